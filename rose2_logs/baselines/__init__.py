@@ -1,0 +1,1 @@
+"""The room segmentation methods that the paper compares with."""

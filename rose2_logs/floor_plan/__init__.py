@@ -1,0 +1,1 @@
+"""Stage C: edges and weights, faces, rooms (paper, section III-C)."""

@@ -1,0 +1,153 @@
+"""Occupancy grids and the only conversion between cells and world coordinates."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rose2_logs.errors import InvalidMapError
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+UNKNOWN = -1
+
+
+@dataclass(frozen=True)
+class GridGeometry:
+    """Where a grid lies in the world.
+
+    The *grid frame* has its origin at the outer corner of cell (0, 0), x along the columns and y along the
+    rows, in metres. The *world* is the frame ``frame_id`` of the map message (REP 105).
+
+    Attributes
+    ----------
+    resolution_m : float
+        Side of a cell.
+    origin_xy_m : (float, float)
+        World position of the grid frame's origin.
+    yaw_rad : float
+        Rotation of the grid frame in the world, counter-clockwise.
+    frame_id : str
+        Name of the world frame.
+    shape : (int, int)
+        Rows and columns (H, W); row 0 lies at the origin.
+    """
+
+    resolution_m: float
+    origin_xy_m: tuple[float, float]
+    yaw_rad: float
+    frame_id: str
+    shape: tuple[int, int]
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.resolution_m) and self.resolution_m > 0):
+            raise InvalidMapError(f"the map's resolution is {self.resolution_m} m; it must be positive")
+        if not np.all(np.isfinite([*self.origin_xy_m, self.yaw_rad])):
+            raise InvalidMapError(
+                f"the map's origin {self.origin_xy_m}, yaw {self.yaw_rad} is not made of finite numbers"
+            )
+
+    @property
+    def cell_area_m2(self) -> float:
+        """Area of one cell in square metres."""
+        return self.resolution_m**2
+
+    @property
+    def rotation(self) -> FloatArray:
+        """The (2, 2) matrix that turns grid-frame vectors into world vectors."""
+        c, s = np.cos(self.yaw_rad), np.sin(self.yaw_rad)
+        return np.array([[c, -s], [s, c]])
+
+    def grid_to_world(self, xy_m: FloatArray) -> FloatArray:
+        """Convert points (..., 2) from the grid frame to the world, metres to metres."""
+        world: FloatArray = np.asarray(xy_m, float) @ self.rotation.T + np.asarray(self.origin_xy_m)
+        return world
+
+    def world_to_grid(self, xy_m: FloatArray) -> FloatArray:
+        """Convert points (..., 2) from the world to the grid frame, metres to metres."""
+        grid: FloatArray = (np.asarray(xy_m, float) - np.asarray(self.origin_xy_m)) @ self.rotation
+        return grid
+
+    def cell_centres(self, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> FloatArray:
+        """World positions (..., 2) in metres of the centres of cells."""
+        return self.grid_to_world((np.stack([columns, rows], axis=-1) + 0.5) * self.resolution_m)
+
+    def world_to_cell(self, xy_m: FloatArray) -> NDArray[np.intp]:
+        """Cells (..., 2) as row, column that hold world points; they may lie outside the grid."""
+        cells = np.floor(self.world_to_grid(xy_m) / self.resolution_m).astype(np.intp)
+        return cells[..., ::-1]
+
+    def corners_m(self) -> FloatArray:
+        """World positions (4, 2) of the outer corners, counter-clockwise from the origin."""
+        height, width = self.shape[0] * self.resolution_m, self.shape[1] * self.resolution_m
+        return self.grid_to_world(np.array([[0, 0], [width, 0], [width, height], [0, height]], float))
+
+
+@dataclass(frozen=True, eq=False)
+class OccupancySnapshot:
+    """One map of a run.
+
+    Attributes
+    ----------
+    index : int
+        Number of the snapshot among the distinct maps taken from the log, from 0.
+    log_time_ns : int
+        When the message was recorded, nanoseconds since the epoch.
+    stamp_ns : int
+        The message's header stamp, nanoseconds.
+    topic : str
+        Topic (or file) that the map comes from.
+    cells : (H, W) int8, read-only
+        -1 unknown, 0..100 occupancy in percent; row 0 at the origin, as in the message.
+    geometry : GridGeometry
+        Where the grid lies in the world.
+    repeats_before : int
+        Identical maps that were received, and dropped, since the snapshot before.
+
+    Raises
+    ------
+    InvalidMapError
+        If `cells` has not the geometry's shape.
+    """
+
+    index: int
+    log_time_ns: int
+    stamp_ns: int
+    topic: str
+    cells: NDArray[np.int8]
+    geometry: GridGeometry
+    repeats_before: int = 0
+
+    def __post_init__(self) -> None:
+        if self.cells.shape != self.geometry.shape:
+            raise InvalidMapError(
+                f"map {self.index} of {self.topic}: data of shape {self.cells.shape} "
+                f"but its header says {self.geometry.shape}"
+            )
+        cells = self.cells.view()
+        cells.flags.writeable = False
+        object.__setattr__(self, "cells", cells)
+
+
+def classify(
+    cells: NDArray[np.int8], *, occupied_min_percent: float, free_max_percent: float
+) -> tuple[BoolArray, BoolArray]:
+    """Masks of the free and of the occupied cells.
+
+    Parameters
+    ----------
+    cells : (H, W) int8
+        -1 unknown, 0..100 occupancy in percent.
+    occupied_min_percent, free_max_percent : float
+        Cells above the first are occupied, known cells below the second are free (map_server's convention).
+
+    Returns
+    -------
+    free, occupied : (H, W) bool
+        Cells between the two thresholds are in neither.
+    """
+    free = (cells >= 0) & (cells < free_max_percent)
+    occupied = cells > occupied_min_percent
+    return free, occupied

@@ -1,0 +1,80 @@
+"""RoomMap: the narrow waist that every segmenter returns; tracking and evaluation need nothing more."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from shapely.geometry.base import BaseGeometry
+
+from rose2_logs.occupancy import FloatArray, GridGeometry
+
+
+@dataclass(frozen=True, eq=False)
+class Doorway:
+    """A passage through which free space of two rooms is connected.
+
+    Attributes
+    ----------
+    rooms : (int, int)
+        The two room numbers, the smaller one first.
+    ends_m : (2, 2) float
+        The two ends of the passage, world metres.
+    """
+
+    rooms: tuple[int, int]
+    ends_m: FloatArray
+
+    @property
+    def width_m(self) -> float:
+        """Clear width of the passage in metres."""
+        return float(np.linalg.norm(self.ends_m[1] - self.ends_m[0]))
+
+
+@dataclass(frozen=True, eq=False)
+class RoomMap:
+    """The rooms of one map.
+
+    Attributes
+    ----------
+    geometry : GridGeometry
+        Where `labels` lies in the world.
+    labels : (H, W) int32, read-only
+        0 = no room, 1..R = the rooms: the segmented map.
+    polygons : tuple of R shapely Polygon or MultiPolygon
+        Shape of room i + 1 in world metres. From ROSE2 it includes the predicted, unseen part of the room;
+        from a baseline it is the outline of the labelled cells.
+    areas_m2 : (R,) float
+        Area of the labelled cells of each room.
+    doorways : tuple of Doorway
+        Passages between rooms.
+    """
+
+    geometry: GridGeometry
+    labels: NDArray[np.int32]
+    polygons: tuple[BaseGeometry, ...]
+    areas_m2: FloatArray
+    doorways: tuple[Doorway, ...] = ()
+
+    def __post_init__(self) -> None:
+        labels = self.labels.view()
+        labels.flags.writeable = False
+        object.__setattr__(self, "labels", labels)
+
+    def __len__(self) -> int:
+        return len(self.polygons)
+
+    @property
+    def predicted_areas_m2(self) -> FloatArray:
+        """Area (R,) of each room's polygon in square metres."""
+        return np.array([polygon.area for polygon in self.polygons], float)
+
+    @property
+    def adjacency(self) -> tuple[tuple[int, int], ...]:
+        """Pairs of room numbers, smaller first, that at least one doorway connects; sorted."""
+        return tuple(sorted({doorway.rooms for doorway in self.doorways}))
+
+    def neighbours(self, room: int) -> tuple[int, ...]:
+        """Rooms that a doorway connects with `room`, ascending."""
+        return tuple(sorted({a + b - room for a, b in self.adjacency if room in (a, b)}))

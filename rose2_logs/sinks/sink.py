@@ -1,0 +1,57 @@
+"""What every sink is: a context manager that receives finished snapshots in order and never feeds back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Protocol, Self
+
+from rose2_logs.parameters import Parameters
+from rose2_logs.tracking.frames import TrackedSnapshot
+
+
+@dataclass(frozen=True)
+class RunInfo:
+    """What a sink knows of the run before the first snapshot.
+
+    Attributes
+    ----------
+    log_path : path
+        The log that is analysed.
+    topic : str
+        The map topic.
+    method : str
+        The segmentation method.
+    parameters : Parameters
+        The resolved parameters.
+    versions : dict
+        Versions of the tool and of the packages that results depend on.
+    provenance : dict
+        What is known of the input: format, size in bytes, SHA-256 fingerprint; JSON values only.
+    """
+
+    log_path: Path
+    topic: str
+    method: str
+    parameters: Parameters
+    versions: dict[str, str]
+    provenance: dict[str, Any]
+
+
+class Sink(Protocol):
+    """Receives every snapshot of a run in order.
+
+    Leaving the context without an exception makes the output whole: it is written beside its final name and
+    renamed; leaving it by an exception removes what was begun.
+    """
+
+    def __enter__(self) -> Self: ...
+
+    def write(self, frame: TrackedSnapshot) -> None:
+        """Take one snapshot."""
+        ...
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None: ...

@@ -1,0 +1,1 @@
+"""Stage D: Voronoi graph and splitting of rooms (paper, section III-D)."""

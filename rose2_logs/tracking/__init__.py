@@ -1,0 +1,1 @@
+"""Identity of rooms over the snapshots of a run."""

@@ -1,0 +1,1 @@
+"""Stage B: segments, wall clusters, representative lines (paper, section III-B)."""
