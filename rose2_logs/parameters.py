@@ -131,7 +131,7 @@ def load_parameters(config: Path | None = None, settings: Iterable[str] = ()) ->
 
 
 def describe_parameters() -> list[dict[str, Any]]:
-    """Describe every parameter by block, name, default, unit, bounds and reason: the source of the documents."""
+    """List every parameter: block, name, default, unit, bounds and reason."""
     rows = []
     for block in dataclasses.fields(Parameters):
         for item in dataclasses.fields(getattr(Parameters(), block.name)):

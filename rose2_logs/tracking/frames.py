@@ -24,7 +24,7 @@ class RoomEvent:
     snapshot : int
         Index of the snapshot.
     track : int
-        The track that the event is about (of a split, the one that was split; of a merge, the one that goes on).
+        The track that the event is about: of a split the one that was split, of a merge the one that stays.
     others : tuple of int
         The further tracks: the parts that a split gave birth to, the tracks that a merge ended.
     overlap : float
