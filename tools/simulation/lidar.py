@@ -1,0 +1,115 @@
+"""A planar lidar: rays against the segments of a building, with the errors of a real sensor."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from simulation.building import Building, FloatArray
+
+EDGE_STEP_M = 0.3
+"""A step between neighbouring ranges that counts as a depth edge."""
+
+
+@dataclass(frozen=True)
+class Lidar:
+    """A lidar's data sheet; the defaults are those of the common indoor sensors (SICK LMS, Hokuyo).
+
+    Attributes
+    ----------
+    beams : int
+        Rays in a scan.
+    field_of_view_rad : float
+        Angle from the first ray to the last, symmetric about the heading.
+    max_range_m : float
+        Nothing returns from further away.
+    range_noise_m : float
+        Standard deviation of a range.
+    dropout : float
+        Probability that a ray gets lost (dark or shiny surfaces).
+    mixed : float
+        Probability that a ray at a depth edge returns from somewhere between the two surfaces.
+    speckle : float
+        Probability of a short return from nothing (dust, a person's leg).
+    """
+
+    beams: int = 361
+    field_of_view_rad: float = float(np.deg2rad(240))
+    max_range_m: float = 25.0
+    range_noise_m: float = 0.015
+    dropout: float = 0.01
+    mixed: float = 0.3
+    speckle: float = 0.0006
+
+    @property
+    def bearings_rad(self) -> FloatArray:
+        """Angle (B,) of each ray to the heading."""
+        return np.linspace(-0.5, 0.5, self.beams) * self.field_of_view_rad
+
+    def scan(self, building: Building, pose: FloatArray, rng: np.random.Generator) -> FloatArray:
+        """Measure once.
+
+        Parameters
+        ----------
+        building : Building
+            Where the lidar is.
+        pose : (3,) float
+            x, y in metres and heading in radians.
+        rng : numpy Generator
+            Source of the sensor's errors.
+
+        Returns
+        -------
+        (B,) float
+            Ranges in metres; NaN where nothing returned.
+        """
+        angles = pose[2] + self.bearings_rad
+        ranges = cast_rays(building, pose[:2], angles, self.max_range_m, rng)
+        hit = np.isfinite(ranges)
+        beside = np.roll(ranges, 1)
+        edge = hit & np.isfinite(beside)
+        edge[0] = False
+        edge[edge] = np.abs(ranges[edge] - beside[edge]) > EDGE_STEP_M
+        between = edge & (rng.random(self.beams) < self.mixed)
+        share = rng.random(self.beams)[between]
+        ranges[between] = share * ranges[between] + (1 - share) * beside[between]
+        ranges = ranges + rng.normal(0, self.range_noise_m, self.beams)
+        speckle = rng.random(self.beams) < self.speckle
+        ranges = np.where(speckle & hit, ranges * rng.random(self.beams), ranges)
+        ranges[rng.random(self.beams) < self.dropout] = np.nan
+        ranges[~(ranges < self.max_range_m)] = np.nan
+        return ranges
+
+
+def cast_rays(
+    building: Building,
+    origin_xy_m: FloatArray,
+    angles_rad: FloatArray,
+    max_range_m: float,
+    rng: np.random.Generator,
+) -> FloatArray:
+    """Distances (B,) to the nearest thing on each ray; infinite where there is none in range.
+
+    Glass lets a ray pass with the transmission of its pane.
+    """
+    start = building.segments[:, :2] - origin_xy_m
+    along = building.segments[:, 2:] - building.segments[:, :2]
+    # Segments that are out of reach are left out: distance from the origin to the nearest point of each.
+    length2 = np.maximum((along**2).sum(1), 1e-12)
+    nearest = start + np.clip(-(start * along).sum(1) / length2, 0, 1)[:, None] * along
+    close = (nearest**2).sum(1) < max_range_m**2
+    start, along, transmission = start[close], along[close], building.transmission[close]
+    rays = np.stack([np.cos(angles_rad), np.sin(angles_rad)], 1)
+
+    across = rays[:, :1] * along[:, 1] - rays[:, 1:] * along[:, 0]  # (B, S)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        distance = (start[:, 0] * along[:, 1] - start[:, 1] * along[:, 0]) / across
+        share = (start[:, 0] * rays[:, 1:] - start[:, 1] * rays[:, :1]) / across
+    distance[~((share >= 0) & (share <= 1) & (distance > 1e-6))] = np.inf
+    passes = rng.random((len(rays), int((transmission > 0).sum()))) < transmission[transmission > 0]
+    glass = distance[:, transmission > 0]
+    distance[:, transmission > 0] = np.where(passes, np.inf, glass)
+    result: FloatArray = distance.min(axis=1, initial=np.inf)
+    result[result > max_range_m] = np.inf
+    return result
