@@ -1,0 +1,78 @@
+"""A method's segmentations of benchmark cases, and their figures."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rose2_logs.errors import CasesError
+from rose2_logs.evaluation.cases import Case
+from rose2_logs.evaluation.scores import Scores, mean_scores, score
+from rose2_logs.parameters import Parameters
+from rose2_logs.workers import ordered_map
+
+
+@dataclass(frozen=True, eq=False)
+class CaseResult:
+    """What a method made of one case.
+
+    Attributes
+    ----------
+    case : Case
+        The case.
+    labels : (H, W) int32
+        The segmented rooms, row 0 at the top as in the case's images.
+    scores : Scores
+        Figures against the true rooms.
+    seconds : float
+        Time of the segmentation.
+    """
+
+    case: Case
+    labels: NDArray[np.int32]
+    scores: Scores
+    seconds: float
+
+
+def evaluate_cases(
+    cases: Sequence[Case], method: str, parameters: Parameters, workers: int = 1
+) -> Iterator[CaseResult]:
+    """Segment each case and score it; results in the order of the cases.
+
+    Raises
+    ------
+    CasesError
+        If an image cannot be read or the two images of a case differ in size.
+    """
+    for _, result in ordered_map(
+        partial(evaluate_case, method=method, parameters=parameters), cases, workers
+    ):
+        yield result
+
+
+def evaluate_case(case: Case, method: str, parameters: Parameters) -> CaseResult:
+    """Segment and score one case."""
+    from rose2_logs.pipeline import analyse
+
+    snapshot, truth = case.snapshot(), case.truth()
+    if snapshot.cells.shape != truth.shape:
+        raise CasesError(f"{case.rooms_path}: of shape {truth.shape}, but its map is {snapshot.cells.shape}")
+    start = time.perf_counter()
+    rooms = analyse(snapshot, parameters, method).rooms
+    seconds = time.perf_counter() - start
+    labels = np.ascontiguousarray(np.flipud(rooms.labels))
+    return CaseResult(case, labels, score(truth, labels), seconds)
+
+
+def group_means(results: Sequence[CaseResult]) -> dict[str, Scores]:
+    """Mean figures of each group, in the order in which the groups occur."""
+    groups = dict.fromkeys(result.case.group for result in results)
+    return {
+        group: mean_scores(result.scores for result in results if result.case.group == group)
+        for group in groups
+    }

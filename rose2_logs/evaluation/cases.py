@@ -1,0 +1,127 @@
+"""Maps with true rooms, as a benchmark lists them in a JSON file.
+
+The file holds ``{"cases": [{"group", "name", "map", "rooms", "resolution_m"}, ...]}`` with paths relative to
+itself: `map` is an 8-bit grey image in the convention of ROS maps, `rooms` a label image of its size, 0 = none.
+Images have row 0 at the top, occupancy grids at the origin below; a case converts between the two.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, UnidentifiedImageError
+
+from rose2_logs.errors import CasesError
+from rose2_logs.occupancy import UNKNOWN, GridGeometry, OccupancySnapshot
+
+OCCUPIED_MAX_GREY = 89
+"""Darker is occupied: (255 - grey) / 255 above map_server's default occupied_thresh of 0.65."""
+FREE_MIN_GREY = 206
+"""Lighter is free: (255 - grey) / 255 below map_server's default free_thresh of 0.196; 205 is unknown."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """One map with its true rooms.
+
+    Attributes
+    ----------
+    group, name : str
+        What the case is called; predictions lie in ``<group>/<name>.png``.
+    map_path, rooms_path : path
+        The two images.
+    resolution_m : float
+        Side of a cell.
+    """
+
+    group: str
+    name: str
+    map_path: Path
+    rooms_path: Path
+    resolution_m: float
+
+    def snapshot(self) -> OccupancySnapshot:
+        """Read the map as an occupancy grid with its origin at the image's lower left corner.
+
+        Raises
+        ------
+        CasesError
+            If the image cannot be read or is not an 8-bit grey one.
+        """
+        grey = _read_image(self.map_path)
+        if grey.ndim != 2 or grey.dtype != np.uint8:
+            raise CasesError(f"{self.map_path}: the map must be an 8-bit grey image")
+        cells = np.full(grey.shape, UNKNOWN, np.int8)
+        cells[grey <= OCCUPIED_MAX_GREY] = 100
+        cells[grey >= FREE_MIN_GREY] = 0
+        geometry = GridGeometry(self.resolution_m, (0.0, 0.0), 0.0, "map", grey.shape)
+        return OccupancySnapshot(
+            0, 0, 0, str(self.map_path), np.ascontiguousarray(np.flipud(cells)), geometry
+        )
+
+    def truth(self) -> NDArray[np.int64]:
+        """Read the true rooms (H, W) as labels, row 0 at the top.
+
+        Raises
+        ------
+        CasesError
+            If the image cannot be read.
+        """
+        labels = _read_image(self.rooms_path)
+        if labels.ndim != 2:
+            raise CasesError(f"{self.rooms_path}: the rooms must be a single-channel label image")
+        return labels.astype(np.int64)
+
+
+def load_cases(path: Path, group: str | None = None) -> tuple[Case, ...]:
+    """Read the list of cases.
+
+    Parameters
+    ----------
+    path : path
+        The JSON file.
+    group : str, optional
+        Take only the cases of this group.
+
+    Raises
+    ------
+    CasesError
+        If the file cannot be read, misses something, or no case is left.
+    """
+    try:
+        listed = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+        raise CasesError(f"{path}: cannot be read as JSON: {error}") from error
+    if not isinstance(listed, dict) or not isinstance(listed.get("cases"), list):
+        raise CasesError(f'{path}: must hold an object with a list "cases"')
+    cases = tuple(_case(path, number, entry) for number, entry in enumerate(listed["cases"]))
+    groups = dict.fromkeys(case.group for case in cases)
+    chosen = tuple(case for case in cases if group in (None, case.group))
+    if not chosen:
+        wanted = "no cases" if group is None else f"no group {group!r}; there are: {', '.join(groups)}"
+        raise CasesError(f"{path}: {wanted}")
+    return chosen
+
+
+def _case(path: Path, number: int, entry: Any) -> Case:
+    try:
+        names = [str(entry["group"]), str(entry["name"])]
+        paths = [path.parent / entry["map"], path.parent / entry["rooms"]]
+        return Case(*names, *paths, float(entry["resolution_m"]))
+    except (KeyError, TypeError, ValueError) as error:
+        raise CasesError(
+            f"{path}: case {number} needs group, name, map, rooms, resolution_m: {error!r}"
+        ) from error
+
+
+def _read_image(path: Path) -> NDArray[Any]:
+    try:
+        with Image.open(path) as image:
+            return np.asarray(image)
+    except (OSError, UnidentifiedImageError) as error:
+        raise CasesError(f"{path}: cannot be read as an image: {error}") from error

@@ -1,0 +1,75 @@
+"""How much two sets of regions have in common, whatever their numbers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rose2_logs.occupancy import FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Overlap:
+    """Sizes and common sizes of the regions of two label arrays, all in the same unit.
+
+    Attributes
+    ----------
+    first_ids, second_ids : (A,) and (B,) int
+        Labels that occur, ascending, without 0.
+    first_size, second_size : (A,) and (B,) float
+        Size of each region.
+    common : (A, B) float
+        Size of the intersection of each pair.
+    """
+
+    first_ids: NDArray[np.intp]
+    second_ids: NDArray[np.intp]
+    first_size: FloatArray
+    second_size: FloatArray
+    common: FloatArray
+
+    @property
+    def iou(self) -> FloatArray:
+        """Intersection over union (A, B) of each pair."""
+        return self.common / (self.first_size[:, None] + self.second_size[None] - self.common)
+
+    @property
+    def share_of_smaller(self) -> FloatArray:
+        """Intersection (A, B) over the size of the smaller of the two."""
+        return self.common / np.minimum(self.first_size[:, None], self.second_size[None])
+
+
+def overlap_of(first: NDArray[np.integer], second: NDArray[np.integer]) -> Overlap:
+    """Count the cells that the regions of two label arrays have in common.
+
+    Parameters
+    ----------
+    first, second : int arrays of the same shape
+        Labels, 0 = none; negative ones are not allowed.
+
+    Raises
+    ------
+    ValueError
+        If the shapes differ.
+    """
+    if first.shape != second.shape:
+        raise ValueError(f"label arrays of different shape: {first.shape} and {second.shape}")
+    first_ids, first_index = _compact(first)
+    second_ids, second_index = _compact(second)
+    rows, columns = len(first_ids) + 1, len(second_ids) + 1
+    table = np.bincount(first_index * columns + second_index, minlength=rows * columns)
+    table = table.reshape(rows, columns).astype(float)
+    return Overlap(first_ids, second_ids, table.sum(1)[1:], table.sum(0)[1:], table[1:, 1:])
+
+
+def _compact(labels: NDArray[np.integer]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Labels that occur without 0, and for each cell (flat) 0 for none or 1 + the position of its label."""
+    flat = labels.ravel()
+    counts = np.bincount(flat, minlength=1)
+    counts[0] = 0
+    ids = np.flatnonzero(counts)
+    index = np.zeros(len(counts), np.intp)
+    index[ids] = np.arange(1, len(ids) + 1)
+    return ids, index[flat]

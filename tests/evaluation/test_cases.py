@@ -1,0 +1,74 @@
+"""Benchmark cases: what is read, and what is said where it cannot be."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from rose2_logs.errors import CasesError, OutputError
+from rose2_logs.evaluation.cases import load_cases
+from rose2_logs.sinks.label_image import write_label_image
+
+
+@pytest.fixture
+def cases_file(tmp_path: Path) -> Path:
+    Image.fromarray(np.array([[254, 205, 0], [206, 89, 90]], np.uint8)).save(tmp_path / "map.png")
+    write_label_image(tmp_path / "rooms.png", np.array([[300, 0, 0], [0, 0, 2]]))
+    case = {"group": "g", "name": "n", "map": "map.png", "rooms": "rooms.png", "resolution_m": 0.1}
+    path = tmp_path / "cases.json"
+    path.write_text(json.dumps({"cases": [case, case | {"group": "h"}]}))
+    return path
+
+
+def test_a_case_is_read_as_a_grid_with_row_0_at_the_bottom(cases_file: Path):
+    """White is free, black occupied, 205 unknown; the image's last row becomes the grid's row 0."""
+    snapshot = load_cases(cases_file)[0].snapshot()
+    assert snapshot.cells.tolist() == [[0, 100, -1], [0, -1, 100]]
+    assert snapshot.geometry.resolution_m == 0.1
+
+
+def test_truth_keeps_image_orientation_and_16_bit_labels(cases_file: Path):
+    """Labels above 255 survive the way through a PNG."""
+    assert load_cases(cases_file)[0].truth().tolist() == [[300, 0, 0], [0, 0, 2]]
+
+
+def test_a_group_is_chosen_and_a_wrong_one_is_answered_with_the_list(cases_file: Path):
+    """--group takes its cases only."""
+    assert [case.group for case in load_cases(cases_file, "h")] == ["h"]
+    with pytest.raises(CasesError, match=r"no group 'x'; there are: g, h"):
+        load_cases(cases_file, "x")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [("{", "JSON"), ("[]", '"cases"'), ('{"cases": [{}]}', "case 0"), ('{"cases": []}', "no cases")],
+)
+def test_a_bad_list_of_cases_is_one_clear_line(tmp_path: Path, text: str, message: str):
+    """The file and what it lacks are named."""
+    path = tmp_path / "cases.json"
+    path.write_text(text)
+    with pytest.raises(CasesError, match=message) as caught:
+        load_cases(path)
+    assert str(path) in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_an_image_that_is_missing_is_named(cases_file: Path):
+    """A case whose image is gone fails when it is read, with the path."""
+    (cases_file.parent / "map.png").unlink()
+    with pytest.raises(CasesError, match="map.png"):
+        load_cases(cases_file)[0].snapshot()
+
+
+def test_label_images_are_8_bit_where_they_can_be(tmp_path: Path):
+    """Up to 255 labels make an 8-bit image; more than 65535 are refused and leave no file."""
+    write_label_image(tmp_path / "a.png", np.array([[255, 0]]))
+    with Image.open(tmp_path / "a.png") as image:
+        assert image.mode == "L"
+    with pytest.raises(OutputError, match="65536"):
+        write_label_image(tmp_path / "b.png", np.array([[65536]]))
+    assert [path.name for path in tmp_path.iterdir()] == ["a.png"]
