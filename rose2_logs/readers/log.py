@@ -1,0 +1,215 @@
+"""A log as the rest of the tool sees it: what it holds, and its distinct maps in the order of log time."""
+
+from __future__ import annotations
+
+import dataclasses
+import logging
+from collections.abc import Iterator
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+
+from rose2_logs.errors import InvalidMapError, LogError, NoMapTopicError
+from rose2_logs.occupancy import OccupancySnapshot
+from rose2_logs.readers.map_stream import MapStream, ReadCounts
+from rose2_logs.readers.messages import is_patch_type
+from rose2_logs.readers.selection import Selection, Times
+from rose2_logs.readers.source import DamagedMessageError, LoggedMap, LogInfo, MessageSource, TopicInfo
+
+__all__ = ["LogInfo", "LogReader", "ReadCounts", "Selection", "TopicInfo", "choose_topic"]
+
+logger = logging.getLogger(__name__)
+
+# Compared without the leading slash, which old ROS 1 bags leave out.
+PREFERRED_TOPIC = "map"
+# Patches of a map travel on the map's topic with this suffix: the convention of costmap_2d and nav2.
+PATCH_SUFFIX = "_updates"
+# Message types named in the error about a log without maps: it stays one readable line.
+MOST_LISTED = 6
+
+
+class LogReader:
+    """The distinct maps of one topic of a log; a context manager that closes its files.
+
+    Attributes
+    ----------
+    info : LogInfo
+        What the log holds.
+    topic : str
+        The map topic that is read.
+    counts : ReadCounts
+        About the latest call of `snapshots`.
+    """
+
+    def __init__(self, source: MessageSource, topic: str | None, selection: Selection) -> None:
+        self.info = source.info
+        self.topic = choose_topic(source.info, topic)
+        self.counts = ReadCounts()
+        self._source = source
+        self._selection = selection
+        self._topics = [self.topic] + [
+            item.name
+            for item in self.info.topics
+            if item.name == self.topic + PATCH_SUFFIX and is_patch_type(item.message_type)
+        ]
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Release the log's files."""
+        self._source.close()
+
+    def snapshots(self) -> Iterator[OccupancySnapshot]:
+        """Yield the selected maps in the order of log time.
+
+        A map equal to the one before is dropped and counted. One map at a time is held, and the times of the
+        topic's messages.
+
+        Raises
+        ------
+        LogError
+            If no map of the topic lies in the time range, or none can be read any more.
+        InvalidMapError
+            If a map contradicts itself; the text names the file, the message and the topic.
+        """
+        times = self._times_in_range()
+        chosen = self._selection.thin(np.unique(times))
+        taken = int(np.isin(times, chosen).sum())
+        self.counts = ReadCounts(messages=len(times), skipped=len(times) - taken)
+        snapshot = None
+        for snapshot in self._read(chosen, self.counts, self._selection.min_change_m2):
+            yield snapshot
+        if snapshot is None:
+            raise self._no_map(self.counts)
+
+    def first(self) -> OccupancySnapshot:
+        """Return the first map in the time range (index 0), whatever else is selected.
+
+        Raises
+        ------
+        LogError, InvalidMapError
+            As `snapshots`.
+        """
+        counts = ReadCounts()
+        snapshot = next(self._read(np.unique(self._times_in_range()), counts), None)
+        if snapshot is None:
+            raise self._no_map(counts)
+        return snapshot
+
+    def last(self) -> OccupancySnapshot:
+        """Return the last map in the time range, whatever else is selected.
+
+        Its index is -1, counted from the end, because the maps before it are not read.
+
+        Raises
+        ------
+        LogError, InvalidMapError
+            As `snapshots`.
+        """
+        counts = ReadCounts()
+        # From the end back: a log may end with messages that are damaged or hold no cells.
+        for time in np.unique(self._times_in_range())[::-1]:
+            snapshot = next(self._read(np.array([time]), counts), None)
+            if snapshot is not None:
+                return dataclasses.replace(snapshot, index=-1)
+        raise self._no_map(counts)
+
+    def _read(
+        self, chosen: Times, counts: ReadCounts, min_change_m2: float | None = None
+    ) -> Iterator[OccupancySnapshot]:
+        """Yield the distinct maps as they stand at the `chosen` times (sorted)."""
+        wanted = set(chosen.tolist())
+        stream = MapStream(self.topic, counts, min_change_m2)
+        for message in self._source.read(self._topics, self._needed(chosen)):
+            is_wanted = message.log_time_ns in wanted
+            try:
+                stream.apply(message.decode())
+            except DamagedMessageError as error:
+                if not counts.damaged:
+                    logger.warning("%s: %s; reading goes on without it", self._place(message), error)
+                counts.damaged += is_wanted
+                continue
+            except InvalidMapError as error:
+                raise InvalidMapError(f"{self._place(message)}: {error}") from error
+            if is_wanted and (snapshot := stream.snapshot(message.log_time_ns)) is not None:
+                yield snapshot
+
+    def _needed(self, chosen: Times) -> Times:
+        """Times of the messages that the maps at the `chosen` times are made of.
+
+        Without patches each map is a message. With patches it is the last grid and all patches since.
+        """
+        if len(self._topics) == 1 or not len(chosen):
+            return chosen
+        grids, patches = (np.unique(self._source.log_times(topic)) for topic in self._topics)
+        last_grid = np.searchsorted(grids, chosen, "right") - 1
+        begins = np.where(last_grid >= 0, grids[last_grid], chosen) if len(grids) else chosen
+        # A patch is needed if some chosen map is made of it: its grid began before, the map stands after it.
+        following = np.searchsorted(chosen, patches, "left")
+        inside = following < len(chosen)
+        patches, following = patches[inside], following[inside]
+        return np.unique(np.concatenate([chosen, begins, patches[begins[following] <= patches]]))
+
+    def _times_in_range(self) -> Times:
+        times = np.sort(np.concatenate([self._source.log_times(topic) for topic in self._topics]))
+        if not len(times):
+            raise LogError(f"{self.info.path}: there is no message on {self.topic}; choose another topic")
+        in_range = self._selection.in_range(times)
+        if not len(in_range):
+            raise LogError(
+                f"{self.info.path}: no message on {self.topic} lies in the time range; "
+                f"they were logged from {times[0]} to {times[-1]} ns"
+            )
+        return in_range
+
+    def _place(self, message: LoggedMap) -> str:
+        times = self._source.log_times(message.topic)
+        number = int(np.searchsorted(times, message.log_time_ns)) + 1
+        return f"{self.info.path}: message {number} of {len(times)} on {message.topic}"
+
+    def _no_map(self, counts: ReadCounts) -> LogError:
+        why = f"; {counts.damaged} messages are damaged" if counts.damaged else ""
+        return LogError(
+            f"{self.info.path}: no message on {self.topic} in the time range holds a map{why}; "
+            "choose another topic or time range"
+        )
+
+
+def choose_topic(info: LogInfo, asked: str | None = None) -> str:
+    """Choose the map topic: the one asked for, else ``/map``, else the only one with messages.
+
+    Raises
+    ------
+    NoMapTopicError
+        If there is none, or there are several and none was asked for; the text lists them.
+    """
+    maps = {topic.name: topic for topic in info.topics if topic.is_map}
+    listed = ", ".join(maps)
+    if asked is not None:
+        for name in maps:
+            if name.lstrip("/") == asked.lstrip("/"):
+                return name
+        has = f"its map topics are {listed}" if maps else "it has no map topics"
+        raise NoMapTopicError(f"{info.path}: {asked} is not a topic with occupancy grids; {has}")
+    if not maps:
+        others = ", ".join(sorted({topic.message_type for topic in info.topics})[:MOST_LISTED]) or "nothing"
+        raise NoMapTopicError(
+            f"{info.path}: no topic holds occupancy grids (nav_msgs/OccupancyGrid); it holds {others}; "
+            "record the topic of the mapping node, often /map, as well"
+        )
+    filled = {name: topic for name, topic in maps.items() if topic.message_count != 0}
+    if not filled:
+        raise NoMapTopicError(f"{info.path}: no message was recorded on the map topics {listed}")
+    for name in filled:
+        if name.lstrip("/") == PREFERRED_TOPIC:
+            return name
+    if len(filled) > 1:
+        raise NoMapTopicError(f"{info.path}: several topics hold maps, choose one: {', '.join(filled)}")
+    return next(iter(filled))

@@ -1,0 +1,232 @@
+"""Maps saved by map_server (a ``.yaml`` file and its image), one or a sequence, as a source of maps."""
+
+from __future__ import annotations
+
+import logging
+import re
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rose2_logs.errors import InvalidMapError, LogError
+from rose2_logs.occupancy import UNKNOWN
+from rose2_logs.readers.messages import Cells, Grid, make_grid
+from rose2_logs.readers.selection import Times
+from rose2_logs.readers.source import LoggedMap, LogInfo, MessageSource, TopicInfo
+
+logger = logging.getLogger(__name__)
+
+TOPIC = "/map"
+FRAME_ID = "map"
+# Saved maps carry no time; a sequence is taken as one map a second from the epoch on.
+STEP_NS = 10**9
+# map_server's defaults, for files that leave them out.
+OCCUPIED_THRESH = 0.65
+FREE_THRESH = 0.196
+MODES = ("trinary", "scale", "raw")
+# What map savers write in trinary mode for free, unknown and occupied.
+SAVED_FREE, SAVED_UNKNOWN, SAVED_OCCUPIED = 254, 205, 0
+
+
+class MapFilesSource(MessageSource):
+    """Saved maps in the order given, as messages on one topic.
+
+    Parameters
+    ----------
+    path : Path
+        Name of the log.
+    files : sequence of Path
+        The ``.yaml`` files; each is read when its turn comes.
+    """
+
+    def __init__(self, path: Path, files: Sequence[Path]) -> None:
+        self._files = list(files)
+        self.info = LogInfo(
+            path,
+            "map_server map" if len(files) == 1 else "map_server maps",
+            sum(_size(file) for file in files),
+            0,
+            (len(files) - 1) * STEP_NS,
+            (TopicInfo(TOPIC, "map_server", len(files), True, "image"),),
+            True,
+        )
+
+    def close(self) -> None:
+        """Nothing is open between maps."""
+
+    def log_times(self, topic: str) -> Times:
+        """One map a second, counted from 0 nanoseconds."""
+        return np.arange(len(self._files), dtype=np.int64) * STEP_NS
+
+    def read(self, topics: Sequence[str], times: Times) -> Iterator[LoggedMap]:
+        """Yield the maps at `times`."""
+        for time in times.tolist():
+            yield LoggedMap(time, TOPIC, partial(read_map, self._files[time // STEP_NS], time))
+
+
+def natural_order(path: Path) -> tuple[list[tuple[int, str]], str]:
+    """Sort key that puts ``map2`` before ``map10``."""
+    parts = re.findall(r"(\d+)|(\D+)", path.stem)
+    return [(int(digits), "") if digits else (-1, text) for digits, text in parts], str(path)
+
+
+def is_map_file(path: Path) -> bool:
+    """Whether a YAML file describes a map: it names an image and a resolution."""
+    try:
+        described = _load_yaml(path)
+    except LogError:
+        return False
+    return "image" in described and "resolution" in described
+
+
+def read_map(path: Path, stamp_ns: int = 0) -> Grid | None:
+    """Read one saved map as map_server would.
+
+    Parameters
+    ----------
+    path : Path
+        The ``.yaml`` file: image, resolution, origin (x, y, yaw), negate, occupied_thresh, free_thresh, mode.
+    stamp_ns : int
+        Stamp to give to the map.
+
+    Returns
+    -------
+    Grid or None
+        Row 0, at the origin, is the image's bottom row. None if the image has no pixels.
+
+    Raises
+    ------
+    InvalidMapError
+        If the file or its image cannot be used.
+    """
+    described = _load_yaml(path)
+    resolution = _number(path, described, "resolution", None)
+    origin = described.get("origin")
+    if not (isinstance(origin, Sequence) and len(origin) == 3 and all(_is_number(part) for part in origin)):
+        raise InvalidMapError(f"{path}: origin is {origin!r}; it must be three numbers: x, y, yaw")
+    x, y, yaw = (float(part) for part in origin)
+    shade, opaque = _load_image(_image_path(path, described))
+    pose = (x, y, 0.0, 0.0, 0.0, np.sin(yaw / 2), np.cos(yaw / 2))
+    return make_grid(
+        stamp_ns, FRAME_ID, resolution, pose, _cells(path, described, shade, opaque)[::-1].copy()
+    )
+
+
+def _cells(
+    path: Path, described: Mapping[str, Any], shade: NDArray[np.float32], opaque: NDArray[np.bool_] | None
+) -> Cells:
+    """Occupancy of pixels of brightness `shade` in 0..1, by the mode and the thresholds of the file."""
+    mode = str(described.get("mode", "trinary")).lower()
+    if mode not in MODES:
+        raise InvalidMapError(f"{path}: mode is {mode!r}; it must be one of {', '.join(MODES)}")
+    if mode == "raw":
+        value = np.round(shade * 255)
+        return np.where(value <= 100, value, UNKNOWN).astype(np.int8)
+    negate = described.get("negate", 0)
+    if negate not in (0, 1):
+        raise InvalidMapError(f"{path}: negate is {negate!r}; it must be 0 or 1")
+    occupied_above = _number(path, described, "occupied_thresh", OCCUPIED_THRESH)
+    free_below = _number(path, described, "free_thresh", FREE_THRESH)
+    if not 0 <= free_below < occupied_above <= 1:
+        raise InvalidMapError(
+            f"{path}: free_thresh {free_below} must lie below occupied_thresh {occupied_above}, both in 0..1"
+        )
+    occupancy = shade if negate else 1 - shade
+    if mode == "scale":
+        cells = np.round((occupancy - free_below) / (occupied_above - free_below) * 100)
+        cells = np.where(occupancy < free_below, 0, np.where(occupancy > occupied_above, 100, cells))
+        return (cells if opaque is None else np.where(opaque, cells, UNKNOWN)).astype(np.int8)
+    unknown = ~opaque if opaque is not None else np.zeros(shade.shape, np.bool_)
+    saved_as_unknown = np.round(shade * 255) == SAVED_UNKNOWN
+    if (
+        not negate
+        and free_below > 1 - SAVED_UNKNOWN / 255
+        and _is_saved_trinary(shade)
+        and saved_as_unknown.any()
+    ):
+        # nav2 before mid 2025 saved free_thresh 0.25 with such images, by which unknown cells load as free.
+        logger.warning(
+            "%s: by its free_thresh %g unknown pixels (%d) would be free; they are read as unknown",
+            path,
+            free_below,
+            SAVED_UNKNOWN,
+        )
+        unknown |= saved_as_unknown
+    cells = np.where(occupancy > occupied_above, np.int8(100), np.int8(UNKNOWN))
+    cells[occupancy < free_below] = 0
+    cells[unknown] = UNKNOWN
+    return cells
+
+
+def _is_saved_trinary(shade: NDArray[np.float32]) -> bool:
+    """Whether an image holds only the three values that map savers write."""
+    return bool(np.isin(np.round(shade * 255), (SAVED_FREE, SAVED_UNKNOWN, SAVED_OCCUPIED)).all())
+
+
+def _load_image(path: Path) -> tuple[NDArray[np.float32], NDArray[np.bool_] | None]:
+    """Brightness (H, W) in 0..1, the mean of the colours, and which pixels are opaque if the image tells."""
+    from PIL import Image, UnidentifiedImageError
+
+    try:
+        with warnings.catch_warnings():
+            # Large maps are wanted; Pillow still refuses those of more than 180 million pixels.
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+            with Image.open(path) as image:
+                if image.mode.startswith("I"):
+                    return np.asarray(image, np.float32) / np.float32(2**16 - 1), None
+                has_alpha = "A" in image.getbands() or "transparency" in image.info
+                pixels = np.asarray(
+                    image.convert("RGBA" if has_alpha else "RGB" if image.mode != "L" else "L")
+                )
+    except (OSError, ValueError, SyntaxError, UnidentifiedImageError, Image.DecompressionBombError) as error:
+        raise InvalidMapError(f"{path}: cannot be read as the image of a map: {error}") from error
+    if pixels.ndim == 2:
+        return pixels.astype(np.float32) / np.float32(255), None
+    shade = pixels[..., :3].mean(axis=-1, dtype=np.float32) / np.float32(255)
+    return shade, pixels[..., 3] == 255 if has_alpha else None
+
+
+def _load_yaml(path: Path) -> dict[str, Any]:
+    import yaml
+
+    try:
+        described = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise LogError(f"{path}: cannot be read: {error}") from error
+    except yaml.YAMLError as error:
+        raise InvalidMapError(f"{path}: is not YAML: {' '.join(str(error).split())}") from error
+    if not isinstance(described, dict):
+        raise InvalidMapError(f"{path}: does not describe a map; it needs image, resolution and origin")
+    return described
+
+
+def _image_path(path: Path, described: Mapping[str, Any]) -> Path:
+    image = described.get("image")
+    if not isinstance(image, str) or not image:
+        raise InvalidMapError(f"{path}: image is {image!r}; it must name the map's image file")
+    return path.parent / image
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+def _number(path: Path, described: Mapping[str, Any], name: str, default: float | None) -> float:
+    value = described.get(name, default)
+    if not _is_number(value):
+        raise InvalidMapError(f"{path}: {name} is {value!r}; it must be a number")
+    return float(value)
+
+
+def _size(path: Path) -> int:
+    """Bytes of a saved map, as far as its files exist."""
+    try:
+        image = _image_path(path, _load_yaml(path))
+        return path.stat().st_size + (image.stat().st_size if image.exists() else 0)
+    except LogError:
+        return path.stat().st_size if path.exists() else 0

@@ -1,0 +1,275 @@
+"""Occupancy grids and their patches from message bytes: CDR of ROS 2, the serialization of ROS 1, protobuf.
+
+Generic deserializers make Python objects of the cells one by one, which takes seconds for a large map. Here
+the few fields before the cells are unpacked by hand and the cells stay a view of the message's bytes.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rose2_logs.errors import InvalidMapError
+from rose2_logs.occupancy import UNKNOWN, GridGeometry
+
+Cells = NDArray[np.int8]
+
+GRID_TYPES = ("nav_msgs/OccupancyGrid", "nav2_msgs/Costmap")
+PATCH_TYPES = ("map_msgs/OccupancyGridUpdate", "nav2_msgs/CostmapUpdate")
+FOXGLOVE_GRID_TYPE = "foxglove.Grid"
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """A whole map: stamp in nanoseconds, geometry, cells (H, W) int8 in {-1, 0..100}."""
+
+    stamp_ns: int
+    geometry: GridGeometry
+    cells: Cells
+
+
+@dataclass(frozen=True, eq=False)
+class Patch:
+    """New values of a rectangle of the map before: stamp, first row and column, cells (h, w) int8."""
+
+    stamp_ns: int
+    row: int
+    column: int
+    cells: Cells
+
+
+Decoder = Callable[[memoryview], Grid | Patch | None]
+
+
+def ros_type(name: str) -> str:
+    """Give a ROS message type the one spelling used here: ``package/Type``, without ``/msg/``."""
+    return name.replace("/msg/", "/")
+
+
+def is_patch_type(message_type: str) -> bool:
+    """Whether messages of this type are patches of a map."""
+    return ros_type(message_type) in PATCH_TYPES
+
+
+def is_map_type(message_type: str, encoding: str) -> bool:
+    """Whether messages of this type and encoding are whole maps that `decoder` can read."""
+    if encoding == "protobuf":
+        return message_type == FOXGLOVE_GRID_TYPE
+    return encoding in ("cdr", "ros1") and ros_type(message_type) in GRID_TYPES
+
+
+def decoder(message_type: str, encoding: str, schema: bytes = b"") -> Decoder | None:
+    """Return the function that decodes map messages of one kind.
+
+    Parameters
+    ----------
+    message_type : str
+        ROS message type in either spelling, or protobuf message name.
+    encoding : str
+        ``cdr``, ``ros1`` or ``protobuf``.
+    schema : bytes
+        The schema stored in the log; needed for protobuf only.
+
+    Returns
+    -------
+    callable or None
+        From the message's bytes to a Grid, a Patch, or None for a grid of no cells; raises InvalidMapError.
+        None if such messages are neither maps nor patches, or cannot be read.
+    """
+    if is_map_type(message_type, encoding) and encoding == "protobuf":
+        from rose2_logs.readers.foxglove_grid import grid_decoder
+
+        return grid_decoder(schema)
+    decode = {
+        "nav_msgs/OccupancyGrid": _occupancy_grid,
+        "map_msgs/OccupancyGridUpdate": _occupancy_grid_update,
+        "nav2_msgs/Costmap": _costmap,
+        "nav2_msgs/CostmapUpdate": _costmap_update,
+    }.get(ros_type(message_type))
+    if decode is None or encoding not in ("cdr", "ros1"):
+        return None
+    open_fields = CdrFields if encoding == "cdr" else Ros1Fields
+    return lambda data: decode(open_fields(data))
+
+
+class Fields:
+    """The fields of a serialized message, taken one after the other; strings and arrays have a 4-byte count.
+
+    Raises InvalidMapError where the message ends before its fields do.
+    """
+
+    byte_order = "<"
+    start = 0
+    largest_alignment = 1
+
+    def __init__(self, data: memoryview) -> None:
+        self._data = data
+        self._place = self.start
+
+    def numbers(self, code: str, count: int = 1) -> tuple[float, ...]:
+        """Take `count` numbers of one `struct` type."""
+        alignment = min(struct.calcsize(code), self.largest_alignment)
+        self._place += -(self._place - self.start) % alignment
+        layout = f"{self.byte_order}{count}{code}"
+        try:
+            values = struct.unpack_from(layout, self._data, self._place)
+        except struct.error as error:
+            raise InvalidMapError(
+                f"the message ends after {len(self._data)} bytes, before its fields"
+            ) from error
+        self._place += struct.calcsize(layout)
+        return values
+
+    def integers(self, code: str, count: int = 1) -> tuple[int, ...]:
+        """Take `count` integers of one `struct` type."""
+        return tuple(int(value) for value in self.numbers(code, count))
+
+    def octets(self, what: str) -> memoryview:
+        """Take a string or an array of bytes, without a copy."""
+        (count,) = self.integers("I")
+        left = len(self._data) - self._place
+        if count > left:
+            raise InvalidMapError(f"its {what} says {count} bytes, but the message has only {left} more")
+        self._place += count
+        return self._data[self._place - count : self._place]
+
+    def string(self, what: str) -> str:
+        """Take a string; CDR ends it with a zero byte, which goes."""
+        return bytes(self.octets(what)).rstrip(b"\0").decode("utf-8", errors="replace")
+
+    def time_ns(self) -> int:
+        """Take a time as nanoseconds."""
+        seconds, nanoseconds = self.integers("i")[0], self.integers("I")[0]
+        return seconds * 10**9 + nanoseconds
+
+    def header(self) -> tuple[int, str]:
+        """Take a std_msgs/Header: stamp in nanoseconds and frame."""
+        return self.time_ns(), self.string("frame_id")
+
+
+# Second byte of the encapsulation header -> byte order, largest alignment (XCDR 1 and 2, plain).
+_CDR_KINDS = {0: (">", 8), 1: ("<", 8), 6: (">", 4), 7: ("<", 4)}
+
+
+class CdrFields(Fields):
+    """CDR as ROS 2 writes it: four bytes that tell the byte order, then fields aligned to their own size."""
+
+    start = 4
+
+    def __init__(self, data: memoryview) -> None:
+        super().__init__(data)
+        if len(data) < self.start or data[0] != 0 or data[1] not in _CDR_KINDS:
+            raise InvalidMapError(
+                f"it does not begin as CDR, but with the bytes {bytes(data[:4]).hex(' ')!r}"
+            )
+        self.byte_order, self.largest_alignment = _CDR_KINDS[data[1]]
+
+
+class Ros1Fields(Fields):
+    """ROS 1: little endian, without gaps; the header has a sequence number, times are unsigned."""
+
+    def time_ns(self) -> int:
+        """Take a time as nanoseconds."""
+        seconds, nanoseconds = self.integers("I", 2)
+        return seconds * 10**9 + nanoseconds
+
+    def header(self) -> tuple[int, str]:
+        """Take a std_msgs/Header: stamp in nanoseconds and frame."""
+        self.integers("I")
+        return super().header()
+
+
+def percent(values: Cells) -> Cells:
+    """Occupancy as -1, 0..100; any other value counts as unknown, as map savers take it."""
+    if values.size == 0 or (values.min() >= UNKNOWN and values.max() <= 100):
+        return values
+    return np.where((values < UNKNOWN) | (values > 100), np.int8(UNKNOWN), values)
+
+
+def _cost_table() -> Cells:
+    """Occupancy per cost: 0 free, 1..252 to 1..98, 253 (inscribed) 99, 254 (lethal) 100, 255 unknown.
+
+    nav2 publishes its costmaps as occupancy grids by the same table.
+    """
+    table = np.empty(256, np.int8)
+    table[0], table[253], table[254], table[255] = 0, 99, 100, UNKNOWN
+    table[1:253] = 1 + (97 * (np.arange(1, 253) - 1)) // 251
+    return table
+
+
+_OCCUPANCY_OF_COST = _cost_table()
+
+
+def yaw_of(x: float, y: float, z: float, w: float) -> float:
+    """Rotation about z, in radians, of a quaternion of any length; all zeros, as left unset, mean none."""
+    if not all(math.isfinite(part) for part in (x, y, z, w)):
+        raise InvalidMapError(
+            f"the orientation of its origin ({x}, {y}, {z}, {w}) is not made of finite numbers"
+        )
+    # No division by the length: it drops out of the two arguments.
+    return math.atan2(2 * (w * z + x * y), w * w + x * x - y * y - z * z)
+
+
+def _resolution(single: float) -> float:
+    """Undo the writer's rounding to single precision: 0.05, not 0.0500000007."""
+    return float(str(np.float32(single)))
+
+
+def _rows(data: memoryview, rows: int, columns: int) -> NDArray[np.uint8]:
+    if rows * columns != len(data):
+        raise InvalidMapError(f"it says {columns} x {rows} cells, but its data has {len(data)}")
+    return np.frombuffer(data, np.uint8).reshape(rows, columns)
+
+
+def make_grid(
+    stamp_ns: int, frame_id: str, resolution_m: float, pose: tuple[float, ...], cells: Cells
+) -> Grid | None:
+    """Put a grid together; `pose` is x, y, z and the quaternion x, y, z, w. None if there are no cells."""
+    if cells.size == 0:
+        return None
+    x, y, _, *quaternion = pose
+    height, width = cells.shape
+    geometry = GridGeometry(resolution_m, (x, y), yaw_of(*quaternion), frame_id, (height, width))
+    return Grid(stamp_ns, geometry, cells)
+
+
+def _occupancy_grid(fields: Fields) -> Grid | None:
+    stamp_ns, frame_id = fields.header()
+    fields.time_ns()  # map_load_time
+    (resolution,) = fields.numbers("f")
+    width, height = fields.integers("I", 2)
+    pose = fields.numbers("d", 7)
+    cells = _rows(fields.octets("data"), height, width).view(np.int8)
+    return make_grid(stamp_ns, frame_id, _resolution(resolution), pose, percent(cells))
+
+
+def _occupancy_grid_update(fields: Fields) -> Patch:
+    stamp_ns, _ = fields.header()
+    x, y = fields.integers("i", 2)
+    width, height = fields.integers("I", 2)
+    cells = _rows(fields.octets("data"), height, width).view(np.int8)
+    return Patch(stamp_ns, y, x, percent(cells))
+
+
+def _costmap(fields: Fields) -> Grid | None:
+    stamp_ns, frame_id = fields.header()
+    fields.time_ns()  # map_load_time
+    fields.time_ns()  # update_time
+    fields.string("layer")
+    (resolution,) = fields.numbers("f")
+    width, height = fields.integers("I", 2)
+    pose = fields.numbers("d", 7)
+    costs = _rows(fields.octets("data"), height, width)
+    return make_grid(stamp_ns, frame_id, _resolution(resolution), pose, _OCCUPANCY_OF_COST[costs])
+
+
+def _costmap_update(fields: Fields) -> Patch:
+    stamp_ns, _ = fields.header()
+    x, y, width, height = fields.integers("I", 4)
+    costs = _rows(fields.octets("data"), height, width)
+    return Patch(stamp_ns, y, x, _OCCUPANCY_OF_COST[costs])
