@@ -20,7 +20,6 @@ import json
 from pathlib import Path
 
 import numpy as np
-
 from log_writing import NANOSECONDS, robot_log
 from simulation.layout import STYLES
 from simulation.make_building import simulate_building
@@ -82,15 +81,12 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument(
-        "-o", "--output", type=Path, default=Path("sample_logs"), help="directory of the logs (sample_logs)"
-    )
-    parser.add_argument("--seed", type=int, default=1, help="decides on buildings and runs (1)")
-    parser.add_argument(
-        "--cases", type=Path, metavar="DIR", help="write benchmark cases to DIR instead of logs"
-    )
-    parser.add_argument("--count", type=int, default=10, help="number of buildings for --cases (10)")
-    parser.add_argument("--style", choices=STYLES, help="style of every building for --cases (all in turn)")
+    add = parser.add_argument
+    add("-o", "--output", type=Path, default=Path("sample_logs"), help="directory of the logs (%(default)s)")
+    add("--seed", type=int, default=1, help="decides on buildings and runs (%(default)s)")
+    add("--cases", type=Path, metavar="DIR", help="write benchmark cases to DIR instead of logs")
+    add("--count", type=int, default=10, help="number of buildings for --cases (%(default)s)")
+    add("--style", choices=STYLES, help="style of every building for --cases (default: all in turn)")
     options = parser.parse_args(arguments)
     if options.cases is None:
         make_sample_logs(options.output, options.seed)

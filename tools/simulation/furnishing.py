@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import shapely
-from shapely.affinity import affine_transform
+from shapely.affinity import affine_transform, rotate
 from shapely.geometry import Polygon, box
 from shapely.geometry.base import BaseGeometry
 
@@ -55,11 +55,25 @@ def wall_piece(rng: np.random.Generator, kind: str, length: float) -> tuple[floa
     return side, [box(0, 0.03, side, 0.03 + side)]
 
 
-def furnish(rng: np.random.Generator, room: Room, draft: FloorPlanDraft) -> list[BaseGeometry]:
-    """Furniture of one room: pieces along its walls, a table in the middle of a large one."""
+def furnish(
+    rng: np.random.Generator, room: Room, draft: FloorPlanDraft, clutter: float
+) -> list[BaseGeometry]:
+    """Furniture of one room: pieces along its walls, tables and chairs in the middle.
+
+    Parameters
+    ----------
+    rng : numpy Generator
+        Source of every choice.
+    room : Room
+        Where to put it.
+    draft : FloorPlanDraft
+        Its doorways stay free.
+    clutter : float
+        Share of the walls that is furnished in the building, 0..1; rooms differ.
+    """
     kind = room.name.split()[0]
     corridor = kind in ("corridor", "hall")
-    density = 0.06 if kind == "corridor" else float(rng.uniform(0.2, 1.0))
+    density = 0.06 if kind == "corridor" else float(np.clip(clutter + rng.normal(0, 0.2), 0.0, 1.0))
     keep_free = shapely.union_all(draft.doorways).buffer(DOOR_CLEARANCE_M, quad_segs=2)
     inside = room.polygon.buffer(0.02)
     placed: list[BaseGeometry] = []
@@ -76,30 +90,41 @@ def furnish(rng: np.random.Generator, room: Room, draft: FloorPlanDraft) -> list
             origin = edge[:2] + direction * at
             frame = [direction[0], -direction[1], direction[1], direction[0], origin[0], origin[1]]
             piece = shapely.union_all([affine_transform(shape, frame) for shape in shapes])
+            if rng.random() < 0.3:  # pushed aside
+                piece = rotate(piece, float(rng.normal(0, 8)), "center")
             taken = shapely.union_all(placed) if placed else Polygon()
             hull = piece.convex_hull
             narrow = corridor and kind == "corridor" and hull.area / width > 0.5
             if not narrow and not hull.intersects(keep_free) and not hull.buffer(0.05).intersects(taken):
                 placed.append(piece.intersection(inside))
-            at += width + float(rng.exponential(0.4))
+            at += width + float(rng.exponential(0.25))
     if not corridor or kind == "hall":
-        placed += middle_furniture(rng, room, keep_free, placed)
+        placed += middle_furniture(rng, room, keep_free, placed, density)
     return [piece for piece in placed if not piece.is_empty]
 
 
 def middle_furniture(
-    rng: np.random.Generator, room: Room, keep_free: BaseGeometry, placed: list[BaseGeometry]
+    rng: np.random.Generator,
+    room: Room,
+    keep_free: BaseGeometry,
+    placed: list[BaseGeometry],
+    density: float,
 ) -> list[BaseGeometry]:
     """Tables with chairs, or pillars, away from the walls."""
     found: list[BaseGeometry] = []
     taken = shapely.union_all([*placed, keep_free])
-    for _ in range(int(room.polygon.area / 10)):
-        if rng.random() < 0.3:
+    for _ in range(int(room.polygon.area / 5)):
+        if rng.random() > density:
             continue
         x0, y0, x1, y1 = room.polygon.bounds
         x, y = float(rng.uniform(x0, x1)), float(rng.uniform(y0, y1))
-        if rng.random() < 0.15:
+        pick = float(rng.random())
+        if pick < 0.15:
             piece: BaseGeometry = square(x, y, float(rng.uniform(0.2, 0.5)))
+        elif pick < 0.45:
+            piece = shapely.union_all(chair(rng, x, y))
+        elif pick < 0.6:  # a desk with a solid side and back
+            piece = shapely.union_all([box(x, y, x + 1.4, y + 0.04), box(x, y, x + 0.45, y + 0.7)])
         else:
             width, depth = float(rng.uniform(1.2, 2.4)), float(rng.uniform(0.7, 1.2))
             shapes = [shapely.affinity.translate(leg, x, y) for leg in legs(width, depth)]
@@ -107,11 +132,32 @@ def middle_furniture(
                 side = -0.25 if k % 2 else depth + 0.25
                 shapes += chair(rng, x + float(rng.uniform(0.2, width - 0.2)), y + side)
             piece = shapely.union_all(shapes)
+        piece = rotate(piece, float(rng.choice([0, 90]) + rng.normal(0, 6)), "center")
         hull = piece.convex_hull
         if room.polygon.buffer(-0.5).contains(hull) and not hull.buffer(0.4).intersects(taken):
             found.append(piece)
             taken = taken.union(piece)
     return found
+
+
+def wall_bumps(rng: np.random.Generator, room: Room, draft: FloorPlanDraft) -> list[BaseGeometry]:
+    """Pilasters, pipes, and radiators: what keeps real walls from being straight."""
+    keep_free = shapely.union_all(draft.doorways).buffer(0.2, quad_segs=2)
+    every = float(rng.choice([1.2, 2.0, 4.0, 8.0]))
+    bumps: list[BaseGeometry] = []
+    for edge in boundary_segments(shapely.geometry.polygon.orient(room.polygon)):
+        length = float(np.hypot(*(edge[2:] - edge[:2])))
+        direction = (edge[2:] - edge[:2]) / max(length, 1e-9)
+        at = float(rng.exponential(every))
+        while at < length - 0.4:
+            width, depth = float(rng.uniform(0.06, 0.4)), float(rng.uniform(0.05, 0.22))
+            origin = edge[:2] + direction * at
+            frame = [direction[0], -direction[1], direction[1], direction[0], origin[0], origin[1]]
+            bump = affine_transform(box(0, 0, width, depth), frame)
+            if not bump.intersects(keep_free):
+                bumps.append(bump)
+            at += width + float(rng.exponential(every))
+    return bumps
 
 
 def door_leaves(rng: np.random.Generator, hinges: list[FloatArray]) -> list[Polygon]:

@@ -9,7 +9,7 @@ from shapely.geometry import LineString, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from simulation.building import Building, FloatArray, Room, boundary_segments
-from simulation.furnishing import door_leaves, furnish, surroundings
+from simulation.furnishing import door_leaves, furnish, surroundings, wall_bumps
 from simulation.layout import STYLES, FloorPlanDraft, draw_floor_plan
 
 OUTER_WALL_M = 0.35
@@ -106,8 +106,10 @@ def simulate_building(seed: int, style: str | None = None, *, turn_rad: float | 
     lean = float(rng.normal(0, np.deg2rad(0.7))) if rng.random() < 0.75 else float(rng.uniform(0, np.pi))
     turned(draft, lean if turn_rad is None else turn_rad)
     furniture: list[BaseGeometry] = []
+    clutter = float(rng.uniform(0.1, 1.0))
     for room in draft.rooms:
-        furniture += furnish(rng, room, draft)
+        furniture += furnish(rng, room, draft, clutter)
+        furniture += wall_bumps(rng, room, draft)
     furniture += door_leaves(rng, draft.hinges)
     slots, panes, passing = windows(rng, draft, chance=float(rng.uniform(0.05, 0.5)))
     floor = shapely.union_all([room.polygon for room in draft.rooms])
