@@ -35,11 +35,93 @@ class OccupancyParameters:
 
 
 @dataclass(frozen=True)
+class SpectrumParameters:
+    """Stage A: dominant directions, structure score, clean map (paper, III-A)."""
+
+    wall_sigma_m: float = _number(0.06, "m", "Walls in SLAM maps wobble by about one cell of 5 cm.", 0.001)
+    longest_wave_m: float = _number(10.0, "m", "Longer waves show the building's outline, not its walls.", 0.1)
+    shortest_wave_m: float = _number(0.25, "m", "Shorter waves show the raster (five cells of 5 cm).", 0.001)
+    angle_step_rad: float = _number(
+        math.radians(0.25), "rad", "A wall of 10 m leaves its line by less than a cell.", 1e-4, 0.2
+    )
+    angle_sigma_rad: float = _number(
+        math.radians(0.75), "rad", "Smoothing of the angular energy, three bins.", 0.0, 0.2
+    )
+    peak_min_prominence: float = _number(
+        0.2, "share of the range", "A direction's peak stands out by this much; the paper's value.", 0, 1
+    )
+    direction_min_gap_rad: float = _number(
+        math.radians(5.0), "rad", "Directions closer than this are one.", 0.0, 1.5
+    )
+    structure_length_m: float = _number(
+        2.0, "m", "Length of wall over which a cell gathers its score: more than most furniture.", 0.01
+    )
+    threshold_min: float = _number(0.2, "score", "Least automatic threshold of the clean map.", 0, 1)
+    threshold_max: float = _number(0.6, "score", "Greatest automatic threshold of the clean map.", 0, 1)
+
+
+@dataclass(frozen=True)
+class WallParameters:
+    """Stage B: segments, wall clusters, representative lines (paper, III-B)."""
+
+    hough_angle_step_rad: float = _number(
+        math.radians(1.0), "rad", "Step of the Hough transform's angle; the paper's value.", 1e-3, 0.2
+    )
+    hough_min_votes_m: float = _number(
+        0.5, "m", "Length of cells on a line for a segment to be looked for; a door's jamb.", 0.01
+    )
+    segment_min_length_m: float = _number(0.4, "m", "Shortest segment: a wall beside a door.", 0.01)
+    segment_max_gap_m: float = _number(0.25, "m", "Gap bridged within a segment; the paper's 5 cells.", 0.0)
+    direction_tolerance_rad: float = _number(
+        math.radians(6.0), "rad", "A segment this near to a dominant direction follows it.", 0.0, 0.8
+    )
+    local_direction_step_rad: float = _number(
+        math.pi / 18, "rad", "Curved walls are approximated by chords every 10 degrees.", 0.02, 0.8
+    )
+    cluster_lateral_m: float = _number(0.15, "m", "Offset within one wall cluster: a wall's thickness.", 0.01)
+    cluster_gap_m: float = _number(0.6, "m", "Gap along one wall cluster: furniture before a wall.", 0.01)
+    local_segment_min_length_m: float = _number(
+        1.2, "m", "Off the dominant directions only walls longer than most furniture count.", 0.01
+    )
+    line_lateral_m: float = _number(0.3, "m", "Both faces of one wall share a representative line.", 0.0)
+    extension_m: float = _number(
+        4.0, "m", "A wall may go on unseen for a room's width beyond its evidence.", 0.0
+    )
+    local_extension_m: float = _number(0.6, "m", "A chord of a curved wall reaches to the next chord.", 0.0)
+    extension_per_length: float = _number(4.0, "1", "A short wall reaches not further than this times itself.")
+    line_min_weight: float = _number(0.1, "share", "Least covered share of a line; the paper's value.", 0, 1)
+
+
+@dataclass(frozen=True)
+class FloorPlanParameters:
+    """Stage C: edge weights, faces, rooms (paper, III-C)."""
+
+    wall_tolerance_m: float = _number(
+        0.2, "m", "A wall counts for an edge when it lies this near: a wall's half thickness and drift.", 0.0
+    )
+    join_min_openness: float = _number(
+        0.6, "share", "Faces join when at least this share of their known border is open.", 0, 1
+    )
+    join_min_open_m: float = _number(0.15, "m", "Least open border for faces to join: three cells of 5 cm.", 0)
+    join_min_passage: float = _number(
+        0.75, "1", "Faces join when the passage is this wide against the narrower one's width.", 0
+    )
+    room_min_area_m2: float = _number(3.0, "m2", "Smaller pieces of free space are no rooms.", 0.0)
+    room_min_clearance_m: float = _number(0.6, "m", "Half the width of the narrowest room.", 0.0)
+
+
+@dataclass(frozen=True)
 class TrackingParameters:
     """Identity of rooms over the snapshots of a run."""
 
     match_min_iou: float = _number(
         0.2, "share", "Least overlap for a room to continue a track; half-seen rooms double in size.", 0, 1
+    )
+    part_min_share: float = _number(
+        0.5, "share", "A room is part of another when most of it lies in it: never of two at once.", 0, 1
+    )
+    lost_kept: int = _number(
+        500, "tracks", "Lost rooms that may return; some kilobytes each, the longest lost go first."
     )
 
 
@@ -48,6 +130,9 @@ class Parameters:
     """All blocks."""
 
     occupancy: OccupancyParameters = field(default_factory=OccupancyParameters)
+    spectrum: SpectrumParameters = field(default_factory=SpectrumParameters)
+    walls: WallParameters = field(default_factory=WallParameters)
+    floor_plan: FloorPlanParameters = field(default_factory=FloorPlanParameters)
     tracking: TrackingParameters = field(default_factory=TrackingParameters)
 
     def resolved(self) -> dict[str, dict[str, float | int | bool | str]]:

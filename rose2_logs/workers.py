@@ -1,4 +1,4 @@
-"""One function over a stream of items by several processes: in order, with bounded memory, on one thread each."""
+"""One function over a stream of items, by several processes: in order, with bounded memory."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def ordered_map(
             yield _taken(pending)
     except BrokenProcessPool as error:
         raise WorkerError(
-            f"one of {workers} worker processes was killed, most likely for lack of memory; use fewer --workers"
+            f"one of {workers} worker processes was killed, likely for lack of memory; use fewer --workers"
         ) from error
     finally:
         pool.shutdown(wait=True, cancel_futures=True)

@@ -1,7 +1,7 @@
 """Maps with true rooms, as a benchmark lists them in a JSON file.
 
 The file holds ``{"cases": [{"group", "name", "map", "rooms", "resolution_m"}, ...]}`` with paths relative to
-itself: `map` is an 8-bit grey image in the convention of ROS maps, `rooms` a label image of its size, 0 = none.
+itself: `map` is an 8-bit grey image in the convention of ROS maps, `rooms` a label image of the same size.
 Images have row 0 at the top, occupancy grids at the origin below; a case converts between the two.
 """
 
@@ -110,9 +110,13 @@ def load_cases(path: Path, group: str | None = None) -> tuple[Case, ...]:
 
 def _case(path: Path, number: int, entry: Any) -> Case:
     try:
-        names = [str(entry["group"]), str(entry["name"])]
-        paths = [path.parent / entry["map"], path.parent / entry["rooms"]]
-        return Case(*names, *paths, float(entry["resolution_m"]))
+        return Case(
+            str(entry["group"]),
+            str(entry["name"]),
+            path.parent / entry["map"],
+            path.parent / entry["rooms"],
+            float(entry["resolution_m"]),
+        )
     except (KeyError, TypeError, ValueError) as error:
         raise CasesError(
             f"{path}: case {number} needs group, name, map, rooms, resolution_m: {error!r}"

@@ -81,8 +81,8 @@ def score(truth: NDArray[np.integer], segmented: NDArray[np.integer]) -> Scores:
     iou_seg = np.mean(iou[every_seg, partner_of_seg])
     iou_gt = np.mean(iou[partner_of_gt, every_gt])
     pq = iou[iou > MATCH_IOU].sum() / ((rooms_seg + rooms_gt) / 2)
-    shares = (precision, recall, iou_seg, iou_gt, (iou_seg + iou_gt) / 2, pq)
-    return Scores(*(100 * float(share) for share in shares), rooms_seg, rooms_gt)
+    percent: list[float] = (100 * np.array([precision, recall, iou_seg, iou_gt, (iou_seg + iou_gt) / 2, pq])).tolist()
+    return Scores(*percent, rooms_seg, rooms_gt)
 
 
 def mean_scores(scores: Iterable[Scores]) -> Scores:

@@ -32,13 +32,17 @@ class Overlap:
 
     @property
     def iou(self) -> FloatArray:
-        """Intersection over union (A, B) of each pair."""
-        return self.common / (self.first_size[:, None] + self.second_size[None] - self.common)
+        """Intersection over union (A, B) of each pair; 0 where both are empty."""
+        return _share(self.common, self.first_size[:, None] + self.second_size[None] - self.common)
 
     @property
     def share_of_smaller(self) -> FloatArray:
-        """Intersection (A, B) over the size of the smaller of the two."""
-        return self.common / np.minimum(self.first_size[:, None], self.second_size[None])
+        """Intersection (A, B) over the size of the smaller of the two; 0 where it is empty."""
+        return _share(self.common, np.minimum(self.first_size[:, None], self.second_size[None]))
+
+
+def _share(part: FloatArray, whole: FloatArray) -> FloatArray:
+    return np.divide(part, whole, out=np.zeros_like(part), where=whole > 0)
 
 
 def overlap_of(first: NDArray[np.integer], second: NDArray[np.integer]) -> Overlap:
@@ -59,9 +63,9 @@ def overlap_of(first: NDArray[np.integer], second: NDArray[np.integer]) -> Overl
     first_ids, first_index = _compact(first)
     second_ids, second_index = _compact(second)
     rows, columns = len(first_ids) + 1, len(second_ids) + 1
-    table = np.bincount(first_index * columns + second_index, minlength=rows * columns)
-    table = table.reshape(rows, columns).astype(float)
-    return Overlap(first_ids, second_ids, table.sum(1)[1:], table.sum(0)[1:], table[1:, 1:])
+    cells = np.bincount(first_index * columns + second_index, minlength=rows * columns)
+    table: FloatArray = cells.reshape(rows, columns).astype(np.float64)
+    return Overlap(first_ids, second_ids, table.sum(axis=1)[1:], table.sum(axis=0)[1:], table[1:, 1:])
 
 
 def _compact(labels: NDArray[np.integer]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

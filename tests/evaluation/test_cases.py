@@ -60,7 +60,7 @@ def test_a_bad_list_of_cases_is_one_clear_line(tmp_path: Path, text: str, messag
 def test_an_image_that_is_missing_is_named(cases_file: Path):
     """A case whose image is gone fails when it is read, with the path."""
     (cases_file.parent / "map.png").unlink()
-    with pytest.raises(CasesError, match="map.png"):
+    with pytest.raises(CasesError, match=r"map\.png"):
         load_cases(cases_file)[0].snapshot()
 
 

@@ -1,0 +1,116 @@
+"""Which room of one map is which room of another: overlap in world coordinates, and the best assignment."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rose2_logs.occupancy import BoolArray, FloatArray, GridGeometry
+
+ROWS_AT_ONCE = 256
+"""Rows resampled together: bounds the memory for coordinates to some megabytes for the largest maps."""
+BORDER_NUDGE = 1e-6
+"""Cells: centres that lie on a border of the other grid, up to rounding, all fall to the same side."""
+
+
+def resample_labels(
+    labels: NDArray[np.int32], source: GridGeometry, target: GridGeometry
+) -> NDArray[np.int32]:
+    """Look up labels at the cell centres of another grid.
+
+    Parameters
+    ----------
+    labels : (H, W) int32
+        Labels on the grid `source`.
+    source, target : GridGeometry
+        They may differ in origin, size, yaw and resolution, but share the world frame.
+
+    Returns
+    -------
+    (H', W') int32
+        The label of the source cell that holds each centre, 0 outside the source grid.
+    """
+    height, width = target.shape
+    result = np.zeros(target.shape, np.int32)
+    # A centre's source cell is affine in its row and column: three points give the whole map.
+    corners = target.cell_centres(np.array([0, 1, 0]), np.array([0, 0, 1]))
+    origin, by_row, by_column = source.world_to_grid(corners) / source.resolution_m
+    by_row, by_column = by_row - origin, by_column - origin
+    columns = np.arange(width)
+    for begin in range(0, height, ROWS_AT_ONCE):
+        rows = np.arange(begin, min(begin + ROWS_AT_ONCE, height))[:, None]
+        x = np.floor(origin[0] + rows * by_row[0] + columns * by_column[0] + BORDER_NUDGE).astype(np.intp)
+        y = np.floor(origin[1] + rows * by_row[1] + columns * by_column[1] + BORDER_NUDGE).astype(np.intp)
+        inside = (x >= 0) & (x < source.shape[1]) & (y >= 0) & (y < source.shape[0])
+        result[begin : begin + len(rows)][inside] = labels[y[inside], x[inside]]
+    return result
+
+
+@dataclass(frozen=True, eq=False)
+class RegionShape:
+    """The cells of one room, cut out of its map and packed to bits.
+
+    Attributes
+    ----------
+    geometry : GridGeometry
+        The grid of the cut-out alone.
+    packed : uint8
+        The mask, eight cells a byte.
+    area_m2 : float
+        Area of the room's cells.
+    box_m : (4,) float
+        World box x0, y0, x1, y1 around the cut-out.
+    """
+
+    geometry: GridGeometry
+    packed: NDArray[np.uint8]
+    area_m2: float
+    box_m: FloatArray
+
+    @classmethod
+    def cut_out(cls, mask: BoolArray, geometry: GridGeometry) -> RegionShape:
+        """Keep the cells of a mask (H, W) that holds at least one."""
+        rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
+        part = mask[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+        corner = np.array([columns[0], rows[0]]) * geometry.resolution_m
+        x, y = geometry.grid_to_world(corner).tolist()
+        cut = GridGeometry(geometry.resolution_m, (x, y), geometry.yaw_rad, geometry.frame_id, part.shape)
+        corners = cut.corners_m()
+        box = np.concatenate([corners.min(0), corners.max(0)])
+        return cls(cut, np.packbits(part), float(part.sum()) * cut.cell_area_m2, box)
+
+    @property
+    def mask(self) -> BoolArray:
+        """The cells of the cut-out (H, W)."""
+        count = self.geometry.shape[0] * self.geometry.shape[1]
+        return np.unpackbits(self.packed, count=count).reshape(self.geometry.shape).astype(bool)
+
+    def common_area_m2(self, labels: NDArray[np.int32], geometry: GridGeometry, count: int) -> FloatArray:
+        """Area (count,) in square metres that this one shares with the rooms 1..count of another map."""
+        under = resample_labels(labels, geometry, self.geometry)[self.mask]
+        cells = np.bincount(under, minlength=count + 1)[1 : count + 1].astype(np.float64)
+        return cells * self.geometry.cell_area_m2
+
+
+def assign(weight: FloatArray, admissible: BoolArray) -> list[tuple[int, int]]:
+    """Pair rows with columns so that the sum of weights is greatest; only admissible pairs are made.
+
+    Parameters
+    ----------
+    weight : (A, B) float
+        Positive where admissible.
+    admissible : (A, B) bool
+
+    Returns
+    -------
+    list of (row, column), by row
+    """
+    from scipy.optimize import linear_sum_assignment
+
+    if not admissible.any():
+        return []
+    rows, columns = linear_sum_assignment(np.where(admissible, weight, 0.0), maximize=True)
+    chosen = admissible[rows, columns]
+    return list(zip(rows[chosen].tolist(), columns[chosen].tolist(), strict=True))
