@@ -143,7 +143,7 @@ def middle_furniture(
 def wall_bumps(rng: np.random.Generator, room: Room, draft: FloorPlanDraft) -> list[BaseGeometry]:
     """Pilasters, pipes, and radiators: what keeps real walls from being straight."""
     keep_free = shapely.union_all(draft.doorways).buffer(0.2, quad_segs=2)
-    every = float(rng.choice([1.2, 2.0, 4.0, 8.0]))
+    every = float(rng.choice([1.5, 3.0, 6.0, 12.0]))
     bumps: list[BaseGeometry] = []
     for edge in boundary_segments(shapely.geometry.polygon.orient(room.polygon)):
         length = float(np.hypot(*(edge[2:] - edge[:2])))

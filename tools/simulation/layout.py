@@ -92,7 +92,7 @@ def corridor_polygons(rng: np.random.Generator, style: str) -> list[Polygon]:
         branch = np.array([[at, 0], [at + rng.uniform(-2, 2), arm]])
         return [shapely.union(along(stem), along(branch))]
     # A flat: one small hallway, the rooms around it do the rest.
-    return [box(0, 0, float(rng.uniform(3.5, 7)), float(rng.uniform(1.4, 2.2)))]
+    return [box(0, 0, float(rng.uniform(5, 10)), float(rng.uniform(1.4, 2.2)))]
 
 
 def room_rows(

@@ -106,7 +106,7 @@ class LogOddsMapper:
 
     def geometry(self, frame_id: str = "map") -> GridGeometry:
         """Where the canvas lies now."""
-        origin = self._first_cell * self.settings.resolution_m
+        origin = np.round(self._first_cell * self.settings.resolution_m, 9)  # -9.6, not -9.600000000000001
         return GridGeometry(
             self.settings.resolution_m,
             (float(origin[0]), float(origin[1])),
