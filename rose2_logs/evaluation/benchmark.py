@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 import time
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +41,10 @@ class CaseResult:
     scores: Scores
     seconds: float
 
+    def without_labels(self) -> CaseResult:
+        """Return the same with an empty label image, to be kept for a table of many."""
+        return dataclasses.replace(self, labels=np.zeros((0, 0), np.int32))
+
 
 def evaluate_cases(
     cases: Sequence[Case], method: str, parameters: Parameters, workers: int = 1
@@ -67,6 +74,22 @@ def evaluate_case(case: Case, method: str, parameters: Parameters) -> CaseResult
     seconds = time.perf_counter() - start
     labels = np.ascontiguousarray(np.flipud(rooms.labels))
     return CaseResult(case, labels, score(truth, labels), seconds)
+
+
+def figures(results: Sequence[CaseResult]) -> dict[str, Any]:
+    """Return the figures of each map and the means of each group as JSON values."""
+    maps = [
+        {"group": result.case.group, "name": result.case.name}
+        | dataclasses.asdict(result.scores)
+        | {"seconds": result.seconds}
+        for result in results
+    ]
+    counts = Counter(result.case.group for result in results)
+    groups = {
+        group: dataclasses.asdict(mean) | {"maps": counts[group]}
+        for group, mean in group_means(results).items()
+    }
+    return {"maps": maps, "groups": groups}
 
 
 def group_means(results: Sequence[CaseResult]) -> dict[str, Scores]:

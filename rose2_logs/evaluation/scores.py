@@ -81,8 +81,16 @@ def score(truth: NDArray[np.integer], segmented: NDArray[np.integer]) -> Scores:
     iou_seg = np.mean(iou[every_seg, partner_of_seg])
     iou_gt = np.mean(iou[partner_of_gt, every_gt])
     pq = iou[iou > MATCH_IOU].sum() / ((rooms_seg + rooms_gt) / 2)
-    percent: list[float] = (100 * np.array([precision, recall, iou_seg, iou_gt, (iou_seg + iou_gt) / 2, pq])).tolist()
-    return Scores(*percent, rooms_seg, rooms_gt)
+    return Scores(
+        precision=100 * float(precision),
+        recall=100 * float(recall),
+        iou_seg=100 * float(iou_seg),
+        iou_gt=100 * float(iou_gt),
+        iou_sym=50 * float(iou_seg + iou_gt),
+        pq=100 * float(pq),
+        rooms_seg=rooms_seg,
+        rooms_gt=rooms_gt,
+    )
 
 
 def mean_scores(scores: Iterable[Scores]) -> Scores:

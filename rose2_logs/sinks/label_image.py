@@ -27,16 +27,27 @@ def write_label_image(path: Path, labels: NDArray[np.integer]) -> None:
     OutputError
         If there are more than 65535 labels or the file cannot be written.
     """
-    from PIL import Image
-
     largest = int(labels.max(initial=0))
     if largest > MAX_16_BIT:
         raise OutputError(f"{path}: {largest} labels do not fit a 16-bit image")
-    image = Image.fromarray(labels.astype(np.uint8 if largest <= MAX_8_BIT else np.uint16))
+    eight_bit = largest <= MAX_8_BIT
+    write_image(path, labels.astype(np.uint8) if eight_bit else labels.astype(np.uint16))
+
+
+def write_image(path: Path, pixels: NDArray[np.uint8] | NDArray[np.uint16]) -> None:
+    """Write grey (H, W) or RGB (H, W, 3) pixels as a PNG, beside its final name and then renamed.
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written.
+    """
+    from PIL import Image
+
     part = path.with_name(f".{path.name}.part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        image.save(part, format="PNG")
+        Image.fromarray(pixels).save(part, format="PNG")
         part.replace(path)
     except OSError as error:
         part.unlink(missing_ok=True)

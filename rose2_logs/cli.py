@@ -1,0 +1,267 @@
+"""The command line ``rose2-logs``: arguments in, one call, a report out.
+
+Exit codes: 0 done; 1 a fault of the tool itself; 2 a log, a file or an option cannot be used (one line says
+which); 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import logging
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from rose2_logs import __version__
+from rose2_logs.errors import LogError, ParameterError, Rose2LogsError
+
+if TYPE_CHECKING:
+    from rose2_logs.parameters import Parameters
+
+EXIT_FAULT, EXIT_KNOWN, EXIT_INTERRUPTED = 1, 2, 130
+
+app = typer.Typer(
+    name="rose2-logs",
+    help="Rooms and structure of buildings from the maps in robot logs.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+_state = {"debug": False}
+
+
+def main() -> None:
+    """Run the command line and exit."""
+    from rose2_logs import reporting
+
+    try:
+        app()
+    except Rose2LogsError as error:
+        reporting.error(str(error), debug=_state["debug"])
+        sys.exit(EXIT_KNOWN)
+    except KeyboardInterrupt:
+        reporting.error("interrupted; unfinished results were removed", debug=_state["debug"])
+        sys.exit(EXIT_INTERRUPTED)
+    except Exception as error:
+        if _state["debug"]:
+            raise
+        reporting.error(f"{type(error).__name__}: {error} (a fault of rose2-logs: --debug shows where)")
+        sys.exit(EXIT_FAULT)
+
+
+def _set_debug(value: bool) -> None:
+    _state["debug"] = value or _state["debug"]
+
+
+def _show_version(value: bool) -> None:
+    if value:
+        typer.echo(f"rose2-logs {__version__}")
+        raise typer.Exit
+
+
+Debug = Annotated[
+    bool, typer.Option("--debug", help="Show the traceback of errors.", callback=_set_debug, is_eager=True)
+]
+Workers = Annotated[int, typer.Option(min=1, help="Processes; results do not depend on their number.")]
+Method = Annotated[str, typer.Option(help="Segmentation method.")]
+Config = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE.toml", help="Parameters, one table per stage.", show_default=False),
+]
+Settings = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="STAGE.NAME=VALUE", help="Change one parameter.", show_default=False),
+]
+
+
+@app.callback()
+def _everything(
+    debug: Debug = False,
+    version: Annotated[
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version.")
+    ] = False,
+) -> None:
+    from rose2_logs import reporting
+
+    reporting.show_warnings(logging.getLogger("rose2_logs"))
+
+
+@app.command(epilog="Example: [bold]rose2-logs info run.mcap[/bold]")
+def info(
+    log: Annotated[str, typer.Argument(help="MCAP, ROS 1 bag, ROS 2 bag or map_server map.")],
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON for scripts.")] = False,
+    debug: Debug = False,
+) -> None:
+    """Show what a log holds: topics, map sizes, resolution, duration, coverage."""
+    from rose2_logs import reporting
+    from rose2_logs.log_facts import describe_log
+
+    facts = describe_log(log)
+    if as_json:
+        reporting.print_json(facts.as_json())
+    else:
+        reporting.print_log_facts(facts)
+
+
+@app.command(epilog="Example: [bold]rose2-logs analyze run.mcap -o results --workers 4[/bold]")
+def analyze(
+    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="One or several logs.")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="Results go to OUT/<name of the log>/.")],
+    topic: Annotated[
+        str | None, typer.Option(help="Map topic; by default /map, else the only one.", show_default=False)
+    ] = None,
+    start: Annotated[
+        float | None, typer.Option(metavar="S", help="Skip this many seconds of the log.", show_default=False)
+    ] = None,
+    end: Annotated[
+        float | None,
+        typer.Option(metavar="S", help="Stop this many seconds into the log.", show_default=False),
+    ] = None,
+    every: Annotated[
+        float | None, typer.Option(metavar="S", help="Least seconds between maps.", show_default=False)
+    ] = None,
+    min_change: Annotated[
+        float | None,
+        typer.Option(metavar="M2", help="Least newly known area between maps.", show_default=False),
+    ] = None,
+    max_snapshots: Annotated[
+        int | None, typer.Option(metavar="N", help="Most maps, spread evenly.", show_default=False)
+    ] = None,
+    workers: Workers = 1,
+    method: Method = "rose2",
+    config: Config = None,
+    settings: Settings = None,
+    live: Annotated[bool, typer.Option("--live", help="Also send to an open Rerun viewer.")] = False,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace results of an earlier run.")
+    ] = False,
+    no_rrd: Annotated[bool, typer.Option("--no-rrd", help="Write no Rerun recording.")] = False,
+    no_mcap: Annotated[bool, typer.Option("--no-mcap", help="Write no annotated MCAP.")] = False,
+    debug: Debug = False,
+) -> None:
+    """Find and follow the rooms in all maps of a log; write recording, annotated MCAP and tables."""
+    from rose2_logs import reporting
+    from rose2_logs.readers import Selection
+    from rose2_logs.run import RunOptions, analyse_log, log_stem, seconds_into_log
+
+    parameters = _parameters(config, settings, method)
+    names = [log_stem(log) for log in logs]
+    if twice := {name for name in names if names.count(name) > 1}:
+        raise ParameterError(f"several logs are named {min(twice)}: analyze them to different folders")
+    failed = False
+    for log, name in zip(logs, names, strict=True):
+        try:
+            start_ns, end_ns = seconds_into_log(log, start, end)
+            options = RunOptions(
+                topic=topic,
+                selection=Selection(start_ns, end_ns, every, min_change, max_snapshots),
+                parameters=parameters,
+                method=method,
+                workers=workers,
+                recording=not no_rrd,
+                annotated_log=not no_mcap,
+                live=live,
+                overwrite=overwrite,
+            )
+            with reporting.run_progress(name) as on_snapshot:
+                result = analyse_log(log, out / name, options, on_snapshot)
+            reporting.print_run(result)
+        except Rose2LogsError as error:
+            if len(logs) == 1:
+                raise
+            failed = True
+            reporting.error(str(error), debug=_state["debug"])
+    if failed:
+        raise typer.Exit(EXIT_KNOWN)
+
+
+@app.command(epilog="Example: [bold]rose2-logs view results/run/run.rrd[/bold]")
+def view(
+    recording: Annotated[Path, typer.Argument(metavar="FILE.rrd", help="Recording that analyze wrote.")],
+    web: Annotated[bool, typer.Option("--web", help="In the browser.")] = False,
+    debug: Debug = False,
+) -> None:
+    """Open a recording in the Rerun viewer."""
+    import subprocess
+
+    if not recording.is_file():
+        raise LogError(f"{recording}: there is no such file; rose2-logs analyze writes recordings")
+    command = [sys.executable, "-m", "rerun", str(recording), *(["--web-viewer"] if web else [])]
+    raise typer.Exit(subprocess.run(command, check=False).returncode)
+
+
+@app.command(epilog="Example: [bold]rose2-logs segment map.png --resolution 0.05 -o rooms[/bold]")
+def segment(
+    map_file: Annotated[Path, typer.Argument(metavar="MAP", help="map_server .yaml, or a .png or .pgm.")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the results.")],
+    resolution: Annotated[
+        float | None,
+        typer.Option(metavar="M", help="Side of a cell, for an image without .yaml.", show_default=False),
+    ] = None,
+    method: Method = "rose2",
+    config: Config = None,
+    settings: Settings = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace earlier results.")] = False,
+    debug: Debug = False,
+) -> None:
+    """Segment one map: label image, floor plan as GeoJSON, picture."""
+    from rose2_logs import reporting
+    from rose2_logs.static_map import segment_map
+
+    parameters = _parameters(config, settings, method)
+    result = segment_map(map_file, out, parameters, method, resolution_m=resolution, overwrite=overwrite)
+    reporting.print_static_map(result)
+
+
+@app.command(
+    epilog="Example: [bold]rose2-logs evaluate cases.json --predictions labels --json figures.json[/bold]"
+)
+def evaluate(
+    cases: Annotated[Path, typer.Argument(metavar="CASES.json", help="Maps with true rooms.")],
+    predictions: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Write DIR/<group>/<name>.png label images.", show_default=False),
+    ] = None,
+    json_file: Annotated[
+        Path | None, typer.Option("--json", metavar="FILE", help="Write the figures.", show_default=False)
+    ] = None,
+    group: Annotated[
+        str | None, typer.Option(help="Only the cases of one group.", show_default=False)
+    ] = None,
+    workers: Workers = 1,
+    method: Method = "rose2",
+    config: Config = None,
+    settings: Settings = None,
+    debug: Debug = False,
+) -> None:
+    """Segment maps whose true rooms are known and print the figures."""
+    from rose2_logs import reporting
+    from rose2_logs.evaluation.benchmark import evaluate_cases, figures
+    from rose2_logs.evaluation.cases import load_cases
+    from rose2_logs.sinks.label_image import write_label_image
+    from rose2_logs.sinks.summary import write_json
+
+    parameters = _parameters(config, settings, method)
+    chosen = load_cases(cases, group)
+    results = []
+    with reporting.case_progress(len(chosen)) as advance:
+        for result in evaluate_cases(chosen, method, parameters, workers):
+            if predictions is not None:
+                write_label_image(predictions / result.case.group / f"{result.case.name}.png", result.labels)
+            results.append(result.without_labels())
+            advance(result.case.name)
+    if json_file is not None:
+        write_json(json_file, {"method": method, "parameters": parameters.resolved(), **figures(results)})
+    reporting.print_figures(results)
+
+
+def _parameters(config: Path | None, settings: list[str] | None, method: str) -> Parameters:
+    from rose2_logs.parameters import load_parameters
+    from rose2_logs.pipeline import METHODS
+
+    if method not in METHODS:
+        raise ParameterError(f"no method {method!r}; there are: {', '.join(METHODS)}")
+    return load_parameters(config, settings or ())

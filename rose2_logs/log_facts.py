@@ -1,0 +1,105 @@
+"""What ``info`` tells of a log: its topics, and of each map topic the first and the last map."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Any
+
+from rose2_logs.errors import LogError
+from rose2_logs.occupancy import OccupancySnapshot, classify
+from rose2_logs.parameters import OccupancyParameters
+from rose2_logs.readers import inspect_log, open_log
+from rose2_logs.readers.log import LogInfo
+
+
+@dataclass(frozen=True)
+class MapFacts:
+    """One map of a topic.
+
+    Attributes
+    ----------
+    log_time_ns : int
+        When it was recorded.
+    shape : (int, int)
+        Rows and columns.
+    resolution_m : float
+        Side of a cell.
+    frame_id : str
+        World frame.
+    free_area_m2 : float
+        Known free area.
+    """
+
+    log_time_ns: int
+    shape: tuple[int, int]
+    resolution_m: float
+    frame_id: str
+    free_area_m2: float
+
+
+@dataclass(frozen=True)
+class TopicFacts:
+    """A map topic: its first and last map, or why there are none."""
+
+    topic: str
+    first: MapFacts | None
+    last: MapFacts | None
+    trouble: str | None = None
+
+    @property
+    def coverage_first(self) -> float | None:
+        """Known free area of the first map over that of the last, at most 1: where the coverage starts."""
+        if self.first is None or self.last is None or self.last.free_area_m2 <= 0:
+            return None
+        return min(self.first.free_area_m2 / self.last.free_area_m2, 1.0)
+
+
+@dataclass(frozen=True)
+class LogFacts:
+    """A log and its map topics."""
+
+    info: LogInfo
+    maps: tuple[TopicFacts, ...]
+
+    def as_json(self) -> dict[str, Any]:
+        """Return everything as JSON values."""
+        info = dataclasses.asdict(self.info) | {
+            "path": str(self.info.path),
+            "duration_s": self.info.duration_s,
+        }
+        maps = [dataclasses.asdict(facts) | {"coverage_first": facts.coverage_first} for facts in self.maps]
+        return info | {"maps": maps}
+
+
+def describe_log(log: str) -> LogFacts:
+    """Look at a log without reading all of it.
+
+    Raises
+    ------
+    LogError
+        If the log cannot be opened. A map topic that cannot be read is told as such.
+    """
+    info = inspect_log(log)
+    topics = [topic for topic in info.topics if topic.is_map and topic.message_count != 0]
+    return LogFacts(info, tuple(_topic_facts(log, topic.name) for topic in topics))
+
+
+def _topic_facts(log: str, topic: str) -> TopicFacts:
+    try:
+        with open_log(log, topic=topic) as reader:
+            return TopicFacts(topic, _map_facts(reader.first()), _map_facts(reader.last()))
+    except LogError as error:
+        return TopicFacts(topic, None, None, str(error))
+
+
+def _map_facts(snapshot: OccupancySnapshot) -> MapFacts:
+    thresholds = OccupancyParameters()
+    free, _ = classify(
+        snapshot.cells,
+        occupied_min_percent=thresholds.occupied_min_percent,
+        free_max_percent=thresholds.free_max_percent,
+    )
+    geometry = snapshot.geometry
+    free_m2 = float(free.sum()) * geometry.cell_area_m2
+    return MapFacts(snapshot.log_time_ns, geometry.shape, geometry.resolution_m, geometry.frame_id, free_m2)

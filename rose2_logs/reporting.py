@@ -1,0 +1,194 @@
+"""What the command line shows: tables, progress, errors. Only `cli` uses it."""
+
+from __future__ import annotations
+
+import json
+import logging
+import traceback
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Console
+from rich.markup import escape
+
+if TYPE_CHECKING:
+    from rich.progress import Progress
+
+    from rose2_logs.evaluation.benchmark import CaseResult
+    from rose2_logs.log_facts import LogFacts, MapFacts
+    from rose2_logs.run import OnSnapshot, RunResult
+    from rose2_logs.static_map import StaticMapResult
+    from rose2_logs.tracking.frames import TrackedSnapshot
+
+_out = Console(highlight=False)
+_err = Console(stderr=True, highlight=False)
+
+
+def error(message: str, debug: bool = False) -> None:
+    """Print one line about an error, after its traceback if asked for."""
+    if debug:
+        _err.print(escape(traceback.format_exc()), soft_wrap=True)
+    _err.print(f"[bold red]error:[/] {escape(' '.join(message.split()))}", soft_wrap=True)
+
+
+class _WarningHandler(logging.Handler):
+    """Shows warnings through the console of the progress bar, so that they do not break it."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Print one line."""
+        _err.print(f"[yellow]warning:[/] {escape(record.getMessage())}", soft_wrap=True)
+
+
+def show_warnings(logger: logging.Logger) -> None:
+    """Show the warnings of a logger as lines on stderr."""
+    logger.handlers = [_WarningHandler(logging.WARNING)]
+    logger.propagate = False
+
+
+def print_json(value: Any) -> None:
+    """Print JSON as it is, for scripts."""
+    _out.file.write(json.dumps(value, indent=2) + "\n")
+
+
+def print_log_facts(facts: LogFacts) -> None:
+    """Print what a log holds."""
+    from rich.table import Table
+
+    info = facts.info
+    _out.print(f"[bold]{escape(str(info.path))}[/]", soft_wrap=True)
+    index = "" if info.indexed else ", no index: read from its beginning"
+    _out.print(f"{info.format}, {_megabytes(info.size_bytes)}, {_duration(info.duration_s)}{index}")
+    table = Table("topic", "type", "encoding", "messages", "map", box=None, pad_edge=False)
+    for topic in info.topics:
+        count = "?" if topic.message_count is None else str(topic.message_count)
+        is_map = "yes" if topic.is_map else ""
+        table.add_row(topic.name, topic.message_type, topic.encoding, count, is_map)
+    _out.print(table)
+    for topic_facts in facts.maps:
+        if topic_facts.first is None or topic_facts.last is None:
+            _out.print(f"[bold]{topic_facts.topic}[/]: {escape(topic_facts.trouble or '')}", soft_wrap=True)
+            continue
+        _out.print(f"[bold]{topic_facts.topic}[/] in frame {escape(topic_facts.last.frame_id)}")
+        _out.print(f"  first map {_map_line(topic_facts.first)}")
+        _out.print(f"  last map  {_map_line(topic_facts.last)}")
+        if topic_facts.coverage_first is not None:
+            _out.print(f"  coverage  {topic_facts.coverage_first:.1%} to 100%")
+    if not facts.maps:
+        _out.print("no occupancy grids: analyze cannot use this log")
+
+
+def _map_line(facts: MapFacts) -> str:
+    height, width = facts.shape
+    return (
+        f"{width} x {height} cells of {facts.resolution_m:.4g} m "
+        f"({width * facts.resolution_m:.1f} x {height * facts.resolution_m:.1f} m), "
+        f"{facts.free_area_m2:.1f} m2 free"
+    )
+
+
+@contextmanager
+def run_progress(name: str) -> Iterator[OnSnapshot]:
+    """Show a bar over the time of a log, with the rate, the time left and the rooms so far."""
+    with _progress("{task.fields[note]}") as progress:
+        task = progress.add_task(name, total=1.0, note="opening")
+        seen = 0
+
+        def on_snapshot(frame: TrackedSnapshot, share: float) -> None:
+            nonlocal seen
+            seen += 1
+            elapsed = progress.tasks[task].elapsed or 0.0
+            rate = f"{seen / elapsed:.2f} maps/s" if elapsed > 0 else ""
+            note = f"map {seen}, {rate}, {len(frame.track_ids)} rooms"
+            progress.update(task, completed=share, note=note)
+
+        yield on_snapshot
+
+
+@contextmanager
+def case_progress(count: int) -> Iterator[Callable[[str], None]]:
+    """Show a bar over a number of cases."""
+    with _progress("{task.completed:.0f}/{task.total:.0f} {task.fields[note]}") as progress:
+        task = progress.add_task("evaluate", total=count, note="")
+        yield lambda name: progress.update(task, advance=1, note=name)
+
+
+def _progress(text: str) -> Progress:
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+    return Progress(
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        TaskProgressColumn(),
+        TextColumn(text, markup=False),
+        TimeRemainingColumn(compact=True),
+        console=_err,
+    )
+
+
+def print_run(result: RunResult) -> None:
+    """Print where the results are and what a run found."""
+    from rich.table import Table
+
+    totals = result.totals
+    events = totals.events
+    table = Table(box=None, show_header=False, pad_edge=False)
+    left_out = f" ({totals.invalid} could not be analysed)" if totals.invalid else ""
+    table.add_row("maps", f"{totals.snapshots}{left_out}")
+    table.add_row("coverage", f"{totals.coverage_first:.1%} to {totals.coverage_last:.1%}")
+    table.add_row("rooms at the end", f"{totals.rooms_last} ({totals.tracks} over the run)")
+    changes = ", ".join(f"{events[kind]} {kind}" for kind in ("split", "merged", "lost", "returned"))
+    table.add_row("changes", changes)
+    table.add_row("time", f"{result.seconds:.1f} s, {totals.snapshots / result.seconds:.2f} maps/s")
+    _out.print(table)
+    _out.print(f"results in [bold]{escape(str(result.folder))}[/]", soft_wrap=True)
+    for file in result.files:
+        _out.print(f"  {escape(file.name)}  {_megabytes(file.stat().st_size)}", soft_wrap=True)
+
+
+def print_static_map(result: StaticMapResult) -> None:
+    """Print the rooms of one map and where the results are."""
+    from rich.table import Table
+
+    rooms = result.rooms
+    table = Table("room", "area m2", "with predicted m2", "behind doors", box=None, pad_edge=False)
+    for number, (area, predicted) in enumerate(
+        zip(rooms.areas_m2, rooms.predicted_areas_m2, strict=True), start=1
+    ):
+        neighbours = ", ".join(str(other) for other in rooms.neighbours(number))
+        table.add_row(str(number), f"{area:.1f}", f"{predicted:.1f}", neighbours)
+    _out.print(table)
+    _out.print(f"results in [bold]{escape(str(result.folder))}[/]", soft_wrap=True)
+    for file in result.files:
+        _out.print(f"  {escape(file.name)}", soft_wrap=True)
+
+
+def print_figures(results: Sequence[CaseResult]) -> None:
+    """Print the figures of each map and the means of each group, in percent."""
+    from rich.table import Table
+
+    from rose2_logs.evaluation.benchmark import group_means
+    from rose2_logs.evaluation.scores import FIGURES, Scores
+
+    def row(scores: Scores) -> list[str]:
+        figures = [f"{getattr(scores, name):.2f}" for name in FIGURES]
+        return [*figures, f"{scores.rooms_seg:.4g}/{scores.rooms_gt:.4g}"]
+
+    table = Table("map", *FIGURES, "rooms/true", "s", box=None, pad_edge=False)
+    for group, mean in group_means(results).items():
+        members = [result for result in results if result.case.group == group]
+        for result in members:
+            table.add_row(escape(result.case.name), *row(result.scores), f"{result.seconds:.1f}")
+        seconds = sum(result.seconds for result in members) / len(members)
+        head = f"[bold]{escape(group)} (mean of {len(members)})"
+        table.add_row(head, *row(mean), f"{seconds:.1f}", end_section=True)
+    _out.print(table)
+
+
+def _megabytes(size_bytes: int) -> str:
+    return f"{size_bytes / 1e6:.1f} MB" if size_bytes >= 1e5 else f"{size_bytes / 1e3:.1f} kB"
+
+
+def _duration(seconds: float) -> str:
+    minutes, rest = divmod(round(seconds), 60)
+    return f"{minutes} min {rest} s" if minutes else f"{seconds:.1f} s"

@@ -1,0 +1,243 @@
+"""One run: reader -> workers -> tracker -> sinks, as one stream."""
+
+from __future__ import annotations
+
+import dataclasses
+import logging
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+
+from rose2_logs.errors import InvalidMapError, OutputError
+from rose2_logs.occupancy import OccupancySnapshot, classify
+from rose2_logs.parameters import OccupancyParameters, Parameters
+from rose2_logs.pipeline import SnapshotAnalysis, analyse
+from rose2_logs.provenance import fingerprint, software_versions
+from rose2_logs.readers import Selection, inspect_log, open_log
+from rose2_logs.readers.log import LogReader
+from rose2_logs.sinks.sink import RunInfo, Sink
+from rose2_logs.sinks.summary import RunTotals, write_summary
+from rose2_logs.tracking.frames import TrackedSnapshot
+from rose2_logs.tracking.tracker import RoomTracker
+from rose2_logs.workers import ordered_map
+
+logger = logging.getLogger(__name__)
+
+TABLES = ("snapshots", "rooms", "events", "doorways")
+SUMMARY = "summary.json"
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """What to take from a log, what to do with it, what to write.
+
+    Attributes
+    ----------
+    topic : str, optional
+        The map topic; by default ``/map``, else the only one.
+    selection : Selection
+        Which maps.
+    parameters : Parameters
+        Of all stages.
+    method : str
+        The segmentation method.
+    workers : int
+        Processes; results do not depend on it.
+    recording, annotated_log : bool
+        Whether to write the Rerun recording and the annotated MCAP. The tables are always written.
+    live : bool
+        Also send the recording to an open Rerun viewer.
+    overwrite : bool
+        Whether results of an earlier run may be replaced.
+    """
+
+    topic: str | None = None
+    selection: Selection = field(default_factory=Selection)
+    parameters: Parameters = field(default_factory=Parameters)
+    method: str = "rose2"
+    workers: int = 1
+    recording: bool = True
+    annotated_log: bool = True
+    live: bool = False
+    overwrite: bool = False
+
+
+@dataclass(frozen=True)
+class RunResult:
+    """What a run has written, and its totals."""
+
+    folder: Path
+    files: tuple[Path, ...]
+    totals: RunTotals
+    seconds: float
+
+
+OnSnapshot = Callable[[TrackedSnapshot, float], None]
+"""Told of each finished snapshot and of the share, in [0, 1], of the log's time that is done."""
+
+
+def log_stem(path: Path) -> str:
+    """Name for the results of a log: its name without its format's ending; of a pattern, its folder's."""
+    name = path.resolve().name
+    if any(sign in name for sign in "*?["):
+        name = path.resolve().parent.name
+    for ending in (".mcap", ".bag", ".db3", ".yaml", ".yml"):
+        name = name.removesuffix(ending)
+    return name
+
+
+def seconds_into_log(path: Path, start_s: float | None, end_s: float | None) -> tuple[int | None, int | None]:
+    """Convert seconds since a log's first message to log times in nanoseconds; None stays None.
+
+    Raises
+    ------
+    LogError
+        If the log cannot be opened.
+    """
+    if start_s is None and end_s is None:
+        return None, None
+    first_ns = inspect_log(path).start_ns or 0
+    start_ns = None if start_s is None else first_ns + round(start_s * 1e9)
+    return start_ns, None if end_s is None else first_ns + round(end_s * 1e9)
+
+
+def analyse_log(
+    path: Path, folder: Path, options: RunOptions, on_snapshot: OnSnapshot | None = None
+) -> RunResult:
+    """Analyse a log and write all results to a folder.
+
+    Parameters
+    ----------
+    path : path
+        The log.
+    folder : path
+        Where to; it is made.
+    options : RunOptions
+        What to take, do and write.
+    on_snapshot : callable, optional
+        To show progress.
+
+    Raises
+    ------
+    LogError, InvalidMapError
+        If the log cannot be read or holds no map that can be analysed.
+    OutputError
+        If there are results already and they may not be replaced, or one cannot be written.
+    """
+    start = time.perf_counter()
+    planned = _planned_files(folder, log_stem(path), options)
+    if not options.overwrite and (existing := [file for file in planned.values() if file.exists()]):
+        raise OutputError(f"{existing[0]}: exists already; choose another folder or pass --overwrite")
+    totals = RunTotals()
+    with open_log(path, topic=options.topic, selection=options.selection) as reader:
+        last = reader.last()
+        info = _run_info(path, reader, options)
+        first_ns: int | None = None
+        with ExitStack() as stack:
+            sinks = [stack.enter_context(sink) for sink in _make_sinks(planned, info, options)]
+            for frame in tracked_snapshots(reader, last, options, totals):
+                for sink in sinks:
+                    sink.write(frame)
+                totals.add(frame)
+                if on_snapshot is not None:
+                    now_ns = frame.snapshot.log_time_ns
+                    first_ns = now_ns if first_ns is None else first_ns
+                    on_snapshot(frame, (now_ns - first_ns) / max(last.log_time_ns - first_ns, 1))
+            if totals.snapshots == 0:
+                raise InvalidMapError(f"{path}: none of its {totals.invalid} maps can be analysed")
+        messages = dataclasses.asdict(reader.counts)
+    seconds = time.perf_counter() - start
+    files = {name: file for name, file in planned.items() if name != "summary"}
+    write_summary(
+        planned["summary"],
+        info,
+        totals,
+        selection=dataclasses.asdict(options.selection),
+        messages=messages,
+        files=[file.name for file in files.values()],
+        seconds=seconds,
+        workers=options.workers,
+    )
+    return RunResult(folder, (*files.values(), planned["summary"]), totals, seconds)
+
+
+def tracked_snapshots(
+    reader: LogReader, last: OccupancySnapshot, options: RunOptions, totals: RunTotals
+) -> Iterator[TrackedSnapshot]:
+    """Yield every map of a log with its rooms and their identity.
+
+    Parameters
+    ----------
+    reader : LogReader
+        The log.
+    last : OccupancySnapshot
+        The last map of the run, which coverage refers to.
+    options : RunOptions
+        Parameters, method, workers.
+    totals : RunTotals
+        Maps that cannot be analysed are left out and counted as invalid here.
+    """
+    final_free_m2 = free_area_m2(last, options.parameters.occupancy)
+    tracker = RoomTracker(options.parameters.tracking)
+    work = partial(_analyse_or_refuse, parameters=options.parameters, method=options.method)
+    for snapshot, analysis in ordered_map(work, reader.snapshots(), options.workers):
+        if isinstance(analysis, InvalidMapError):
+            totals.invalid += 1
+            logger.warning("snapshot %d is left out: %s", snapshot.index, analysis)
+            continue
+        track_ids, events = tracker.update(snapshot, analysis)
+        coverage = min(analysis.free_area_m2 / final_free_m2, 1.0) if final_free_m2 > 0 else 0.0
+        yield TrackedSnapshot(snapshot, analysis, coverage, track_ids, events)
+
+
+def free_area_m2(snapshot: OccupancySnapshot, parameters: OccupancyParameters) -> float:
+    """Known free area of a map in square metres."""
+    free, _ = classify(
+        snapshot.cells,
+        occupied_min_percent=parameters.occupied_min_percent,
+        free_max_percent=parameters.free_max_percent,
+    )
+    return float(free.sum()) * snapshot.geometry.cell_area_m2
+
+
+def _analyse_or_refuse(
+    snapshot: OccupancySnapshot, parameters: Parameters, method: str
+) -> SnapshotAnalysis | InvalidMapError:
+    try:
+        return analyse(snapshot, parameters, method)
+    except InvalidMapError as error:
+        return error
+
+
+def _run_info(path: Path, reader: LogReader, options: RunOptions) -> RunInfo:
+    provenance = {"format": reader.info.format, **fingerprint(path)}
+    return RunInfo(path, reader.topic, options.method, options.parameters, software_versions(), provenance)
+
+
+def _planned_files(folder: Path, stem: str, options: RunOptions) -> dict[str, Path]:
+    files = {}
+    if options.recording:
+        files["recording"] = folder / f"{stem}.rrd"
+    if options.annotated_log:
+        files["annotated_log"] = folder / f"{stem}.rose2.mcap"
+    files |= {name: folder / f"{name}.parquet" for name in TABLES}
+    return files | {"summary": folder / SUMMARY}
+
+
+def _make_sinks(planned: dict[str, Path], info: RunInfo, options: RunOptions) -> list[Sink]:
+    # Imported here: each brings a large library that the others do not need.
+    from rose2_logs.sinks.tables import Tables
+
+    sinks: list[Sink] = [Tables(planned["summary"].parent)]
+    if options.recording or options.live:
+        from rose2_logs.sinks.rerun_recording import RerunRecording
+
+        sinks.append(RerunRecording(planned.get("recording"), info, live=options.live))
+    if options.annotated_log:
+        from rose2_logs.sinks.annotated_mcap import AnnotatedMcap
+
+        sinks.append(AnnotatedMcap(planned["annotated_log"], info))
+    return sinks

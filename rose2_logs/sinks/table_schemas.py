@@ -1,0 +1,108 @@
+"""What the columns of the tables are: name, type, unit and meaning, as written into the files."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import pyarrow as pa
+
+
+def _table(columns: dict[str, tuple[pa.DataType, str]], metadata: dict[str, str] | None = None) -> pa.Schema:
+    """Build a schema; each column's meaning is its field metadata ``description``."""
+    fields = [
+        pa.field(name, kind, nullable=name in _NULLABLE, metadata={"description": meaning})
+        for name, (kind, meaning) in columns.items()
+    ]
+    return pa.schema(fields, metadata=metadata)
+
+
+_NULLABLE = frozenset({"label_x_m", "label_y_m", "clean_threshold"})
+
+_SNAPSHOT: dict[str, tuple[pa.DataType, str]] = {
+    "snapshot": (pa.int32(), "number of the snapshot among the distinct maps, from 0"),
+    "log_time_ns": (pa.int64(), "when the map was recorded, nanoseconds since the epoch"),
+}
+
+SNAPSHOTS = _table(
+    {
+        **_SNAPSHOT,
+        "stamp_ns": (pa.int64(), "header stamp of the map, nanoseconds"),
+        "time_s": (pa.float64(), "log time since the first snapshot, seconds"),
+        "coverage": (pa.float64(), "known free area over that of the run's last map, share in [0, 1]"),
+        "free_area_m2": (pa.float64(), "known free area, square metres"),
+        "rooms": (pa.int32(), "number of rooms"),
+        "rooms_area_m2": (pa.float64(), "area of all rooms as far as they were seen, square metres"),
+        "rooms_predicted_area_m2": (
+            pa.float64(),
+            "area of all rooms with their predicted parts, square metres",
+        ),
+        "doorways": (pa.int32(), "number of doorways between rooms"),
+        "directions_rad": (
+            pa.list_(pa.float64()),
+            "dominant directions, world frame, strongest first, radians",
+        ),
+        "clean_threshold": (pa.float64(), "structure score from which cells are in the clean map"),
+        "wall_segments": (pa.int32(), "number of wall segments"),
+        "lines": (pa.int32(), "number of representative lines"),
+        "faces": (pa.int32(), "number of faces"),
+        "repeats_before": (pa.int32(), "identical maps dropped since the snapshot before"),
+        "frame_id": (pa.string(), "name of the world frame"),
+        "resolution_m": (pa.float64(), "side of a cell, metres"),
+        "origin_x_m": (pa.float64(), "world x of the grid's origin, metres"),
+        "origin_y_m": (pa.float64(), "world y of the grid's origin, metres"),
+        "yaw_rad": (pa.float64(), "rotation of the grid in the world, radians counter-clockwise"),
+        "height_cells": (pa.int32(), "rows of the grid"),
+        "width_cells": (pa.int32(), "columns of the grid"),
+    }
+)
+
+GEOPARQUET: dict[str, Any] = {
+    "version": "1.1.0",
+    "primary_column": "polygon_wkb",
+    "columns": {
+        "polygon_wkb": {"encoding": "WKB", "geometry_types": ["Polygon", "MultiPolygon"], "crs": None}
+    },
+}
+"""Lets GeoPandas, DuckDB and QGIS read the polygons; the frame is the map's, so there is no CRS."""
+
+ROOMS = _table(
+    {
+        **_SNAPSHOT,
+        "track": (pa.int32(), "number of the room over the run, from 1"),
+        "room": (pa.int32(), "number of the room in this snapshot, from 1"),
+        "area_m2": (pa.float64(), "area as far as it was seen, square metres"),
+        "predicted_area_m2": (pa.float64(), "area of the polygon, with the predicted part, square metres"),
+        "label_x_m": (pa.float64(), "world x of the point deepest inside the polygon, metres"),
+        "label_y_m": (pa.float64(), "world y of the point deepest inside the polygon, metres"),
+        "neighbours": (pa.list_(pa.int32()), "tracks of the rooms behind its doorways, ascending"),
+        "polygon_wkb": (pa.binary(), "shape with the predicted part, well-known binary, world metres"),
+    },
+    {"geo": json.dumps(GEOPARQUET, sort_keys=True)},
+)
+
+EVENTS = _table(
+    {
+        **_SNAPSHOT,
+        "kind": (pa.string(), "born, continued, split, merged, lost or returned"),
+        "track": (pa.int32(), "the track that it is about; of a merge the one that stays"),
+        "others": (pa.list_(pa.int32()), "tracks of the parts of a split, tracks that a merge ended"),
+        "overlap_iou": (
+            pa.float64(),
+            "intersection over union with the track's last shape, share; 0 for none",
+        ),
+    }
+)
+
+DOORWAYS = _table(
+    {
+        **_SNAPSHOT,
+        "track_a": (pa.int32(), "track of the room on one side, the smaller number"),
+        "track_b": (pa.int32(), "track of the room on the other side"),
+        "width_m": (pa.float64(), "clear width, metres"),
+        "x0_m": (pa.float64(), "world x of one end, metres"),
+        "y0_m": (pa.float64(), "world y of one end, metres"),
+        "x1_m": (pa.float64(), "world x of the other end, metres"),
+        "y1_m": (pa.float64(), "world y of the other end, metres"),
+    }
+)

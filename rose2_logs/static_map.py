@@ -1,0 +1,151 @@
+"""One saved map to its rooms: label image, floor plan as GeoJSON, picture."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import shapely
+
+from rose2_logs.errors import LogError, OutputError, ParameterError
+from rose2_logs.occupancy import OccupancySnapshot
+from rose2_logs.parameters import Parameters
+from rose2_logs.pipeline import SnapshotAnalysis, analyse
+from rose2_logs.readers import open_log
+from rose2_logs.rooms import RoomMap
+from rose2_logs.sinks.label_image import write_image, write_label_image
+from rose2_logs.sinks.picture import draw_rooms
+from rose2_logs.sinks.summary import write_json
+
+IMAGES = (".png", ".pgm", ".bmp")
+
+
+@dataclass(frozen=True)
+class StaticMapResult:
+    """What `segment_map` found and wrote."""
+
+    rooms: RoomMap
+    folder: Path
+    files: tuple[Path, ...]
+
+
+def segment_map(
+    map_file: Path,
+    folder: Path,
+    parameters: Parameters,
+    method: str = "rose2",
+    *,
+    resolution_m: float | None = None,
+    overwrite: bool = False,
+) -> StaticMapResult:
+    """Segment a saved map and write what was found.
+
+    Parameters
+    ----------
+    map_file : path
+        A map_server ``.yaml``, or an image in the grey values of ROS maps.
+    folder : path
+        Receives ``<name>.labels.png`` (0 = none, row 0 at the top like the image),
+        ``<name>.floor_plan.geojson`` and ``<name>.rooms.png``.
+    parameters, method
+        As for `analyse`.
+    resolution_m : float, optional
+        Side of a cell, for an image without a ``.yaml`` beside it; its origin is then its lower left corner.
+    overwrite : bool
+        Whether earlier results may be replaced.
+
+    Raises
+    ------
+    LogError, InvalidMapError, ParameterError
+        If the map cannot be read, or its resolution is neither given nor written beside it.
+    OutputError
+        If results exist and may not be replaced, or cannot be written.
+    """
+    name = map_file.stem
+    files = tuple(
+        folder / f"{name}{ending}" for ending in (".labels.png", ".floor_plan.geojson", ".rooms.png")
+    )
+    if not overwrite and (existing := [file for file in files if file.exists()]):
+        raise OutputError(f"{existing[0]}: exists already; choose another folder or pass --overwrite")
+    snapshot = read_static_map(map_file, resolution_m)
+    analysis = analyse(snapshot, parameters, method)
+    write_label_image(files[0], np.flipud(analysis.rooms.labels))
+    write_json(files[1], floor_plan_geojson(analysis))
+    write_image(files[2], draw_rooms(snapshot, analysis))
+    return StaticMapResult(analysis.rooms, folder, files)
+
+
+def read_static_map(map_file: Path, resolution_m: float | None = None) -> OccupancySnapshot:
+    """Read a saved map; an image without a ``.yaml`` needs its resolution."""
+    if not map_file.is_file():
+        raise LogError(f"{map_file}: there is no such file")
+    is_bare = map_file.suffix.lower() in IMAGES and not map_file.with_suffix(".yaml").exists()
+    if is_bare and resolution_m is None:
+        raise ParameterError(f"{map_file}: no .yaml lies beside it; pass --resolution METRES_PER_CELL")
+    if not is_bare and resolution_m is not None:
+        raise ParameterError(f"{map_file}: its .yaml says the resolution; leave --resolution out")
+    with _described(map_file, resolution_m) as log, open_log(log) as reader:
+        return reader.first()
+
+
+@contextmanager
+def _described(map_file: Path, resolution_m: float | None) -> Iterator[Path]:
+    """Give the map itself, or a description as map_server writes it for an image that has none."""
+    if resolution_m is None:
+        yield map_file
+        return
+    import yaml
+
+    with tempfile.TemporaryDirectory() as folder:
+        described = Path(folder) / f"{map_file.stem}.yaml"
+        about = {"image": str(map_file.resolve()), "resolution": resolution_m, "origin": [0.0, 0.0, 0.0]}
+        described.write_text(yaml.safe_dump(about), encoding="utf-8")
+        yield described
+
+
+def floor_plan_geojson(analysis: SnapshotAnalysis) -> dict[str, Any]:
+    """Return rooms, doorways, walls and lines as a GeoJSON feature collection.
+
+    Coordinates are metres in the map's frame, not degrees; the member ``coordinates`` says so. Each feature's
+    property ``kind`` is room, doorway, wall or line.
+    """
+    rooms = analysis.rooms
+    features = [
+        _feature(
+            polygon,
+            kind="room",
+            room=number,
+            area_m2=float(rooms.areas_m2[number - 1]),
+            predicted_area_m2=polygon.area,
+            neighbours=list(rooms.neighbours(number)),
+        )
+        for number, polygon in enumerate(rooms.polygons, start=1)
+    ]
+    for doorway in rooms.doorways:
+        line = shapely.LineString(doorway.ends_m)
+        features.append(_feature(line, kind="doorway", rooms=list(doorway.rooms), width_m=doorway.width_m))
+    if analysis.walls is not None:
+        walls = analysis.walls
+        for ends, direction in zip(walls.segments_m, walls.segment_direction.tolist(), strict=True):
+            features.append(
+                _feature(shapely.LineString(ends.reshape(2, 2)), kind="wall", direction=direction)
+            )
+        for ends, direction, weight in zip(
+            walls.lines_m, walls.line_direction.tolist(), walls.line_weight.tolist(), strict=True
+        ):
+            line = shapely.LineString(ends.reshape(2, 2))
+            features.append(_feature(line, kind="line", direction=direction, weight=weight))
+    return {
+        "type": "FeatureCollection",
+        "coordinates": {"unit": "metre", "frame_id": analysis.geometry.frame_id},
+        "features": features,
+    }
+
+
+def _feature(geometry: shapely.Geometry, **properties: Any) -> dict[str, Any]:
+    return {"type": "Feature", "properties": properties, "geometry": shapely.geometry.mapping(geometry)}
