@@ -39,7 +39,9 @@ class SpectrumParameters:
     """Stage A: dominant directions, structure score, clean map (paper, III-A)."""
 
     wall_sigma_m: float = _number(0.06, "m", "Walls in SLAM maps wobble by about one cell of 5 cm.", 0.001)
-    longest_wave_m: float = _number(10.0, "m", "Longer waves show the building's outline, not its walls.", 0.1)
+    longest_wave_m: float = _number(
+        10.0, "m", "Longer waves show the building's outline, not its walls.", 0.1
+    )
     shortest_wave_m: float = _number(0.25, "m", "Shorter waves show the raster (five cells of 5 cm).", 0.001)
     angle_step_rad: float = _number(
         math.radians(0.25), "rad", "A wall of 10 m leaves its line by less than a cell.", 1e-4, 0.2
@@ -88,7 +90,9 @@ class WallParameters:
         4.0, "m", "A wall may go on unseen for a room's width beyond its evidence.", 0.0
     )
     local_extension_m: float = _number(0.6, "m", "A chord of a curved wall reaches to the next chord.", 0.0)
-    extension_per_length: float = _number(4.0, "1", "A short wall reaches not further than this times itself.")
+    extension_per_length: float = _number(
+        4.0, "1", "A short wall reaches not further than this times itself."
+    )
     line_min_weight: float = _number(0.1, "share", "Least covered share of a line; the paper's value.", 0, 1)
 
 
@@ -99,15 +103,36 @@ class FloorPlanParameters:
     wall_tolerance_m: float = _number(
         0.2, "m", "A wall counts for an edge when it lies this near: a wall's half thickness and drift.", 0.0
     )
+    face_min_seen: float = _number(
+        0.05, "share", "A face less seen than this is outside: it holds rays through windows.", 0, 1
+    )
+    shape_min_seen: float = _number(
+        0.2, "share", "A face seen this much belongs to its room's predicted shape; the paper's value.", 0, 1
+    )
     join_min_openness: float = _number(
         0.6, "share", "Faces join when at least this share of their known border is open.", 0, 1
     )
-    join_min_open_m: float = _number(0.15, "m", "Least open border for faces to join: three cells of 5 cm.", 0)
+    join_min_open_m: float = _number(
+        0.15, "m", "Least open border for faces to join: three cells of 5 cm.", 0
+    )
     join_min_passage: float = _number(
         0.75, "1", "Faces join when the passage is this wide against the narrower one's width.", 0
     )
     room_min_area_m2: float = _number(3.0, "m2", "Smaller pieces of free space are no rooms.", 0.0)
     room_min_clearance_m: float = _number(0.6, "m", "Half the width of the narrowest room.", 0.0)
+
+
+@dataclass(frozen=True)
+class TopologyParameters:
+    """Stage D: Voronoi graph, splitting of rooms, doorways (paper, III-D)."""
+
+    voronoi_min_clearance_m: float = _number(
+        0.25, "m", "The graph keeps clear of walls by the half width of a small robot.", 0.0
+    )
+    split_min_area_m2: float = _number(2.0, "m2", "Smaller parts of a graph are niches.", 0.0)
+    split_min_purity: float = _number(0.9, "share", "A cut leaves this share of each part on its side.", 0, 1)
+    max_rounds: int = _number(5, "1", "Rounds of splitting; the paper's implementation has five.", 0, 100)
+    doorway_min_width_m: float = _number(0.3, "m", "Narrower contacts of two rooms are noise.", 0.0)
 
 
 @dataclass(frozen=True)
@@ -133,6 +158,7 @@ class Parameters:
     spectrum: SpectrumParameters = field(default_factory=SpectrumParameters)
     walls: WallParameters = field(default_factory=WallParameters)
     floor_plan: FloorPlanParameters = field(default_factory=FloorPlanParameters)
+    topology: TopologyParameters = field(default_factory=TopologyParameters)
     tracking: TrackingParameters = field(default_factory=TrackingParameters)
 
     def resolved(self) -> dict[str, dict[str, float | int | bool | str]]:

@@ -2,16 +2,30 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
 
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry.base import BaseGeometry
+
+from rose2_logs.errors import ParameterError
+from rose2_logs.floor_plan.doorways import find_doorways
 from rose2_logs.floor_plan.plan import FloorPlan
-from rose2_logs.occupancy import GridGeometry, OccupancySnapshot
+from rose2_logs.floor_plan.rooms import number_rooms, outline, predicted_shapes
+from rose2_logs.floor_plan.stage import FloorPlanResult, make_floor_plan
+from rose2_logs.occupancy import BoolArray, FloatArray, GridGeometry, OccupancySnapshot, classify
 from rose2_logs.parameters import Parameters
-from rose2_logs.rooms import RoomMap
+from rose2_logs.rooms import Doorway, RoomMap
+from rose2_logs.rose.stage import RoseResult, find_structure
 from rose2_logs.rose.structure import Structure
+from rose2_logs.topology.splitting import split_rooms
+from rose2_logs.walls.stage import WallResult, find_walls
 from rose2_logs.walls.walls import Walls
 
 METHODS = ("rose2",)
+"""Names of the segmentation methods."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,5 +61,189 @@ class SnapshotAnalysis:
 
 
 def analyse(snapshot: OccupancySnapshot, parameters: Parameters, method: str = "rose2") -> SnapshotAnalysis:
-    """Segment one map into rooms."""
-    raise NotImplementedError
+    """Segment one map into rooms.
+
+    Parameters
+    ----------
+    snapshot : OccupancySnapshot
+    parameters : Parameters
+    method : str
+        One of `METHODS`.
+
+    Returns
+    -------
+    SnapshotAnalysis
+        The same for the same input, whatever ran before.
+
+    Raises
+    ------
+    ParameterError
+        If `method` is none of `METHODS`.
+    """
+    if method not in METHODS:
+        raise ParameterError(f"no method {method!r}; there are: {', '.join(METHODS)}")
+    watch = _StopWatch()
+    geometry = snapshot.geometry
+    resolution = geometry.resolution_m
+    free, occupied = classify(
+        snapshot.cells,
+        occupied_min_percent=parameters.occupancy.occupied_min_percent,
+        free_max_percent=parameters.occupancy.free_max_percent,
+    )
+    explored = _Explored.of(free | occupied, geometry)
+    free, occupied = free[explored.window], occupied[explored.window]
+    watch.lap("prepare")
+
+    structure = find_structure(occupied, resolution, parameters.spectrum)
+    watch.lap("structure")
+    walls = find_walls(occupied, structure.clean, structure.directions_rad, resolution, parameters.walls)
+    watch.lap("walls")
+    plan = make_floor_plan(walls.lines.ends_m, walls.walls, free, resolution, parameters.floor_plan)
+    watch.lap("floor_plan")
+    labels = split_rooms(
+        plan.labels,
+        walls.walls,
+        walls.lines.ends_m,
+        structure.directions_rad,
+        resolution,
+        parameters.topology,
+    )
+    watch.lap("topology")
+    labels = number_rooms(labels, parameters.floor_plan.room_min_area_m2, resolution)
+    room_of_face, shapes = _room_shapes(plan, labels, resolution, parameters)
+    rooms = _room_map(labels, shapes, explored, geometry, parameters)
+    watch.lap("rooms")
+    return SnapshotAnalysis(
+        index=snapshot.index,
+        log_time_ns=snapshot.log_time_ns,
+        stamp_ns=snapshot.stamp_ns,
+        geometry=geometry,
+        free_area_m2=float(np.count_nonzero(free)) * geometry.cell_area_m2,
+        rooms=rooms,
+        structure=explored.structure(structure),
+        walls=explored.walls(walls),
+        floor_plan=explored.floor_plan(plan, room_of_face, parameters),
+        seconds=watch.seconds,
+    )
+
+
+class _StopWatch:
+    """Seconds per stage."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+        self._last = time.perf_counter()
+
+    def lap(self, stage: str) -> None:
+        now = time.perf_counter()
+        self.seconds[stage] = now - self._last
+        self._last = now
+
+
+def _room_shapes(
+    plan: FloorPlanResult, labels: NDArray[np.int32], resolution_m: float, parameters: Parameters
+) -> tuple[NDArray[np.int32], list[BaseGeometry]]:
+    """Room of each face, and predicted shapes: a room's faces, or its cells where a split cut faces."""
+    count = int(labels.max(initial=0))
+    group_of_room = np.zeros(count + 1, np.int32)
+    cells = labels > 0
+    group_of_room[labels[cells]] = plan.labels[cells]
+    # A group that was split, or lost cells to a split, has no faces of its own any more.
+    rooms, groups = np.unique(np.stack([labels[cells], plan.labels[cells]]), axis=1)
+    rooms_in_group = np.bincount(groups, minlength=int(plan.group.max(initial=0)) + 1)
+    room_of_group = np.zeros(len(rooms_in_group), np.int32)
+    whole = rooms_in_group[groups] == 1
+    room_of_group[groups[whole]] = rooms[whole]
+    room_of_face = room_of_group[plan.group]
+    room_of_face[plan.group == 0] = 0
+    shown = np.where(plan.seen >= parameters.floor_plan.shape_min_seen, room_of_face, 0)
+    shapes = list(predicted_shapes(plan.graph, shown, count))
+    for room, shape in enumerate(shapes, start=1):
+        if shape.is_empty:
+            shapes[room - 1] = outline(labels == room, resolution_m)
+    return room_of_face, shapes
+
+
+def _room_map(
+    labels: NDArray[np.int32],
+    shapes: list[BaseGeometry],
+    explored: _Explored,
+    geometry: GridGeometry,
+    parameters: Parameters,
+) -> RoomMap:
+    full = np.zeros(geometry.shape, np.int32)
+    full[explored.window] = labels
+    doorways = find_doorways(labels, geometry.resolution_m, parameters.topology.doorway_min_width_m)
+    return RoomMap(
+        geometry=geometry,
+        labels=full,
+        polygons=tuple(explored.shape(shape) for shape in shapes),
+        areas_m2=np.bincount(labels.ravel(), minlength=len(shapes) + 1)[1:].astype(float)
+        * geometry.cell_area_m2,
+        doorways=tuple(Doorway(pair, explored.points(ends)) for pair, ends in doorways),
+    )
+
+
+@dataclass(frozen=True)
+class _Explored:
+    """The part of the canvas that holds known cells, and the way from its frame back to canvas and world."""
+
+    window: tuple[slice, slice]
+    geometry: GridGeometry
+
+    @classmethod
+    def of(cls, known: BoolArray, geometry: GridGeometry) -> _Explored:
+        rows, columns = np.flatnonzero(known.any(1)), np.flatnonzero(known.any(0))
+        if len(rows) == 0:
+            return cls((slice(0, 1), slice(0, 1)), geometry)
+        return cls((slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)), geometry)
+
+    def points(self, xy_m: FloatArray) -> FloatArray:
+        """World positions of points (..., 2) of the window's frame."""
+        corner = np.array([self.window[1].start, self.window[0].start]) * self.geometry.resolution_m
+        return self.geometry.grid_to_world(xy_m + corner)
+
+    def segments(self, ends_m: FloatArray) -> FloatArray:
+        """World ends (N, 4) of segments of the window's frame."""
+        return self.points(ends_m.reshape(-1, 2, 2)).reshape(-1, 4)
+
+    def shape(self, geometry: BaseGeometry) -> BaseGeometry:
+        """Shapely geometry in the world."""
+        return shapely.transform(geometry, self.points)
+
+    def cells(self, values: NDArray[np.generic]) -> NDArray[np.generic]:
+        """Array over the whole canvas, zero outside the window."""
+        full = np.zeros(self.geometry.shape, values.dtype)
+        full[self.window] = values
+        return full
+
+    def structure(self, found: RoseResult) -> Structure:
+        return Structure(
+            directions_rad=np.mod(found.directions_rad + self.geometry.yaw_rad, np.pi),
+            strengths=found.strengths,
+            score=self.cells(found.score).astype(np.float32, copy=False),
+            threshold=found.threshold,
+            clean=self.cells(found.clean).astype(bool, copy=False),
+        )
+
+    def walls(self, found: WallResult) -> Walls:
+        return Walls(
+            segments_m=self.segments(found.segments_m),
+            segment_direction=found.segment_direction,
+            segment_cluster=found.segment_line,
+            lines_m=self.segments(found.lines.ends_m),
+            line_direction=found.lines.direction,
+            line_weight=found.lines.weight,
+        )
+
+    def floor_plan(
+        self, found: FloorPlanResult, room_of_face: NDArray[np.int32], parameters: Parameters
+    ) -> FloorPlan:
+        return FloorPlan(
+            edges_m=self.segments(found.graph.edges_m),
+            edge_weight=found.evidence.weight,
+            edge_faces=found.graph.edge_faces,
+            faces=tuple(shapely.transform(found.graph.polygons, self.points)),
+            face_inside=found.seen >= parameters.floor_plan.face_min_seen,
+            room_of_face=room_of_face,
+        )

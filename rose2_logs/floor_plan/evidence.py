@@ -1,0 +1,160 @@
+"""What the map says along each edge: wall, open, or not seen (paper, III-C: edge weights)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from rose2_logs.floor_plan.faces import SNAP_M
+from rose2_logs.occupancy import BoolArray, FloatArray
+from rose2_logs.parameters import FloorPlanParameters
+
+LINE_SEARCH_M = 4 * SNAP_M
+"""Noding moves an edge off its line by less than this."""
+
+
+@dataclass(frozen=True, eq=False)
+class EdgeEvidence:
+    """Lengths (E,) in metres of each edge; what is neither was not seen or is clutter.
+
+    Attributes
+    ----------
+    wall_m : (E,) float
+        Covered by walls.
+    open_m : (E,) float
+        Open free space.
+    length_m : (E,) float
+        All of the edge.
+    passage_m : (E,) float
+        Widest stretch without a wall, along the whole line, that open parts of the edge belong to; 0 without.
+    """
+
+    wall_m: FloatArray
+    open_m: FloatArray
+    length_m: FloatArray
+    passage_m: FloatArray
+
+    @property
+    def weight(self) -> FloatArray:
+        """Share (E,) of each edge that walls cover, in [0, 1]."""
+        share: FloatArray = np.divide(
+            self.wall_m, self.length_m, out=np.zeros_like(self.wall_m), where=self.length_m > 0
+        )
+        return np.minimum(share, 1.0)
+
+
+def edge_evidence(
+    edges_m: FloatArray,
+    lines_m: FloatArray,
+    walls: BoolArray,
+    free: BoolArray,
+    resolution_m: float,
+    parameters: FloorPlanParameters,
+) -> EdgeEvidence:
+    """Read the map along the representative lines and share what is found among their edges.
+
+    Parameters
+    ----------
+    edges_m : (E, 4) float
+        Edges in the grid frame, metres; those that lie on no line get zeros.
+    lines_m : (L, 4) float
+        Representative lines.
+    walls, free : (H, W) bool
+        Cells of walls and free cells.
+    """
+    line, step_m, is_wall, is_free = _read_lines(lines_m, walls, free, resolution_m, parameters)
+    offset = np.concatenate([[0], np.cumsum(np.bincount(line, minlength=len(lines_m)))])
+    owner, start, end = _place_edges(edges_m, lines_m)
+    length = np.hypot(edges_m[:, 2] - edges_m[:, 0], edges_m[:, 3] - edges_m[:, 1])
+    on_line = owner >= 0
+    lengths = []
+    for flag in (is_wall, is_free & ~is_wall):
+        total = np.concatenate([[0.0], np.cumsum(flag)])
+        samples = np.arange(len(total), dtype=float)
+        base, step = offset[owner[on_line]], step_m[owner[on_line]]
+        spans = [np.interp(base + at[on_line] / step, samples, total) for at in (start, end)]
+        value = np.zeros(len(edges_m))
+        value[on_line] = (spans[1] - spans[0]) * step
+        lengths.append(value)
+    run_m = _free_runs(line, is_wall, step_m)
+    run_m[~is_free] = 0
+    passage = np.zeros(len(edges_m))
+    first = offset[owner] + np.floor(start / step_m[owner] + 0.5).astype(np.int64)
+    last = offset[owner] + np.floor(end / step_m[owner] + 0.5).astype(np.int64)
+    some = on_line & (last > first)
+    if some.any():
+        bounds = np.minimum(np.column_stack([first[some], last[some]]).ravel(), len(run_m) - 1)
+        passage[some] = np.maximum.reduceat(run_m, bounds)[::2]
+    return EdgeEvidence(lengths[0], lengths[1], length, passage)
+
+
+def _free_runs(line: NDArray[np.intp], is_wall: BoolArray, step_m: FloatArray) -> FloatArray:
+    """Length of the stretch without a wall that each sample lies in, in metres; 0 on walls."""
+    begins = np.flatnonzero(np.concatenate([[True], (np.diff(line) != 0) | (np.diff(is_wall) != 0)]))
+    run = np.repeat(np.arange(len(begins)), np.diff(np.append(begins, len(line))))
+    length: FloatArray = (np.bincount(run) * step_m[line[begins]])[run]
+    return np.where(is_wall, 0.0, length)
+
+
+def _read_lines(
+    lines_m: FloatArray,
+    walls: BoolArray,
+    free: BoolArray,
+    resolution_m: float,
+    parameters: FloorPlanParameters,
+) -> tuple[NDArray[np.intp], FloatArray, BoolArray, BoolArray]:
+    """Sample each line once a cell: a wall is where a wall cell lies across it within the tolerance.
+
+    Returns
+    -------
+    line : (S,) int
+        Line of each sample, in order along the lines.
+    step_m : (L,) float
+        Distance between the samples of a line.
+    is_wall, is_free : (S,) bool
+    """
+    vector = lines_m[:, 2:] - lines_m[:, :2]
+    length = np.hypot(vector[:, 0], vector[:, 1])
+    count = np.maximum(np.ceil(length / resolution_m).astype(np.int64), 1)
+    line = np.repeat(np.arange(len(lines_m)), count)
+    position = np.arange(len(line)) - np.repeat(np.cumsum(count) - count, count)
+    centre = lines_m[line, :2] + vector[line] * ((position + 0.5) / count[line])[:, None]
+    normal = (np.column_stack([-vector[:, 1], vector[:, 0]]) / np.maximum(length, 1e-12)[:, None])[line]
+    is_wall = np.zeros(len(line), bool)
+    reach = round(parameters.wall_tolerance_m / resolution_m)
+    for step in range(-reach, reach + 1):
+        is_wall |= _sample(walls, centre + normal * (step * resolution_m), resolution_m)
+    return line, length / count, is_wall, _sample(free, centre, resolution_m)
+
+
+def _sample(mask: BoolArray, points_m: FloatArray, resolution_m: float) -> BoolArray:
+    """Values of the cells that hold points; False outside the map."""
+    cells = np.floor(points_m / resolution_m).astype(np.intp)
+    inside = np.all((cells >= 0) & (cells < mask.shape[::-1]), axis=1)
+    values = np.zeros(len(cells), bool)
+    values[inside] = mask[cells[inside, 1], cells[inside, 0]]
+    return values
+
+
+def _place_edges(edges_m: FloatArray, lines_m: FloatArray) -> tuple[NDArray[np.intp], FloatArray, FloatArray]:
+    """Line of each edge (-1 for none) and where along it the edge starts and ends, in metres."""
+    owner = np.full(len(edges_m), -1, np.intp)
+    tree = shapely.STRtree(shapely.linestrings(lines_m.reshape(-1, 2, 2)))
+    middle = shapely.points((edges_m[:, :2] + edges_m[:, 2:]) / 2)
+    edge, line = tree.query(middle, predicate="dwithin", distance=LINE_SEARCH_M)
+    # Where lines cross at a point, the edge's own line is the one that both its ends lie on.
+    ends = [shapely.points(edges_m[edge, k : k + 2]) for k in (0, 2)]
+    misfit = np.maximum(*[shapely.distance(end, tree.geometries[line]) for end in ends])
+    good = misfit <= LINE_SEARCH_M
+    edge, line, misfit = edge[good], line[good], misfit[good]
+    order = np.lexsort((line, misfit, edge))[::-1]
+    owner[edge[order]] = line[order]
+    direction = lines_m[owner, 2:] - lines_m[owner, :2]
+    direction /= np.maximum(np.hypot(direction[:, 0], direction[:, 1]), 1e-12)[:, None]
+    along = [np.einsum("ij,ij->i", edges_m[:, k : k + 2] - lines_m[owner, :2], direction) for k in (0, 2)]
+    length = shapely.length(tree.geometries[owner])
+    start, end = np.minimum(*along), np.maximum(*along)
+    return owner, np.clip(start, 0, length), np.clip(end, 0, length)

@@ -1,0 +1,161 @@
+"""Faces that no wall divides are grouped to rooms (paper, III-C)."""
+
+from __future__ import annotations
+
+import heapq
+from collections import defaultdict
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rose2_logs.floor_plan.evidence import EdgeEvidence
+from rose2_logs.occupancy import FloatArray
+from rose2_logs.parameters import FloorPlanParameters
+
+Border = tuple[float, float, float]
+"""Open and closed length of a border, and the widest passage through it, in metres."""
+
+
+def group_faces(
+    edge_faces: NDArray[np.int32],
+    evidence: EdgeEvidence,
+    free_m2: FloatArray,
+    clearance_m: FloatArray,
+    parameters: FloorPlanParameters,
+) -> NDArray[np.int32]:
+    """Join the two groups with the best connection, again and again, until no connection is good enough.
+
+    The openness of a border is its open length over its known length, wall or open, taken over the whole
+    border between two groups, so that a door in a long wall never joins what the wall divides. The passage is
+    the widest stretch without a wall on the border's line, held against the width of the narrower group.
+    What is too small for a room at the end joins the neighbour that it opens to most.
+
+    Parameters
+    ----------
+    free_m2 : (F,) float
+        Free area of each face; faces without any take no part.
+    clearance_m : (F,) float
+        Greatest distance from a wall within each face.
+
+    Returns
+    -------
+    group : (F,) int32
+        0.. for faces with free area, -1 for the others.
+    """
+    groups = _Groups(edge_faces, evidence, free_m2, clearance_m)
+    heap: list[tuple[float, float, int, int, Border]] = []
+
+    def push(a: int, b: int) -> None:
+        border = groups.borders[a][b]
+        if border[0] < parameters.join_min_open_m:
+            return
+        openness, passage = border[0] / (border[0] + border[1]), groups.relative_passage(a, b)
+        if openness >= parameters.join_min_openness and passage >= parameters.join_min_passage:
+            heapq.heappush(heap, (-openness * min(passage, 2.0), -border[0], min(a, b), max(a, b), border))
+
+    for a, neighbours in groups.borders.items():
+        for b in neighbours:
+            if a < b:
+                push(a, b)
+    while heap:
+        _, _, a, b, border = heapq.heappop(heap)
+        # An entry is stale when one of the two is gone or their border or widths have changed since.
+        if groups.borders.get(a, {}).get(b) != border:
+            continue
+        if groups.relative_passage(a, b) < parameters.join_min_passage:
+            continue
+        for c in groups.join(a, b):
+            push(a, c)
+    _absorb_small(groups, parameters)
+    return groups.labels()
+
+
+def _absorb_small(groups: _Groups, parameters: FloorPlanParameters) -> None:
+    """Join what is too small or too narrow for a room to the neighbour that it opens to most."""
+    heap = [(groups.free_m2[a], a) for a in np.flatnonzero(groups.alive).tolist()]
+    heapq.heapify(heap)
+    while heap:
+        area, a = heapq.heappop(heap)
+        if not groups.alive[a] or area != groups.free_m2[a]:
+            continue
+        small = area < parameters.room_min_area_m2
+        narrow = groups.clearance_m[a] < parameters.room_min_clearance_m
+        neighbours = groups.borders.get(a, {})
+        if not (small or narrow) or not neighbours:
+            continue
+        best = max(neighbours, key=lambda b: (neighbours[b][0], -b))
+        if neighbours[best][0] < parameters.join_min_open_m:
+            continue
+        groups.join(best, a)
+        heapq.heappush(heap, (groups.free_m2[best], best))
+
+
+class _Groups:
+    """Groups of faces with what is known of the borders between them."""
+
+    def __init__(
+        self,
+        edge_faces: NDArray[np.int32],
+        evidence: EdgeEvidence,
+        free_m2: FloatArray,
+        clearance_m: FloatArray,
+    ) -> None:
+        self.alive = free_m2 > 0
+        self.free_m2 = free_m2.copy()
+        self.clearance_m = np.maximum(clearance_m, 1e-6)
+        self.borders = _borders(edge_faces, evidence, self.alive)
+        self._active = self.alive.copy()
+        self._parent = np.arange(len(free_m2))
+
+    def relative_passage(self, a: int, b: int) -> float:
+        """Widest passage between two groups over the width of the narrower one."""
+        return self.borders[a][b][2] / (2 * float(min(self.clearance_m[a], self.clearance_m[b])))
+
+    def join(self, a: int, b: int) -> list[int]:
+        """Make `b` part of `a`; return the neighbours that `a` now has from it."""
+        self.alive[b] = False
+        self._parent[b] = a
+        self.free_m2[a] += self.free_m2[b]
+        self.clearance_m[a] = max(self.clearance_m[a], self.clearance_m[b])
+        taken = self.borders.pop(b)
+        del self.borders[a][b], taken[a]
+        for c, (open_m, closed_m, passage_m) in taken.items():
+            before = self.borders[a].get(c, (0.0, 0.0, 0.0))
+            border = (before[0] + open_m, before[1] + closed_m, max(before[2], passage_m))
+            self.borders[a][c] = self.borders[c][a] = border
+            del self.borders[c][b]
+        return list(taken)
+
+    def labels(self) -> NDArray[np.int32]:
+        """Group of each face, 0.., -1 for faces that take no part."""
+        root = _roots(self._parent)
+        group = np.full(len(root), -1, np.int32)
+        group[self._active] = np.unique(root[self._active], return_inverse=True)[1]
+        return group
+
+
+def _borders(
+    edge_faces: NDArray[np.int32], evidence: EdgeEvidence, active: NDArray[np.bool_]
+) -> dict[int, dict[int, Border]]:
+    use = np.all(edge_faces >= 0, axis=1)
+    use[use] &= np.all(active[edge_faces[use]], axis=1)
+    borders: dict[int, dict[int, Border]] = defaultdict(dict)
+    for (a, b), open_m, closed_m, passage_m in zip(
+        edge_faces[use].tolist(),
+        evidence.open_m[use].tolist(),
+        evidence.wall_m[use].tolist(),
+        evidence.passage_m[use].tolist(),
+        strict=True,
+    ):
+        before = borders[a].get(b, (0.0, 0.0, 0.0))
+        border = (before[0] + open_m, before[1] + closed_m, max(before[2], passage_m))
+        borders[a][b] = borders[b][a] = border
+    return borders
+
+
+def _roots(parent: NDArray[np.intp]) -> NDArray[np.intp]:
+    while True:
+        above = parent[parent]
+        if np.array_equal(above, parent):
+            return parent
+        parent = above

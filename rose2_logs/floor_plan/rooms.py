@@ -1,0 +1,96 @@
+"""Rooms from groups of faces: which faces are inside, labels of cells, predicted shapes (paper, III-C)."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from scipy import ndimage
+from shapely.geometry.base import BaseGeometry
+
+from rose2_logs.floor_plan.faces import FaceGraph, rasterise
+from rose2_logs.occupancy import BoolArray, FloatArray
+
+
+def label_faces(graph: FaceGraph, shape: tuple[int, int], resolution_m: float) -> NDArray[np.int32]:
+    """Paint the faces: (H, W) int32 with 1 + index of the face that holds each cell, 0 for none."""
+    return rasterise(
+        graph.polygons, np.arange(1, len(graph.polygons) + 1, dtype=np.int32), shape, resolution_m
+    )
+
+
+def free_area(
+    face_of_cell: NDArray[np.int32], free: BoolArray, count: int, resolution_m: float
+) -> FloatArray:
+    """Free area (F,) of each face in square metres."""
+    cells = np.bincount(face_of_cell[free], minlength=count + 1)[1:]
+    return cells.astype(float) * resolution_m**2
+
+
+def clearance(
+    face_of_cell: NDArray[np.int32], free: BoolArray, walls: BoolArray, count: int, resolution_m: float
+) -> FloatArray:
+    """Greatest distance (F,) in metres of a free cell of each face from a wall."""
+    distance = cv2.distanceTransform((~walls).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
+    distance[~free] = 0
+    greatest: FloatArray = np.asarray(
+        ndimage.maximum(distance, face_of_cell, np.arange(1, count + 1)), dtype=float
+    )
+    return greatest * resolution_m
+
+
+def number_rooms(labels: NDArray[np.int32], minimum_m2: float, resolution_m: float) -> NDArray[np.int32]:
+    """Renumber labels 1..R in order of their first cell; labels of less area than `minimum_m2` become 0."""
+    size = np.bincount(labels.ravel())
+    keep = size * resolution_m**2 >= minimum_m2
+    keep[0] = False
+    if not keep.any():
+        return np.zeros_like(labels)
+    present, first = np.unique(labels, return_index=True)
+    order = present[np.argsort(first)]
+    order = order[keep[order]]
+    number = np.zeros(len(size), np.int32)
+    number[order] = np.arange(1, len(order) + 1)
+    return number[labels]
+
+
+def predicted_shapes(
+    graph: FaceGraph, room_of_face: NDArray[np.int32], count: int
+) -> tuple[BaseGeometry, ...]:
+    """Join the faces of each room to one shape; gaps that it encloses belong to it.
+
+    Parameters
+    ----------
+    room_of_face : (F,) int32
+        Room 1..count of each face, 0 for none.
+
+    Returns
+    -------
+    shapes : tuple of `count` shapely geometries
+        Grid frame, metres; empty where a room has no face.
+    """
+    shapes = []
+    for room in range(1, count + 1):
+        shape = shapely.union_all(graph.polygons[room_of_face == room])
+        shapes.append(shape)
+    everything = shapely.union_all(graph.polygons[room_of_face > 0])
+    return tuple(_without_holes(shape, shapely.difference(everything, shape)) for shape in shapes)
+
+
+def _without_holes(shape: BaseGeometry, others: BaseGeometry) -> BaseGeometry:
+    """Fill the holes of a shape that hold no other room."""
+    filled = shapely.union_all(
+        [shapely.polygons(shapely.get_exterior_ring(part)) for part in shapely.get_parts(shape)]
+    )
+    return shapely.difference(filled, others)
+
+
+def outline(mask: BoolArray, resolution_m: float) -> BaseGeometry:
+    """Outline of the cells of a mask as a polygon or multipolygon in the grid frame, metres."""
+    padded = np.pad(mask, 1).astype(np.uint8)
+    rows = np.diff(padded.astype(np.int8), axis=1)
+    row, start = np.nonzero(rows == 1)
+    _, end = np.nonzero(rows == -1)
+    boxes = shapely.box(start, row - 1, end, row)
+    return shapely.transform(shapely.union_all(boxes), lambda points: points * resolution_m)

@@ -1,0 +1,67 @@
+"""Stage C in one call."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from rose2_logs.floor_plan.evidence import EdgeEvidence, edge_evidence
+from rose2_logs.floor_plan.faces import FaceGraph, build_faces
+from rose2_logs.floor_plan.grouping import group_faces
+from rose2_logs.floor_plan.rooms import clearance, free_area, label_faces
+from rose2_logs.occupancy import BoolArray, FloatArray
+from rose2_logs.parameters import FloorPlanParameters
+
+FRAME_MARGIN_M = 1.0
+"""The plane is cut within the map's box and this much around it, so that its outer walls lie inside."""
+
+
+@dataclass(frozen=True, eq=False)
+class FloorPlanResult:
+    """Stage C in the grid frame, metres.
+
+    Attributes
+    ----------
+    graph : FaceGraph
+    evidence : EdgeEvidence
+    seen : (F,) float
+        Share of each face that is known to be free.
+    group : (F,) int32
+        Group of each face, 1.., 0 for faces outside.
+    labels : (H, W) int32
+        Group of each free cell, 0 for none.
+    """
+
+    graph: FaceGraph
+    evidence: EdgeEvidence
+    seen: FloatArray
+    group: NDArray[np.int32]
+    labels: NDArray[np.int32]
+
+
+def make_floor_plan(
+    lines_m: FloatArray,
+    walls: BoolArray,
+    free: BoolArray,
+    resolution_m: float,
+    parameters: FloorPlanParameters,
+) -> FloorPlanResult:
+    """Faces, edge weights, inside and outside, groups of faces."""
+    height, width = free.shape[0] * resolution_m, free.shape[1] * resolution_m
+    margin = FRAME_MARGIN_M
+    graph = build_faces(lines_m, (-margin, -margin, width + margin, height + margin))
+    count = len(graph.polygons)
+    evidence = edge_evidence(graph.edges_m, lines_m, walls, free, resolution_m, parameters)
+    face_of_cell = label_faces(graph, (free.shape[0], free.shape[1]), resolution_m)
+    area = free_area(face_of_cell, free, count, resolution_m)
+    seen = area / np.maximum(shapely.area(graph.polygons), 1e-12)
+    # Without any line the map is one face, however little of it was seen.
+    inside = (seen >= parameters.face_min_seen) | (count == 1)
+    widest = clearance(face_of_cell, free, walls, count, resolution_m)
+    group = 1 + group_faces(graph.edge_faces, evidence, np.where(inside, area, 0.0), widest, parameters)
+    labels = np.concatenate([np.zeros(1, np.int32), group])[face_of_cell]
+    labels[~free] = 0
+    return FloorPlanResult(graph, evidence, seen, group, labels)

@@ -1,0 +1,121 @@
+"""The map's two-dimensional spectrum and the dominant directions that its ridges show (paper, III-A)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft, ndimage, signal
+
+from rose2_logs.occupancy import BoolArray, FloatArray
+from rose2_logs.parameters import SpectrumParameters
+
+
+@dataclass(frozen=True, eq=False)
+class Spectrum:
+    """Half-plane Fourier transform of the occupied cells, with all walls brought to one thickness.
+
+    Attributes
+    ----------
+    values : (h, w // 2 + 1) complex64
+        The transform, zero padded to a size (h, w) that is good for it.
+    frequency_x, frequency_y : (1, w // 2 + 1) and (h, 1) float32
+        Frequencies in cycles per metre.
+    shape : (int, int)
+        The padded size (h, w).
+    """
+
+    values: NDArray[np.complex64]
+    frequency_x: NDArray[np.float32]
+    frequency_y: NDArray[np.float32]
+    shape: tuple[int, int]
+
+    def filtered(self, gain: NDArray[np.float32], size: tuple[int, int]) -> NDArray[np.float32]:
+        """Transform back what a gain of the half plane's shape leaves, cut to `size` cells."""
+        image: NDArray[np.float32] = fft.irfft2(self.values * gain, s=self.shape)
+        return image[: size[0], : size[1]]
+
+
+def compute_spectrum(occupied: BoolArray, resolution_m: float, parameters: SpectrumParameters) -> Spectrum:
+    """Transform the occupied cells of the explored part of a map.
+
+    The canvas is padded by twice the length of the structure filter so that nothing wraps around, and the
+    cells are blurred by `wall_sigma_m`, so that a wall that wobbles by a cell still is one straight line;
+    thick walls and furniture count no more than a thin wall does.
+    """
+    margin = int(np.ceil(2 * parameters.structure_length_m / resolution_m))
+    shape = tuple(fft.next_fast_len(side + margin, real=True) for side in occupied.shape)
+    values = fft.rfft2(_walls_of_one_thickness(occupied, resolution_m, parameters.wall_sigma_m), s=shape)
+    frequency_x = fft.rfftfreq(shape[1], resolution_m).astype(np.float32)[None, :]
+    frequency_y = fft.fftfreq(shape[0], resolution_m).astype(np.float32)[:, None]
+    return Spectrum(values, frequency_x, frequency_y, (shape[0], shape[1]))
+
+
+def _walls_of_one_thickness(occupied: BoolArray, resolution_m: float, sigma_m: float) -> NDArray[np.float32]:
+    """Blur the occupied cells, scaled so that a straight wall one cell thick is 1 and cut off there."""
+    sigma = max(sigma_m / resolution_m, 0.5)
+    blurred = cv2.GaussianBlur(occupied.astype(np.float32), (0, 0), sigma, borderType=cv2.BORDER_CONSTANT)
+    thin_wall = 1 / (np.sqrt(2 * np.pi) * sigma)
+    capped: NDArray[np.float32] = np.minimum(blurred / np.float32(thin_wall), 1)
+    return capped
+
+
+def angular_energy(spectrum: Spectrum, parameters: SpectrumParameters) -> FloatArray:
+    """Amplitude of the spectrum over the direction of the walls that cause it.
+
+    A wall along direction t has its energy on the frequencies perpendicular to t; the power summed over
+    the plane is proportional to the length of the wall. Its square root is returned, an amplitude, so that a
+    long corridor does not hide the short walls of the rooms along it.
+
+    Returns
+    -------
+    energy : (B,) float
+        Bin b is centred on the wall direction b * pi / B.
+    """
+    bins = round(np.pi / parameters.angle_step_rad)
+    radius = np.hypot(spectrum.frequency_x, spectrum.frequency_y)
+    use = (radius > 1 / parameters.longest_wave_m) & (radius < 1 / parameters.shortest_wave_m)
+    if not use.any():
+        return np.zeros(bins)
+    row, column = np.nonzero(use)
+    angle = np.arctan2(spectrum.frequency_y[row, 0], spectrum.frequency_x[0, column]) + np.pi / 2
+    index = np.rint(angle / np.pi * bins).astype(np.intp) % bins
+    power = np.square(np.abs(spectrum.values[use]))
+    # The columns of a half plane stand for two frequencies each, but for the first.
+    power[column == 0] /= 2
+    energy = np.bincount(index, weights=power, minlength=bins)
+    energy = ndimage.gaussian_filter1d(energy, parameters.angle_sigma_rad / np.pi * bins, mode="wrap")
+    amplitude: FloatArray = np.sqrt(energy)
+    return amplitude
+
+
+def dominant_directions(energy: FloatArray, parameters: SpectrumParameters) -> tuple[FloatArray, FloatArray]:
+    """Peaks of the angular energy, refined below a bin by a parabola.
+
+    Returns
+    -------
+    directions_rad : (D,) float
+        Wall directions in [0, pi), strongest first.
+    strengths : (D,) float
+        Height of each peak above the floor, as a share of the energy's range.
+    """
+    span = float(np.ptp(energy))
+    if span <= 0:
+        return np.zeros(0), np.zeros(0)
+    bins = len(energy)
+    # Three turns of the circle, of which the middle one is read, so that no peak is cut.
+    tiled = np.tile((energy - energy.min()) / span, 3)
+    peaks, _ = signal.find_peaks(
+        tiled,
+        prominence=parameters.peak_min_prominence,
+        distance=max(1, round(parameters.direction_min_gap_rad / np.pi * bins)),
+    )
+    peaks = peaks[(peaks >= bins) & (peaks < 2 * bins)]
+    left, centre, right = tiled[peaks - 1], tiled[peaks], tiled[peaks + 1]
+    curvature = left - 2 * centre + right
+    shift = np.divide(left - right, 2 * curvature, out=np.zeros(len(peaks)), where=curvature < 0)
+    directions = np.mod((peaks - bins + shift) * np.pi / bins, np.pi)
+    order = np.lexsort((directions, -centre))
+    return directions[order], centre[order]

@@ -1,0 +1,33 @@
+"""Stage A in one call."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rose2_logs.occupancy import BoolArray, FloatArray
+from rose2_logs.parameters import SpectrumParameters
+from rose2_logs.rose.clean_map import clean_threshold, structure_score
+from rose2_logs.rose.spectrum import angular_energy, compute_spectrum, dominant_directions
+
+
+@dataclass(frozen=True, eq=False)
+class RoseResult:
+    """Stage A in the grid frame: see `rose.structure.Structure`, which is the same in the world."""
+
+    directions_rad: FloatArray
+    strengths: FloatArray
+    score: NDArray[np.float32]
+    threshold: float
+    clean: BoolArray
+
+
+def find_structure(occupied: BoolArray, resolution_m: float, parameters: SpectrumParameters) -> RoseResult:
+    """Spectrum, dominant directions, structure score, clean map of the occupied cells (H, W)."""
+    spectrum = compute_spectrum(occupied, resolution_m, parameters)
+    directions, strengths = dominant_directions(angular_energy(spectrum, parameters), parameters)
+    score = structure_score(spectrum, occupied, directions, parameters)
+    threshold = clean_threshold(score, occupied, parameters)
+    return RoseResult(directions, strengths, score, threshold, occupied & (score >= threshold))

@@ -1,0 +1,66 @@
+"""Stage B in one call."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rose2_logs.occupancy import BoolArray, FloatArray
+from rose2_logs.parameters import WallParameters
+from rose2_logs.walls.clusters import cluster_segments
+from rose2_logs.walls.lines import RepresentativeLines, representative_lines
+from rose2_logs.walls.segments import detect_local_segments, detect_segments, group_by_angle
+
+
+@dataclass(frozen=True, eq=False)
+class WallResult:
+    """Stage B in the grid frame, metres.
+
+    Attributes
+    ----------
+    segments_m : (N, 4) float
+        All segments.
+    segment_direction : (N,) int32
+        Index into `directions_rad`.
+    segment_line : (N,) int32
+        Representative line of each segment's wall cluster, -1 for none.
+    directions_rad : (D,) float
+        Dominant directions first, then local ones.
+    lines : RepresentativeLines
+        The representative lines.
+    walls : (H, W) bool
+        Wall cells: the clean map and the walls off the dominant directions.
+    """
+
+    segments_m: FloatArray
+    segment_direction: NDArray[np.int32]
+    segment_line: NDArray[np.int32]
+    directions_rad: FloatArray
+    lines: RepresentativeLines
+    walls: BoolArray
+
+
+def find_walls(
+    occupied: BoolArray,
+    clean: BoolArray,
+    dominant_rad: FloatArray,
+    resolution_m: float,
+    parameters: WallParameters,
+) -> WallResult:
+    """Segments, wall clusters and representative lines of a clean map (H, W)."""
+    along = detect_segments(clean, resolution_m, parameters)
+    local, local_walls = detect_local_segments(occupied, clean, resolution_m, parameters)
+    segments = np.concatenate([along, local])
+    directions, direction = group_by_angle(segments, dominant_rad, parameters)
+    clusters = cluster_segments(segments, directions, direction, parameters)
+    lines = representative_lines(clusters, directions, len(dominant_rad), parameters)
+    return WallResult(
+        segments,
+        direction,
+        lines.of_cluster[clusters.of_segment],
+        directions,
+        lines,
+        clean | local_walls,
+    )
