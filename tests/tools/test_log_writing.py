@@ -134,16 +134,17 @@ def test_sample_logs_hold_growing_maps_with_poses_and_true_rooms_beside(name):
     labels = np.flipud(np.asarray(Image.open(SAMPLES / truth["image"])))
     assert list(labels.shape) == truth["shape"]
     assert np.unique(labels)[1:].tolist() == [room["label"] for room in truth["rooms"]]
-    # The truth lies where the last map has its free cells.
+    # The truth lies where the last map has its obstacles. Its free cells prove less: how many of them lie
+    # outside the building depends on its windows.
     info, cells = grids[-1].info, grids[-1].data.reshape(grids[-1].info.height, grids[-1].info.width)
-    rows, columns = np.nonzero((cells >= 0) & (cells < 20))
+    rows, columns = np.nonzero(cells > 65)
     xy = (np.stack([columns, rows], -1) + 0.5) * info.resolution
     xy += np.array([info.origin.position.x, info.origin.position.y])
     at = np.floor((xy - np.array(truth["origin_xy_m"])) / truth["resolution_m"]).astype(int)
     inside = ((at >= 0) & (at < labels.shape[::-1])).all(1)
     found = np.zeros(len(xy), bool)
     found[inside] = labels[at[inside, 1], at[inside, 0]] > 0
-    assert found.mean() > 0.9
+    assert found.mean() > 0.95
 
 
 def test_sample_logs_are_small():
