@@ -49,7 +49,7 @@ def windows(
         others = shapely.union_all([r.polygon for r in draft.rooms if r is not room]).buffer(
             OUTER_WALL_M + 0.1
         )
-        clear = float(rng.uniform(0.03, 0.5))
+        clear = float(rng.uniform(0.02, 0.3))
         for edge in boundary_segments(shapely.geometry.polygon.orient(room.polygon)):
             length = float(np.hypot(*(edge[2:] - edge[:2])))
             if length < 1.4:
@@ -111,7 +111,7 @@ def simulate_building(seed: int, style: str | None = None, *, turn_rad: float | 
         furniture += furnish(rng, room, draft, clutter)
         furniture += wall_bumps(rng, room, draft)
     furniture += door_leaves(rng, draft.hinges)
-    slots, panes, passing = windows(rng, draft, chance=float(rng.uniform(0.05, 0.5)))
+    slots, panes, passing = windows(rng, draft, chance=float(rng.uniform(0.02, 0.3)))
     floor = shapely.union_all([room.polygon for room in draft.rooms])
     footprint = floor.buffer(OUTER_WALL_M, join_style="mitre", mitre_limit=2)
     walls = footprint.difference(shapely.union_all([floor, *draft.doorways, *slots]))

@@ -29,7 +29,7 @@ def random_equipment(seed: int) -> tuple[Lidar, RobotSettings, MapperSettings]:
         pose_noise_rad=float(rng.uniform(0.001, 0.006)),
         greed=float(rng.uniform(0.0, 2.0)),
     )
-    return lidar, robot, MapperSettings(usable_range_m=float(rng.uniform(7.0, 16.0)))
+    return lidar, robot, MapperSettings(usable_range_m=float(rng.uniform(7.0, 12.0)))
 
 
 def thinned_run(building: Building, seed: int, *, maps: int) -> list[ExplorationStep]:
