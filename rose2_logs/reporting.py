@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
+import sys
 import traceback
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -21,7 +22,10 @@ if TYPE_CHECKING:
     from rose2_logs.static_map import StaticMapResult
     from rose2_logs.tracking.frames import TrackedSnapshot
 
-_out = Console(highlight=False)
+PIPE_WIDTH = 120
+"""Columns of tables that do not go to a terminal."""
+
+_out = Console(highlight=False, width=None if sys.stdout.isatty() else PIPE_WIDTH)
 _err = Console(stderr=True, highlight=False)
 
 
@@ -123,6 +127,9 @@ def _progress(text: str) -> Progress:
         TextColumn(text, markup=False),
         TimeRemainingColumn(compact=True),
         console=_err,
+        # The bar goes when it is done or an error comes; in a file or a pipe there is none.
+        transient=True,
+        disable=not _err.is_terminal,
     )
 
 
@@ -172,15 +179,18 @@ def print_figures(results: Sequence[CaseResult]) -> None:
 
     def row(scores: Scores) -> list[str]:
         figures = [f"{getattr(scores, name):.2f}" for name in FIGURES]
-        return [*figures, f"{scores.rooms_seg:.4g}/{scores.rooms_gt:.4g}"]
+        return [*figures, f"{scores.rooms_seg:.3g}/{scores.rooms_gt:.3g}"]
 
-    table = Table("map", *FIGURES, "rooms/true", "s", box=None, pad_edge=False)
+    table = Table(box=None, pad_edge=False)
+    table.add_column("map", no_wrap=True)
+    for heading in (*FIGURES, "rooms/true", "s"):
+        table.add_column(heading, justify="right")
     for group, mean in group_means(results).items():
         members = [result for result in results if result.case.group == group]
         for result in members:
             table.add_row(escape(result.case.name), *row(result.scores), f"{result.seconds:.1f}")
         seconds = sum(result.seconds for result in members) / len(members)
-        head = f"[bold]{escape(group)} (mean of {len(members)})"
+        head = f"[bold]{escape(group)}, mean of {len(members)}"
         table.add_row(head, *row(mean), f"{seconds:.1f}", end_section=True)
     _out.print(table)
 

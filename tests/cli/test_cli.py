@@ -1,0 +1,198 @@
+"""The command line as a user meets it: every verb on real files, and one line for every known error."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+from saved_maps import RESOLUTION_M, save_map, save_run, two_rooms
+
+from rose2_logs import __version__
+from rose2_logs.cli import main
+from rose2_logs.sinks.label_image import write_label_image
+
+VERBS = ("info", "analyze", "view", "segment", "evaluate")
+
+
+@pytest.fixture
+def cli(monkeypatch, capfd):
+    """Run the command line; returns exit code, stdout and stderr."""
+
+    def run(*arguments: object) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["rose2-logs", *map(str, arguments)])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        out, err = capfd.readouterr()
+        return int(ended.value.code or 0), out, err
+
+    return run
+
+
+@pytest.fixture
+def maps(tmp_path: Path) -> Path:
+    return save_run(tmp_path / "maps")
+
+
+def analyze(cli, *arguments: object) -> tuple[int, str, str]:
+    return cli("analyze", *arguments, "--no-rrd", "--no-mcap")
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_help_shows_an_example(cli, verb: str):
+    """Each verb's --help can be copied from."""
+    code, out, _ = cli(verb, "--help")
+    assert code == 0
+    assert f"rose2-logs {verb}" in out.split("Example:")[1]
+
+
+def test_the_module_runs_and_help_is_fast():
+    """`python -m rose2_logs` is the command; help imports nothing heavy."""
+    heavy = ("numpy", "cv2", "sklearn", "pyarrow", "rerun", "rosbags", "shapely")
+    program = (
+        "import sys, runpy; sys.argv = ['rose2-logs', 'analyze', '--help']\n"
+        "try: runpy.run_module('rose2_logs', run_name='__main__')\n"
+        f"except SystemExit: print('HEAVY', [name for name in {heavy!r} if name in sys.modules])"
+    )
+    start = time.process_time()
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert "HEAVY []" in done.stdout
+    assert time.process_time() - start < 1
+
+
+def test_version(cli):
+    """The version is that of the package."""
+    assert cli("--version")[:2] == (0, f"rose2-logs {__version__}\n")
+
+
+def test_info_shows_topics_and_maps(cli, maps: Path):
+    """Sizes, resolution and where coverage starts; the same as JSON."""
+    code, out, _ = cli("info", maps)
+    assert code == 0
+    assert "240 x 120 cells of 0.05 m" in out
+    code, out, _ = cli("info", maps, "--json")
+    facts = json.loads(out)
+    assert facts["maps"][0]["last"]["shape"] == [120, 240]
+    assert 0.4 < facts["maps"][0]["coverage_first"] < 0.6
+
+
+def test_analyze_writes_a_folder_named_after_the_log(cli, maps: Path, tmp_path: Path):
+    """It ends with a short table and the place of the results."""
+    code, out, _ = analyze(cli, maps, "-o", tmp_path / "out", "--set", "tracking.match_min_iou=0.3")
+    assert code == 0
+    assert "results in" in out
+    assert "2 (2 over the run)" in out
+    summary = json.loads((tmp_path / "out" / "maps" / "summary.json").read_text())
+    assert summary["parameters"]["tracking"]["match_min_iou"] == 0.3
+
+
+def test_analyze_goes_on_after_a_bad_log_and_ends_non_zero(cli, maps: Path, tmp_path: Path):
+    """One line names the bad log; the good one after it is done."""
+    (tmp_path / "bad.mcap").write_bytes(b"\x89MCAP0\r\n")
+    code, _, err = analyze(cli, tmp_path / "bad.mcap", maps, "-o", tmp_path / "out")
+    assert code == 2
+    errors = [line for line in err.splitlines() if "error:" in line]
+    assert len(errors) == 1
+    assert "bad.mcap" in errors[0]
+    assert (tmp_path / "out" / "maps" / "summary.json").exists()
+    assert not (tmp_path / "out" / "bad").exists()
+
+
+def test_time_options_are_seconds_into_the_log(cli, maps: Path, tmp_path: Path):
+    """--start 1 leaves out the first of three maps, which are a second apart."""
+    assert analyze(cli, maps, "-o", tmp_path / "out", "--start", "1", "--end", "1.5")[0] == 0
+    summary = json.loads((tmp_path / "out" / "maps" / "summary.json").read_text())
+    assert summary["results"]["snapshots"] == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["info", "nowhere.mcap"], "nowhere.mcap"),
+        (["analyze", "nowhere.mcap", "-o", "out"], "nowhere.mcap"),
+        (["analyze", "x.bag", "-o", "out", "--set", "walls.nothing=1"], "walls.nothing"),
+        (["analyze", "x.bag", "-o", "out", "--method", "magic"], "no method 'magic'"),
+        (["analyze", "a/x.bag", "b/x.mcap", "-o", "out"], "several logs are named x"),
+        (["view", "nowhere.rrd"], "nowhere.rrd"),
+        (["evaluate", "nowhere.json"], "nowhere.json"),
+        (["segment", "nowhere.png", "-o", "out"], "nowhere.png"),
+    ],
+)
+def test_known_errors_are_one_line_and_exit_code_2(cli, arguments: list[str], message: str):
+    """On stderr, naming what is wrong; nothing on stdout."""
+    code, out, err = cli(*arguments)
+    assert code == 2
+    assert out == ""
+    assert len(err.strip().splitlines()) == 1
+    assert err.startswith("error: ")
+    assert message in err
+
+
+def test_debug_shows_the_traceback(cli):
+    """Before the line."""
+    _, _, err = cli("info", "nowhere.mcap", "--debug")
+    assert "Traceback" in err
+    assert err.strip().splitlines()[-1].startswith("error: ")
+
+
+def test_segment_writes_labels_plan_and_picture(cli, tmp_path: Path):
+    """The label image has the map's size and orientation; the plan lies at the map's origin, in metres."""
+    path = save_map(tmp_path, "flat", two_rooms())
+    code, out, _ = cli("segment", path, "-o", tmp_path / "out")
+    assert code == 0
+    assert "results in" in out
+    with Image.open(tmp_path / "out" / "flat.labels.png") as image:
+        labels = np.asarray(image)
+    assert labels.shape == two_rooms().shape
+    assert set(np.unique(labels[30:90, 20:100])) == {labels[60, 50]} != {0}
+    plan = json.loads((tmp_path / "out" / "flat.floor_plan.geojson").read_text())
+    rooms = [feature for feature in plan["features"] if feature["properties"]["kind"] == "room"]
+    assert len(rooms) == 2
+    corners = np.array([point for room in rooms for point in room["geometry"]["coordinates"][0]])
+    assert corners.min(0) == pytest.approx([1 + 0.5, 2 + 0.4], abs=0.3)
+    assert corners.max(0) == pytest.approx([1 + 11.2, 2 + 5.6], abs=0.3)
+    with Image.open(tmp_path / "out" / "flat.rooms.png") as image:
+        assert image.width > 2 * image.height
+
+
+def test_segment_needs_the_resolution_of_a_bare_image(cli, tmp_path: Path):
+    """Without a .yaml the option is asked for, and then enough."""
+    Image.fromarray(two_rooms()).save(tmp_path / "bare.png")
+    code, _, err = cli("segment", tmp_path / "bare.png", "-o", tmp_path / "out")
+    assert (code, "--resolution" in err) == (2, True)
+    assert cli("segment", tmp_path / "bare.png", "-o", tmp_path / "out", "--resolution", RESOLUTION_M)[0] == 0
+    assert (tmp_path / "out" / "bare.labels.png").exists()
+
+
+def test_segment_does_not_replace_unasked(cli, tmp_path: Path):
+    """A second run needs --overwrite."""
+    path = save_map(tmp_path, "flat", two_rooms())
+    assert cli("segment", path, "-o", tmp_path)[0] == 0
+    code, _, err = cli("segment", path, "-o", tmp_path)
+    assert (code, "--overwrite" in err) == (2, True)
+    assert cli("segment", path, "-o", tmp_path, "--overwrite")[0] == 0
+
+
+def test_evaluate_writes_predictions_and_figures(cli, tmp_path: Path):
+    """Two drawn rooms are found as they are; JSON and label images are where they were asked for."""
+    save_map(tmp_path, "flat", two_rooms())
+    truth = np.where(two_rooms() == 254, 1 + (np.arange(240) >= 117)[None, :], 0)
+    write_label_image(tmp_path / "rooms.png", truth)
+    case = {"group": "drawn", "name": "flat", "map": "flat.png", "rooms": "rooms.png"}
+    cases = tmp_path / "cases.json"
+    cases.write_text(json.dumps({"cases": [case | {"resolution_m": RESOLUTION_M}]}))
+    code, out, _ = cli(
+        "evaluate", cases, "--predictions", tmp_path / "p", "--json", tmp_path / "f.json", "--method", "rose2"
+    )
+    assert code == 0
+    assert "drawn" in out
+    figures = json.loads((tmp_path / "f.json").read_text())
+    assert figures["groups"]["drawn"]["iou_sym"] > 90
+    assert figures["maps"][0]["rooms_seg"] == 2
+    with Image.open(tmp_path / "p" / "drawn" / "flat.png") as image:
+        assert image.size == (240, 120)

@@ -1,0 +1,132 @@
+"""The Parquet tables say what was given to them, document themselves, and are whole or absent."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+import shapely
+from drawn_rooms import drawn, rows
+
+from rose2_logs.errors import OutputError
+from rose2_logs.parameters import TrackingParameters
+from rose2_logs.rooms import Doorway
+from rose2_logs.sinks import tables as tables_module
+from rose2_logs.sinks.tables import Tables
+from rose2_logs.tracking.frames import TrackedSnapshot
+from rose2_logs.tracking.tracker import RoomTracker
+
+NAMES = ("snapshots", "rooms", "events", "doorways")
+
+
+def frames() -> list[TrackedSnapshot]:
+    """Three maps: two rooms with a door, one lost, and back with swapped labels."""
+    door = Doorway((1, 2), np.array([[2.0, 0.0], [2.0, 0.9]]))
+    tracker = RoomTracker(TrackingParameters())
+    result = []
+    for index, (labels, doors) in enumerate([("1122", (door,)), ("11..", ()), ("2211", (door,))]):
+        snapshot, analysis = drawn(rows(labels, labels), index, doorways=doors)
+        ids, events = tracker.update(snapshot, analysis)
+        result.append(TrackedSnapshot(snapshot, analysis, analysis.free_area_m2 / 8, ids, events))
+    return result
+
+
+def write(folder: Path) -> dict[str, list[dict]]:
+    with Tables(folder) as sink:
+        for frame in frames():
+            sink.write(frame)
+    return {name: pq.read_table(folder / f"{name}.parquet").to_pylist() for name in NAMES}
+
+
+def test_snapshots_have_one_row_a_map(tmp_path: Path):
+    """Times, coverage and sums are those of the run."""
+    table = write(tmp_path)["snapshots"]
+    assert [row["snapshot"] for row in table] == [0, 1, 2]
+    assert [row["time_s"] for row in table] == [0.0, 1.0, 2.0]
+    assert [row["coverage"] for row in table] == [1.0, 0.5, 1.0]
+    assert [row["rooms_area_m2"] for row in table] == [8.0, 4.0, 8.0]
+    assert [row["doorways"] for row in table] == [1, 0, 1]
+
+
+def test_rooms_are_told_by_track_with_their_shape_in_the_world(tmp_path: Path):
+    """Rows are ordered by track; polygon, label point and neighbours belong to the track, not the label."""
+    table = write(tmp_path)["rooms"]
+    assert [(row["snapshot"], row["track"], row["room"]) for row in table] == [
+        (0, 1, 1),
+        (0, 2, 2),
+        (1, 1, 1),
+        (2, 1, 2),
+        (2, 2, 1),
+    ]
+    last = table[-1]
+    polygon = shapely.from_wkb(last["polygon_wkb"])
+    assert polygon.equals(shapely.box(2, 0, 4, 2))
+    assert polygon.contains(shapely.Point(last["label_x_m"], last["label_y_m"]))
+    assert last["neighbours"] == [1]
+    assert last["area_m2"] == last["predicted_area_m2"] == 4.0
+
+
+def test_events_are_one_flat_table(tmp_path: Path):
+    """Every event of every map, with the other tracks that it concerns."""
+    told = [(row["snapshot"], row["kind"], row["track"]) for row in write(tmp_path)["events"]]
+    assert told == [
+        (0, "born", 1),
+        (0, "born", 2),
+        (1, "continued", 1),
+        (1, "lost", 2),
+        (2, "continued", 1),
+        (2, "returned", 2),
+    ]
+
+
+def test_doorways_name_the_tracks_on_both_sides(tmp_path: Path):
+    """The smaller track first, whatever the labels."""
+    table = write(tmp_path)["doorways"]
+    assert [(row["snapshot"], row["track_a"], row["track_b"]) for row in table] == [(0, 1, 2), (2, 1, 2)]
+    assert table[0]["width_m"] == pytest.approx(0.9)
+
+
+def test_every_column_says_what_it_is(tmp_path: Path):
+    """Each field has a description, and GeoParquet's metadata names the polygons."""
+    write(tmp_path)
+    for name in NAMES:
+        for field in pq.read_schema(tmp_path / f"{name}.parquet"):
+            assert field.metadata[b"description"], field.name
+    geo = json.loads(pq.read_schema(tmp_path / "rooms.parquet").metadata[b"geo"])
+    assert geo["primary_column"] in pq.read_schema(tmp_path / "rooms.parquet").names
+
+
+def test_row_groups_are_written_along_the_way_and_twice_the_same(tmp_path: Path, monkeypatch):
+    """Memory does not grow: rows leave in groups. The same run gives the same bytes."""
+    monkeypatch.setattr(tables_module, "ROWS_PER_GROUP", 2)
+    write(tmp_path / "a")
+    write(tmp_path / "b")
+    assert pq.ParquetFile(tmp_path / "a" / "events.parquet").num_row_groups == 3
+    for name in NAMES:
+        first, second = ((tmp_path / run / f"{name}.parquet").read_bytes() for run in "ab")
+        assert first == second
+
+
+def test_a_run_that_breaks_off_leaves_nothing(tmp_path: Path):
+    """Neither half tables nor parts of files remain, and earlier results stay."""
+    (tmp_path / "rooms.parquet").write_text("earlier")
+
+    def break_off():
+        with Tables(tmp_path) as sink:
+            sink.write(frames()[0])
+            raise RuntimeError("broken off")
+
+    with pytest.raises(RuntimeError, match="broken off"):
+        break_off()
+    assert [path.name for path in tmp_path.iterdir()] == ["rooms.parquet"]
+    assert (tmp_path / "rooms.parquet").read_text() == "earlier"
+
+
+def test_a_place_that_cannot_be_written_is_named(tmp_path: Path):
+    """A file where the folder should be is one clear line."""
+    (tmp_path / "file").write_text("")
+    with pytest.raises(OutputError, match=r"file/snapshots\.parquet"), Tables(tmp_path / "file"):
+        pass

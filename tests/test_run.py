@@ -1,0 +1,126 @@
+"""A log through reader, workers, tracker and tables, for real."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from saved_maps import save_run, two_rooms
+
+from rose2_logs.errors import OutputError
+from rose2_logs.provenance import fingerprint, log_files
+from rose2_logs.readers import Selection
+from rose2_logs.run import TABLES, RunOptions, analyse_log, log_stem
+
+SHARED_BAGS = Path(__file__).parents[2] / "shared" / "bags"
+TABLES_ONLY = RunOptions(recording=False, annotated_log=False)
+
+
+def table_bytes(folder: Path) -> list[bytes]:
+    return [(folder / f"{name}.parquet").read_bytes() for name in TABLES]
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory) -> Path:
+    """Log in ``maps``, its results in ``out``."""
+    folder = tmp_path_factory.mktemp("run")
+    save_run(folder / "maps")
+    analyse_log(folder / "maps", folder / "out", TABLES_ONLY)
+    return folder
+
+
+def test_coverage_rises_to_one(run: Path):
+    """Coverage is the free area over that of the last map: the share of free cells drawn."""
+    coverage = pq.read_table(run / "out" / "snapshots.parquet")["coverage"].to_pylist()
+    free = [np.count_nonzero(two_rooms(columns) == 254) for columns in (115, 180, 240)]
+    assert coverage == pytest.approx([count / free[-1] for count in free])
+    assert coverage[-1] == 1.0
+
+
+def test_both_rooms_are_found_and_keep_their_numbers(run: Path):
+    """The first room is there from the beginning, the second is born later; 25 m2 each in the end."""
+    rooms = pq.read_table(run / "out" / "rooms.parquet").to_pylist()
+    last = {row["track"]: row for row in rooms if row["snapshot"] == 2}
+    assert len(last) == 2
+    assert all(row["area_m2"] == pytest.approx(26, rel=0.1) for row in last.values())
+    assert last[1]["label_x_m"] < last[2]["label_x_m"]
+    assert last[1]["neighbours"] == [2]
+    assert {row["snapshot"] for row in rooms if row["track"] == 1} == {0, 1, 2}
+
+
+def test_the_summary_tells_what_the_run_was_made_of(run: Path):
+    """Parameters, versions, fingerprint, counts; times only under seconds."""
+    summary = json.loads((run / "out" / "summary.json").read_text())
+    assert summary["parameters"]["tracking"]["match_min_iou"] > 0
+    assert summary["versions"]["numpy"] == np.__version__
+    assert len(summary["input"]["files"]) == 6
+    assert summary["messages"]["messages"] == summary["results"]["snapshots"] == 3
+    assert summary["results"]["tracks"] == 2
+    assert summary["seconds"]["run"] > 0
+    assert summary["files"] == [f"{name}.parquet" for name in TABLES]
+
+
+def test_any_number_of_workers_gives_the_same_bytes(run: Path, tmp_path: Path):
+    """Two worker processes write what one process wrote."""
+    options = RunOptions(recording=False, annotated_log=False, workers=2)
+    result = analyse_log(run / "maps", tmp_path, options)
+    assert result.totals.snapshots == 3
+    assert table_bytes(tmp_path) == table_bytes(run / "out")
+
+
+def test_progress_ends_at_one(run: Path, tmp_path: Path):
+    """Each snapshot is told with the share of the log's time that is done."""
+    told = []
+    analyse_log(
+        run / "maps", tmp_path, TABLES_ONLY, lambda frame, share: told.append((frame.snapshot.index, share))
+    )
+    assert told == [(0, 0.0), (1, 0.5), (2, 1.0)]
+
+
+def test_earlier_results_are_not_replaced_unasked(run: Path):
+    """The file that is in the way is named, and --overwrite."""
+    before = table_bytes(run / "out")
+    with pytest.raises(OutputError, match=r"snapshots\.parquet: exists already.*--overwrite"):
+        analyse_log(run / "maps", run / "out", TABLES_ONLY)
+    assert table_bytes(run / "out") == before
+
+
+def test_a_selection_is_written_into_the_summary(run: Path, tmp_path: Path):
+    """What was left out can be seen later."""
+    options = RunOptions(recording=False, annotated_log=False, selection=Selection(max_snapshots=2))
+    analyse_log(run / "maps", tmp_path, options)
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert summary["selection"]["max_snapshots"] == 2
+    assert summary["results"]["snapshots"] == 2
+
+
+def test_names_of_results_come_from_the_log(tmp_path: Path):
+    """Endings of formats go, other dots stay."""
+    assert log_stem(tmp_path / "run.1.mcap") == "run.1"
+    assert log_stem(tmp_path / "fr79.ros2_mcap") == "fr79.ros2_mcap"
+    assert log_stem(tmp_path / "maps" / "*.yaml") == "maps"
+
+
+def test_the_fingerprint_of_one_file_is_its_sha256(tmp_path: Path):
+    """It can be checked with sha256sum; that of a folder changes with any of its files' names or bytes."""
+    (tmp_path / "a").write_bytes(b"one")
+    assert fingerprint(tmp_path / "a")["sha256"] == hashlib.sha256(b"one").hexdigest()
+    whole = fingerprint(tmp_path)
+    (tmp_path / "b").write_bytes(b"")
+    assert fingerprint(tmp_path)["sha256"] != whole["sha256"]
+    assert [path.name for path in log_files(tmp_path)] == ["a", "b"]
+
+
+@pytest.mark.skipif(not SHARED_BAGS.exists(), reason="the shared logs are not beside the project")
+def test_one_run_in_three_formats_gives_the_same_tables(tmp_path: Path):
+    """A bag, an MCAP and a compressed sqlite3 bag of the same maps cannot be told apart by the tables."""
+    options = RunOptions(recording=False, annotated_log=False, selection=Selection(max_snapshots=3))
+    written = []
+    for name in ("fr79.bag", "fr79.ros2_mcap", "fr79.ros2_sqlite3_zstd"):
+        analyse_log(SHARED_BAGS / name, tmp_path / name, options)
+        written.append(table_bytes(tmp_path / name))
+    assert written[0] == written[1] == written[2]
