@@ -1,4 +1,4 @@
-"""A picture of one map: as it was recorded on the left, with what was found on the right."""
+"""A picture of one map: as it was recorded, beside (or above) it with what was found."""
 
 from __future__ import annotations
 
@@ -18,6 +18,8 @@ SIDE_MIN_PX = 700
 ROOM_OPACITY = 0.55
 GOLDEN_RATIO = 0.618034
 """Hues that are this share of the circle apart stay well apart for any number of rooms."""
+WIDE = 1.5
+"""Width over height from which a map is drawn above its rooms and not beside them."""
 MARGIN_CELLS = 10
 UNKNOWN_GREY, FREE_GREY, OCCUPIED_GREY = 205, 254, 0
 WALL_COLOUR, OUTLINE_COLOUR, DOOR_COLOUR = (200, 30, 30), (40, 40, 40), (20, 120, 220)
@@ -31,7 +33,7 @@ def room_colours(count: int) -> NDArray[np.uint8]:
 
 
 def draw_rooms(snapshot: OccupancySnapshot, analysis: SnapshotAnalysis) -> Image:
-    """Draw a map beside its rooms, walls, doorways and predicted outlines.
+    """Draw a map, and beside or below it the same with rooms, walls, doorways and predicted outlines.
 
     Returns
     -------
@@ -74,6 +76,9 @@ def draw_rooms(snapshot: OccupancySnapshot, analysis: SnapshotAnalysis) -> Image
     for number, polygon in enumerate(rooms.polygons, start=1):
         if not polygon.is_empty:
             _write_number(filled, str(number), polygon.representative_point().coords[0], to_pixels)
+    if filled.shape[1] > WIDE * filled.shape[0]:
+        gap = np.full((MARGIN_CELLS, filled.shape[1], 3), 255, np.uint8)
+        return np.concatenate([plain, gap, filled], axis=0)
     gap = np.full((filled.shape[0], MARGIN_CELLS, 3), 255, np.uint8)
     return np.concatenate([plain, gap, filled], axis=1)
 

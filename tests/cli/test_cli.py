@@ -157,7 +157,15 @@ def test_segment_writes_labels_plan_and_picture(cli, tmp_path: Path):
     assert corners.min(0) == pytest.approx([1 + 0.5, 2 + 0.4], abs=0.3)
     assert corners.max(0) == pytest.approx([1 + 11.2, 2 + 5.6], abs=0.3)
     with Image.open(tmp_path / "out" / "flat.rooms.png") as image:
-        assert image.width > 2 * image.height
+        picture = np.asarray(image)
+    # A wide map: the plain one above, grey; the rooms below, in two colours.
+    above, below = picture[: len(picture) // 2 - 10], picture[len(picture) // 2 + 10 :]
+    assert np.ptp(above.astype(int), axis=2).max() == 0
+    height, width = below.shape[:2]
+    left, right = below[height // 4, width // 4].astype(int), below[height // 4, 3 * width // 4].astype(int)
+    assert np.ptp(left) > 20
+    assert np.ptp(right) > 20
+    assert np.abs(left - right).max() > 20
 
 
 def test_segment_needs_the_resolution_of_a_bare_image(cli, tmp_path: Path):
