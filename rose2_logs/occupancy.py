@@ -151,3 +151,21 @@ def classify(
     free = (cells >= 0) & (cells < free_max_percent)
     occupied = cells > occupied_min_percent
     return free, occupied
+
+
+def distinct_labels(labels: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDArray[np.intp]]:
+    """Find the distinct values of a label image and where each comes first in reading order.
+
+    The same as ``numpy.unique`` with ``return_index``, but it sorts the runs of equal labels only.
+
+    Returns
+    -------
+    values : (K,) int64
+        Ascending.
+    first : (K,) int
+        Index into the flattened image.
+    """
+    flat = labels.ravel()
+    starts = np.flatnonzero(np.concatenate([[True], flat[1:] != flat[:-1]]))
+    values, index = np.unique(flat[starts], return_index=True)
+    return values.astype(np.int64), starts[index]

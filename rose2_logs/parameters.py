@@ -87,7 +87,7 @@ class WallParameters:
     )
     line_lateral_m: float = _number(0.3, "m", "Both faces of one wall share a representative line.", 0.0)
     extension_m: float = _number(
-        4.0, "m", "A wall may go on unseen for a room's width beyond its evidence.", 0.0
+        8.0, "m", "A wall may go on unseen for a room's width beyond its evidence.", 0.0
     )
     local_extension_m: float = _number(0.6, "m", "A chord of a curved wall reaches to the next chord.", 0.0)
     extension_per_length: float = _number(

@@ -15,7 +15,14 @@ from rose2_logs.floor_plan.doorways import find_doorways
 from rose2_logs.floor_plan.plan import FloorPlan
 from rose2_logs.floor_plan.rooms import number_rooms, outline, predicted_shapes
 from rose2_logs.floor_plan.stage import FloorPlanResult, make_floor_plan
-from rose2_logs.occupancy import BoolArray, FloatArray, GridGeometry, OccupancySnapshot, classify
+from rose2_logs.occupancy import (
+    BoolArray,
+    FloatArray,
+    GridGeometry,
+    OccupancySnapshot,
+    classify,
+    distinct_labels,
+)
 from rose2_logs.parameters import Parameters
 from rose2_logs.rooms import Doorway, RoomMap
 from rose2_logs.rose.stage import RoseResult, find_structure
@@ -145,11 +152,10 @@ def _room_shapes(
 ) -> tuple[NDArray[np.int32], list[BaseGeometry]]:
     """Room of each face, and predicted shapes: a room's faces, or its cells where a split cut faces."""
     count = int(labels.max(initial=0))
-    group_of_room = np.zeros(count + 1, np.int32)
-    cells = labels > 0
-    group_of_room[labels[cells]] = plan.labels[cells]
+    pairs, _ = distinct_labels(labels * np.int64(plan.group.max(initial=0) + 1) + plan.labels)
+    rooms, groups = np.divmod(pairs, int(plan.group.max(initial=0)) + 1)
     # A group that was split, or lost cells to a split, has no faces of its own any more.
-    rooms, groups = np.unique(np.stack([labels[cells], plan.labels[cells]]), axis=1)
+    rooms, groups = rooms[rooms > 0], groups[rooms > 0]
     rooms_in_group = np.bincount(groups, minlength=int(plan.group.max(initial=0)) + 1)
     room_of_group = np.zeros(len(rooms_in_group), np.int32)
     whole = rooms_in_group[groups] == 1

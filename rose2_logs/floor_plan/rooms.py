@@ -6,11 +6,10 @@ import cv2
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from scipy import ndimage
 from shapely.geometry.base import BaseGeometry
 
 from rose2_logs.floor_plan.faces import FaceGraph, rasterise
-from rose2_logs.occupancy import BoolArray, FloatArray
+from rose2_logs.occupancy import BoolArray, FloatArray, distinct_labels
 
 
 def label_faces(graph: FaceGraph, shape: tuple[int, int], resolution_m: float) -> NDArray[np.int32]:
@@ -33,11 +32,9 @@ def clearance(
 ) -> FloatArray:
     """Greatest distance (F,) in metres of a free cell of each face from a wall."""
     distance = cv2.distanceTransform((~walls).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
-    distance[~free] = 0
-    greatest: FloatArray = np.asarray(
-        ndimage.maximum(distance, face_of_cell, np.arange(1, count + 1)), dtype=float
-    )
-    return greatest * resolution_m
+    greatest = np.zeros(count + 1, np.float32)
+    np.maximum.at(greatest, face_of_cell[free], distance[free])
+    return greatest[1:].astype(float) * resolution_m
 
 
 def number_rooms(labels: NDArray[np.int32], minimum_m2: float, resolution_m: float) -> NDArray[np.int32]:
@@ -47,7 +44,7 @@ def number_rooms(labels: NDArray[np.int32], minimum_m2: float, resolution_m: flo
     keep[0] = False
     if not keep.any():
         return np.zeros_like(labels)
-    present, first = np.unique(labels, return_index=True)
+    present, first = distinct_labels(labels)
     order = present[np.argsort(first)]
     order = order[keep[order]]
     number = np.zeros(len(size), np.int32)
@@ -70,20 +67,21 @@ def predicted_shapes(
     shapes : tuple of `count` shapely geometries
         Grid frame, metres; empty where a room has no face.
     """
-    shapes = []
-    for room in range(1, count + 1):
-        shape = shapely.union_all(graph.polygons[room_of_face == room])
-        shapes.append(shape)
-    everything = shapely.union_all(graph.polygons[room_of_face > 0])
-    return tuple(_without_holes(shape, shapely.difference(everything, shape)) for shape in shapes)
+    shapes = [shapely.union_all(graph.polygons[room_of_face == room]) for room in range(1, count + 1)]
+    inner = graph.polygons[room_of_face > 0]
+    tree = shapely.STRtree(shapely.point_on_surface(inner))
+    return tuple(_without_empty_holes(shape, tree) for shape in shapes)
 
 
-def _without_holes(shape: BaseGeometry, others: BaseGeometry) -> BaseGeometry:
-    """Fill the holes of a shape that hold no other room."""
-    filled = shapely.union_all(
-        [shapely.polygons(shapely.get_exterior_ring(part)) for part in shapely.get_parts(shape)]
-    )
-    return shapely.difference(filled, others)
+def _without_empty_holes(shape: BaseGeometry, face_points: shapely.STRtree) -> BaseGeometry:
+    """Fill the holes of a shape that hold no face of a room."""
+    rings, part = shapely.get_rings(shapely.get_parts(shape), return_index=True)
+    if len(rings) == len(shapely.get_parts(shape)):
+        return shape
+    first_of_part = np.concatenate([[True], part[1:] != part[:-1]])
+    holes = shapely.polygons(rings[~first_of_part])
+    taken = np.unique(face_points.query(holes, predicate="contains")[0])
+    return shapely.union_all([shape, *np.delete(holes, taken)])
 
 
 def outline(mask: BoolArray, resolution_m: float) -> BaseGeometry:

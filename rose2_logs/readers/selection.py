@@ -62,7 +62,7 @@ class Selection:
     def thin(self, times: Times) -> Times:
         """Keep those of the sorted, distinct `times` that `every_s` and `max_snapshots` choose."""
         if self.every_s and len(times):
-            step = round(self.every_s * 1e9)
+            step = max(round(self.every_s * 1e9), 1)
             chosen = [0]
             while (later := int(np.searchsorted(times, int(times[chosen[-1]]) + step))) < len(times):
                 chosen.append(later)

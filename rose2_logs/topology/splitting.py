@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rose2_logs.occupancy import BoolArray, FloatArray
+from rose2_logs.occupancy import BoolArray, FloatArray, distinct_labels
 from rose2_logs.parameters import TopologyParameters
-from rose2_logs.topology.voronoi import voronoi_cells
+from rose2_logs.topology.voronoi import clear_parts
 
 
 def split_rooms(
@@ -32,13 +32,13 @@ def split_rooms(
     labels = labels.copy()
     lines = _as_normals(lines_m)
     for _ in range(parameters.max_rounds):
-        _, part = voronoi_cells(labels, walls, resolution_m, parameters.voronoi_min_clearance_m)
+        part = clear_parts(labels, walls, resolution_m, parameters.voronoi_min_clearance_m)
         size = np.bincount(part.ravel()) * resolution_m**2
         size[0] = 0
         large = np.flatnonzero(size >= parameters.split_min_area_m2)
         if len(large) == 0:
             break
-        first = np.unique(part, return_index=True)[1]
+        _, first = distinct_labels(part)
         room_of_part = labels.ravel()[first[large]]
         rooms, count = np.unique(room_of_part, return_counts=True)
         divided = False

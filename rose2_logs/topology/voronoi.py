@@ -10,10 +10,13 @@ from skimage.morphology import skeletonize
 from rose2_logs.occupancy import BoolArray
 
 
-def voronoi_cells(
+def clear_parts(
     labels: NDArray[np.int32], walls: BoolArray, resolution_m: float, min_clearance_m: float
-) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """Skeleton of the free space that keeps clear of walls, and the part of its room's graph it belongs to.
+) -> NDArray[np.int32]:
+    """Find the connected parts of each room's free space that keeps clear of walls.
+
+    They are the connected parts of the room's Voronoi graph as far as a robot of that half width can follow
+    it: thinning to the graph keeps what is connected.
 
     Parameters
     ----------
@@ -26,16 +29,27 @@ def voronoi_cells(
 
     Returns
     -------
-    skeleton : (K, 2) int32
-        Row and column of the cells of the Voronoi graph.
     part : (H, W) int32
-        Connected parts of the clear free space of all rooms, 1.., 0 elsewhere; parts never span two rooms.
+        Parts 1.., 0 elsewhere; no part spans two rooms.
     """
+    return _parts_within_rooms(labels, _clear_space(labels, walls, resolution_m, min_clearance_m))
+
+
+def voronoi_graph(
+    labels: NDArray[np.int32], walls: BoolArray, resolution_m: float, min_clearance_m: float
+) -> NDArray[np.int32]:
+    """Row and column (K, 2) of the cells of the Voronoi graph: the skeleton of the clear free space."""
+    clear = _clear_space(labels, walls, resolution_m, min_clearance_m)
+    skeleton = skeletonize(clear)  # type: ignore[no-untyped-call]
+    return np.argwhere(skeleton).astype(np.int32)
+
+
+def _clear_space(
+    labels: NDArray[np.int32], walls: BoolArray, resolution_m: float, min_clearance_m: float
+) -> BoolArray:
     distance = cv2.distanceTransform((~walls).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
-    clear = (labels > 0) & (distance * resolution_m >= min_clearance_m)
-    part = _parts_within_rooms(labels, clear)
-    skeleton = np.argwhere(skeletonize(clear)).astype(np.int32)  # type: ignore[no-untyped-call]
-    return skeleton, part
+    clear: BoolArray = (labels > 0) & (distance * resolution_m >= min_clearance_m)
+    return clear
 
 
 def _parts_within_rooms(labels: NDArray[np.int32], clear: BoolArray) -> NDArray[np.int32]:

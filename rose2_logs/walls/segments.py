@@ -86,7 +86,7 @@ def group_by_angle(
     base = dominant_rad[0] if len(dominant_rad) else 0.0
     slot = np.rint(np.mod(angle - base, np.pi) / step).astype(np.int64) % round(np.pi / step)
     used, local = np.unique(slot, return_inverse=True)
-    direction = (len(dominant_rad) + local).astype(np.int32)
+    direction: NDArray[np.int64] = len(dominant_rad) + local.astype(np.int64)
     if len(dominant_rad):
         away = np.abs(angle[:, None] - dominant_rad[None])
         away = np.minimum(away, np.pi - away)
