@@ -58,8 +58,12 @@ class SpectrumParameters:
     structure_length_m: float = _number(
         2.0, "m", "Length of wall over which a cell gathers its score: more than most furniture.", 0.01
     )
-    threshold_min: float = _number(0.2, "score", "Least automatic threshold of the clean map.", 0, 1)
-    threshold_max: float = _number(0.6, "score", "Greatest automatic threshold of the clean map.", 0, 1)
+    threshold_min: float = _number(0.35, "score", "Least threshold of the clean map that is tried.", 0, 1)
+    threshold_max: float = _number(0.85, "score", "Greatest threshold of the clean map that is tried.", 0, 1)
+    threshold_step: float = _number(0.05, "score", "Step of the search for the threshold.", 0.001, 1)
+    segments_max_per_m2: float = _number(
+        0.9, "1/m2", "Line segments per free area of a clean map; empty floor plans have 0.3 to 0.7.", 0.0
+    )
 
 
 @dataclass(frozen=True)

@@ -28,6 +28,7 @@ from rose2_logs.rooms import Doorway, RoomMap
 from rose2_logs.rose.stage import RoseResult, find_structure
 from rose2_logs.rose.structure import Structure
 from rose2_logs.topology.splitting import split_rooms
+from rose2_logs.walls.segments import detect_segments
 from rose2_logs.walls.stage import WallResult, find_walls
 from rose2_logs.walls.walls import Walls
 
@@ -101,7 +102,14 @@ def analyse(snapshot: OccupancySnapshot, parameters: Parameters, method: str = "
     free, occupied = free[explored.window], occupied[explored.window]
     watch.lap("prepare")
 
-    structure = find_structure(occupied, resolution, parameters.spectrum)
+    free_m2 = float(np.count_nonzero(free)) * geometry.cell_area_m2
+    structure = find_structure(
+        occupied,
+        free_m2,
+        resolution,
+        lambda clean: len(detect_segments(clean, resolution, parameters.walls)),
+        parameters.spectrum,
+    )
     watch.lap("structure")
     walls = find_walls(occupied, structure.clean, structure.directions_rad, resolution, parameters.walls)
     watch.lap("walls")
@@ -125,7 +133,7 @@ def analyse(snapshot: OccupancySnapshot, parameters: Parameters, method: str = "
         log_time_ns=snapshot.log_time_ns,
         stamp_ns=snapshot.stamp_ns,
         geometry=geometry,
-        free_area_m2=float(np.count_nonzero(free)) * geometry.cell_area_m2,
+        free_area_m2=free_m2,
         rooms=rooms,
         structure=explored.structure(structure),
         walls=explored.walls(walls),

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
-from skimage.filters import threshold_otsu
 
 from rose2_logs.occupancy import BoolArray, FloatArray
 from rose2_logs.parameters import SpectrumParameters
@@ -41,10 +42,34 @@ def structure_score(
     return np.clip(score, 0, 1, out=score)
 
 
-def clean_threshold(score: NDArray[np.float32], occupied: BoolArray, parameters: SpectrumParameters) -> float:
-    """Find the score that best divides walls from clutter (Otsu), within the bounds of the parameters."""
-    values = score[occupied]
-    low, high = parameters.threshold_min, parameters.threshold_max
-    if values.size == 0 or np.ptp(values) == 0:
-        return low
-    return float(np.clip(threshold_otsu(values), low, high))  # type: ignore[no-untyped-call]
+def clean_threshold(
+    score: NDArray[np.float32],
+    occupied: BoolArray,
+    free_m2: float,
+    count_segments: Callable[[BoolArray], int],
+    parameters: SpectrumParameters,
+) -> float:
+    """Find the lowest threshold whose clean map has few enough line segments for its free space.
+
+    A building has about so many walls per square metre; a map with more segments than that still holds
+    clutter. The paper asks for the segments per free cell to lie in an interval; area makes it independent
+    of the resolution. The number falls as the threshold rises, so the search halves the range.
+
+    Parameters
+    ----------
+    free_m2 : float
+        Free area of the map.
+    count_segments : callable
+        Number of line segments of a clean map.
+    """
+    allowed = parameters.segments_max_per_m2 * free_m2
+    step = parameters.threshold_step
+    steps = np.arange(parameters.threshold_min, parameters.threshold_max + step / 2, step)
+    low, high = 0, len(steps) - 1
+    while low < high:
+        middle = (low + high) // 2
+        if count_segments(occupied & (score >= steps[middle])) <= allowed:
+            high = middle
+        else:
+            low = middle + 1
+    return float(steps[low])

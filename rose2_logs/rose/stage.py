@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,10 +25,19 @@ class RoseResult:
     clean: BoolArray
 
 
-def find_structure(occupied: BoolArray, resolution_m: float, parameters: SpectrumParameters) -> RoseResult:
-    """Spectrum, dominant directions, structure score, clean map of the occupied cells (H, W)."""
+def find_structure(
+    occupied: BoolArray,
+    free_m2: float,
+    resolution_m: float,
+    count_segments: Callable[[BoolArray], int],
+    parameters: SpectrumParameters,
+) -> RoseResult:
+    """Spectrum, dominant directions, structure score, clean map of the occupied cells (H, W).
+
+    `free_m2` and `count_segments` set the clean map's threshold, see `clean_threshold`.
+    """
     spectrum = compute_spectrum(occupied, resolution_m, parameters)
     directions, strengths = dominant_directions(angular_energy(spectrum, parameters), parameters)
     score = structure_score(spectrum, occupied, directions, parameters)
-    threshold = clean_threshold(score, occupied, parameters)
+    threshold = clean_threshold(score, occupied, free_m2, count_segments, parameters)
     return RoseResult(directions, strengths, score, threshold, occupied & (score >= threshold))
