@@ -61,8 +61,11 @@ class SpectrumParameters:
     threshold_min: float = _number(0.35, "score", "Least threshold of the clean map that is tried.", 0, 1)
     threshold_max: float = _number(0.85, "score", "Greatest threshold of the clean map that is tried.", 0, 1)
     threshold_step: float = _number(0.05, "score", "Step of the search for the threshold.", 0.001, 1)
+    attached_share: float = _number(
+        0.75, "share", "Cells of this share of the threshold that touch the clean map are wall too.", 0, 1
+    )
     segments_max_per_m2: float = _number(
-        0.9, "1/m2", "Line segments per free area of a clean map; empty floor plans have 0.3 to 0.7.", 0.0
+        0.75, "1/m2", "Line segments per free area of a clean map; empty floor plans have 0.3 to 0.7.", 0.0
     )
 
 
@@ -114,7 +117,7 @@ class FloorPlanParameters:
         0.2, "share", "A face seen this much belongs to its room's predicted shape; the paper's value.", 0, 1
     )
     join_min_openness: float = _number(
-        0.6, "share", "Faces join when at least this share of their known border is open.", 0, 1
+        0.7, "share", "Faces join when at least this share of their known border is open.", 0, 1
     )
     join_min_open_m: float = _number(
         0.15, "m", "Least open border for faces to join: three cells of 5 cm.", 0
@@ -122,6 +125,10 @@ class FloorPlanParameters:
     join_min_passage: float = _number(
         0.75, "1", "Faces join when the passage is this wide against the narrower one's width.", 0
     )
+    passage_look_widths: float = _number(
+        2.0, "1", "How far from a passage its width is compared with the room's, in widths.", 0.0
+    )
+    passage_look_max_m: float = _number(3.0, "m", "The same at most: half a large room.", 0.0)
     room_min_area_m2: float = _number(3.0, "m2", "Smaller pieces of free space are no rooms.", 0.0)
     room_min_clearance_m: float = _number(0.6, "m", "Half the width of the narrowest room.", 0.0)
 

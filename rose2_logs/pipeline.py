@@ -111,7 +111,14 @@ def analyse(snapshot: OccupancySnapshot, parameters: Parameters, method: str = "
         parameters.spectrum,
     )
     watch.lap("structure")
-    walls = find_walls(occupied, structure.clean, structure.directions_rad, resolution, parameters.walls)
+    walls = find_walls(
+        occupied,
+        structure.clean,
+        structure.attached,
+        structure.directions_rad,
+        resolution,
+        parameters.walls,
+    )
     watch.lap("walls")
     plan = make_floor_plan(walls.lines.ends_m, walls.walls, free, resolution, parameters.floor_plan)
     watch.lap("floor_plan")

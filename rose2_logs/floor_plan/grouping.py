@@ -13,7 +13,7 @@ from rose2_logs.occupancy import FloatArray
 from rose2_logs.parameters import FloorPlanParameters
 
 Border = tuple[float, float, float]
-"""Open and closed length of a border, and the widest passage through it, in metres."""
+"""Open and closed length of a border in metres, and its best passage (see `EdgeEvidence.passage_share`)."""
 
 
 def group_faces(
@@ -26,8 +26,8 @@ def group_faces(
     """Join the two groups with the best connection, again and again, until no connection is good enough.
 
     The openness of a border is its open length over its known length, wall or open, taken over the whole
-    border between two groups, so that a door in a long wall never joins what the wall divides. The passage is
-    the widest stretch without a wall on the border's line, held against the width of the narrower group.
+    border between two groups, so that a door in a long wall never joins what the wall divides. The best
+    passage through it is held against the room on both sides: what narrows like a door does not join.
     What is too small for a room at the end joins the neighbour that it opens to most.
 
     Parameters
@@ -49,7 +49,7 @@ def group_faces(
         border = groups.borders[a][b]
         if border[0] < parameters.join_min_open_m:
             return
-        openness, passage = border[0] / (border[0] + border[1]), groups.relative_passage(a, b)
+        openness, passage = border[0] / (border[0] + border[1]), border[2]
         if openness >= parameters.join_min_openness and passage >= parameters.join_min_passage:
             heapq.heappush(heap, (-openness * min(passage, 2.0), -border[0], min(a, b), max(a, b), border))
 
@@ -59,10 +59,8 @@ def group_faces(
                 push(a, b)
     while heap:
         _, _, a, b, border = heapq.heappop(heap)
-        # An entry is stale when one of the two is gone or their border or widths have changed since.
+        # An entry is stale when one of the two is gone or their border has changed since.
         if groups.borders.get(a, {}).get(b) != border:
-            continue
-        if groups.relative_passage(a, b) < parameters.join_min_passage:
             continue
         for c in groups.join(a, b):
             push(a, c)
@@ -107,10 +105,6 @@ class _Groups:
         self._active = self.alive.copy()
         self._parent = np.arange(len(free_m2))
 
-    def relative_passage(self, a: int, b: int) -> float:
-        """Widest passage between two groups over the width of the narrower one."""
-        return self.borders[a][b][2] / (2 * float(min(self.clearance_m[a], self.clearance_m[b])))
-
     def join(self, a: int, b: int) -> list[int]:
         """Make `b` part of `a`; return the neighbours that `a` now has from it."""
         self.alive[b] = False
@@ -119,9 +113,9 @@ class _Groups:
         self.clearance_m[a] = max(self.clearance_m[a], self.clearance_m[b])
         taken = self.borders.pop(b)
         del self.borders[a][b], taken[a]
-        for c, (open_m, closed_m, passage_m) in taken.items():
+        for c, (open_m, closed_m, passage) in taken.items():
             before = self.borders[a].get(c, (0.0, 0.0, 0.0))
-            border = (before[0] + open_m, before[1] + closed_m, max(before[2], passage_m))
+            border = (before[0] + open_m, before[1] + closed_m, max(before[2], passage))
             self.borders[a][c] = self.borders[c][a] = border
             del self.borders[c][b]
         return list(taken)
@@ -140,15 +134,15 @@ def _borders(
     use = np.all(edge_faces >= 0, axis=1)
     use[use] &= np.all(active[edge_faces[use]], axis=1)
     borders: dict[int, dict[int, Border]] = defaultdict(dict)
-    for (a, b), open_m, closed_m, passage_m in zip(
+    for (a, b), open_m, closed_m, passage in zip(
         edge_faces[use].tolist(),
         evidence.open_m[use].tolist(),
         evidence.wall_m[use].tolist(),
-        evidence.passage_m[use].tolist(),
+        evidence.passage_share[use].tolist(),
         strict=True,
     ):
         before = borders[a].get(b, (0.0, 0.0, 0.0))
-        border = (before[0] + open_m, before[1] + closed_m, max(before[2], passage_m))
+        border = (before[0] + open_m, before[1] + closed_m, max(before[2], passage))
         borders[a][b] = borders[b][a] = border
     return borders
 

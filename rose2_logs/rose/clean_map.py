@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -73,3 +74,16 @@ def clean_threshold(
         else:
             low = middle + 1
     return float(steps[low])
+
+
+def attached_cells(clean: BoolArray, candidates: BoolArray) -> BoolArray:
+    """Add to the clean map the candidates that are connected with it: a threshold with hysteresis.
+
+    Jambs and ends of walls have a low score, for half of their neighbourhood is open.
+    """
+    _, part = cv2.connectedComponents((clean | candidates).astype(np.uint8), connectivity=8)
+    touched = np.zeros(int(part.max()) + 1, bool)
+    touched[part[clean]] = True
+    touched[0] = False
+    attached: BoolArray = touched[part]
+    return attached

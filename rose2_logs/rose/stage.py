@@ -10,19 +10,23 @@ from numpy.typing import NDArray
 
 from rose2_logs.occupancy import BoolArray, FloatArray
 from rose2_logs.parameters import SpectrumParameters
-from rose2_logs.rose.clean_map import clean_threshold, structure_score
+from rose2_logs.rose.clean_map import attached_cells, clean_threshold, structure_score
 from rose2_logs.rose.spectrum import angular_energy, compute_spectrum, dominant_directions
 
 
 @dataclass(frozen=True, eq=False)
 class RoseResult:
-    """Stage A in the grid frame: see `rose.structure.Structure`, which is the same in the world."""
+    """Stage A in the grid frame: see `rose.structure.Structure`, which is the same in the world.
+
+    `attached` (H, W) holds the clean map and the cells of lower score that touch it: jambs, ends of walls.
+    """
 
     directions_rad: FloatArray
     strengths: FloatArray
     score: NDArray[np.float32]
     threshold: float
     clean: BoolArray
+    attached: BoolArray
 
 
 def find_structure(
@@ -40,4 +44,6 @@ def find_structure(
     directions, strengths = dominant_directions(angular_energy(spectrum, parameters), parameters)
     score = structure_score(spectrum, occupied, directions, parameters)
     threshold = clean_threshold(score, occupied, free_m2, count_segments, parameters)
-    return RoseResult(directions, strengths, score, threshold, occupied & (score >= threshold))
+    clean = occupied & (score >= threshold)
+    attached = attached_cells(clean, occupied & (score >= parameters.attached_share * threshold))
+    return RoseResult(directions, strengths, score, threshold, clean, attached)

@@ -31,7 +31,7 @@ class WallResult:
     lines : RepresentativeLines
         The representative lines.
     walls : (H, W) bool
-        Wall cells: the clean map and the walls off the dominant directions.
+        Wall cells: the clean map, what is attached to it, and the walls off the dominant directions.
     """
 
     segments_m: FloatArray
@@ -45,11 +45,12 @@ class WallResult:
 def find_walls(
     occupied: BoolArray,
     clean: BoolArray,
+    attached: BoolArray,
     dominant_rad: FloatArray,
     resolution_m: float,
     parameters: WallParameters,
 ) -> WallResult:
-    """Segments, wall clusters and representative lines of a clean map (H, W)."""
+    """Segments, wall clusters and representative lines of a clean map (H, W) and what is attached to it."""
     along = detect_segments(clean, resolution_m, parameters)
     local, local_walls = detect_local_segments(occupied, clean, resolution_m, parameters)
     segments = np.concatenate([along, local])
@@ -62,5 +63,5 @@ def find_walls(
         lines.of_cluster[clusters.of_segment],
         directions,
         lines,
-        clean | local_walls,
+        attached | local_walls,
     )
