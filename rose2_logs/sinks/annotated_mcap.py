@@ -1,0 +1,220 @@
+"""The input log with what was found added to it, as an MCAP that Foxglove, RViz and rosbag2 open."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import TracebackType
+from typing import IO, Self
+
+from mcap.exceptions import McapError
+from mcap.writer import CompressionType, Writer
+
+from rose2_logs.errors import OutputError
+from rose2_logs.sinks.copied_log import (
+    LATCHED_QOS,
+    CopiedChannel,
+    CopiedLog,
+    CopiedMessage,
+    open_copied_log,
+)
+from rose2_logs.sinks.ros_messages import ROOMS_TYPE, MessageMaker
+from rose2_logs.sinks.sink import RunInfo
+from rose2_logs.tracking.frames import TrackedSnapshot
+
+PREFIX = "/rose2/"
+GRID_TYPE = "nav_msgs/msg/OccupancyGrid"
+ADDED = {
+    "/rose2/segmented_map": GRID_TYPE,
+    "/rose2/clean_map": GRID_TYPE,
+    "/rose2/markers": "visualization_msgs/msg/MarkerArray",
+    "/rose2/rooms": ROOMS_TYPE,
+}
+"""Topics that are added, with their types."""
+ATTACHMENT = "rose2_parameters.json"
+METADATA = "rose2_logs"
+
+
+class AnnotatedMcap:
+    """Sink that copies the input log and adds the topics of `ADDED` with the source map's stamp and frame.
+
+    Messages, schemas, channels, attachments and metadata of an MCAP stay as they were, byte for byte; a bag
+    becomes an MCAP of the ros2 profile with every message as CDR. The copy is read along with the run,
+    so that messages stand by log time and the log is never held in memory. Of saved maps, which are no
+    messages yet, each map is written to the map topic.
+
+    Parameters
+    ----------
+    path : path
+        Where to; written beside and renamed when whole.
+    info : RunInfo
+        The run.
+
+    Attributes
+    ----------
+    copied_counts : dict of topic to int
+        Messages copied from the input.
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written, or the input holds ``/rose2/`` topics already.
+    LogError
+        If the input cannot be copied.
+    """
+
+    def __init__(self, path: Path, info: RunInfo) -> None:
+        self._path = path
+        self._part = path.with_name(f".{path.name}.part")
+        self._info = info
+        self._file: IO[bytes] | None = None
+        self.copied_counts: Counter[str] = Counter()
+
+    def __enter__(self) -> Self:
+        self._log: CopiedLog = open_copied_log(self._info.log_path)
+        try:
+            with self._writing():
+                self._path.parent.mkdir(parents=True, exist_ok=True)
+                self._file = self._part.open("wb")
+                self._writer = Writer(self._file, compression=CompressionType.ZSTD)
+                self._begin()
+        except BaseException:
+            self._abandon()
+            raise
+        return self
+
+    def _begin(self) -> None:
+        log, info = self._log, self._info
+        library = f"rose2_logs {info.versions.get('rose2_logs', '')}".strip()
+        self._writer.start(log.profile, f"{log.library}; {library}" if log.library else library)
+        self._channels: dict[int, int] = {}
+        self._schemas: dict[tuple[str, str, bytes], int] = {}
+        self._messages = log.messages()
+        self._waiting: CopiedMessage | None = None
+        self._maker = MessageMaker()
+        self._sequence = 0
+        map_metadata: dict[str, str] = {}
+        for channel in log.channels():
+            self._register(channel)
+            if channel.topic == info.topic:
+                map_metadata = channel.metadata
+        for attachment in log.attachments():
+            self._writer.add_attachment(
+                attachment.create_time,
+                attachment.log_time,
+                attachment.name,
+                attachment.media_type,
+                attachment.data,
+            )
+        for record in log.metadata():
+            self._writer.add_metadata(record.name, record.metadata)
+        # The quality of service of the source's map, in its distribution's spelling.
+        qos = map_metadata.get("offered_qos_profiles", "[]")
+        self._qos = qos if qos.strip() not in ("", "[]") else LATCHED_QOS
+        self._added = {topic: self._add_channel(topic, kind) for topic, kind in ADDED.items()}
+        self._own_map = None if log.channels() or log.profile != "ros2" else self._map_channel()
+        self._writer.add_metadata(
+            METADATA, {name: str(value) for name, value in (info.versions | info.provenance).items()}
+        )
+
+    def _map_channel(self) -> int | None:
+        return self._add_channel(self._info.topic, GRID_TYPE) if not self._has_messages() else None
+
+    def _has_messages(self) -> bool:
+        self._waiting = next(self._messages, None)
+        return self._waiting is not None
+
+    def write(self, frame: TrackedSnapshot) -> None:
+        """Copy the input up to the map's log time, then add what was found in the map."""
+        time_ns = frame.snapshot.log_time_ns
+        with self._writing():
+            self._copy_until(time_ns)
+            made = {
+                "/rose2/segmented_map": self._maker.segmented_map(frame),
+                "/rose2/clean_map": self._maker.clean_map(frame),
+                "/rose2/markers": self._maker.markers(frame),
+                "/rose2/rooms": self._maker.rooms(frame),
+            }
+            if self._own_map is not None:
+                self._add(self._own_map, time_ns, self._maker.source_map(frame))
+            for topic, data in made.items():
+                if data is not None:
+                    self._add(self._added[topic], time_ns, data)
+            self._sequence += 1
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        if kind is not None:
+            self._abandon()
+            return
+        try:
+            with self._writing():
+                self._copy_until(None)
+                text = json.dumps(self._info.parameters.resolved(), indent=2)
+                self._writer.add_attachment(0, 0, ATTACHMENT, "application/json", text.encode())
+                self._writer.finish()  # type: ignore[no-untyped-call]
+                if self._file is not None:
+                    self._file.close()
+                self._part.replace(self._path)
+        finally:
+            self._abandon()
+
+    def _copy_until(self, time_ns: int | None) -> None:
+        while True:
+            if self._waiting is None:
+                self._waiting = next(self._messages, None)
+            if self._waiting is None or (time_ns is not None and self._waiting.log_time > time_ns):
+                return
+            message, self._waiting = self._waiting, None
+            self._writer.add_message(
+                self._register(message.channel),
+                message.log_time,
+                bytes(message.data),
+                message.publish_time,
+                message.sequence,
+            )
+            self.copied_counts[message.channel.topic] += 1
+
+    def _register(self, channel: CopiedChannel) -> int:
+        if channel.key not in self._channels:
+            if channel.topic.startswith(PREFIX):
+                raise OutputError(
+                    f"{self._info.log_path}: holds {channel.topic} already; analyse the log it was made from"
+                )
+            schema = (channel.schema_name, channel.schema_encoding, channel.schema_data)
+            self._channels[channel.key] = self._writer.register_channel(
+                channel.topic, channel.message_encoding, self._schema(*schema), channel.metadata
+            )
+        return self._channels[channel.key]
+
+    def _schema(self, name: str, encoding: str, data: bytes) -> int:
+        if not (name or encoding or data):
+            return 0
+        key = (name, encoding, data)
+        if key not in self._schemas:
+            self._schemas[key] = self._writer.register_schema(name, encoding, data)
+        return self._schemas[key]
+
+    def _add_channel(self, topic: str, kind: str) -> int:
+        schema = self._schema(kind, "ros2msg", self._maker.definition(kind))
+        return self._writer.register_channel(topic, "cdr", schema, {"offered_qos_profiles": self._qos})
+
+    def _add(self, channel: int, time_ns: int, data: bytes) -> None:
+        self._writer.add_message(channel, time_ns, data, time_ns, self._sequence)
+
+    def _abandon(self) -> None:
+        self._log.close()
+        if self._file is not None:
+            self._file.close()
+        self._part.unlink(missing_ok=True)
+
+    @contextmanager
+    def _writing(self) -> Iterator[None]:
+        try:
+            yield
+        except (OSError, McapError) as error:
+            raise OutputError(f"{self._path}: cannot be written: {error}") from error
