@@ -72,7 +72,9 @@ class GridGeometry:
 
     def cell_centres(self, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> FloatArray:
         """World positions (..., 2) in metres of the centres of cells."""
-        return self.grid_to_world((np.stack([columns, rows], axis=-1) + 0.5) * self.resolution_m)
+        return self.grid_to_world(
+            (np.stack([columns, rows], axis=-1) + 0.5).astype(float) * self.resolution_m
+        )
 
     def world_to_cell(self, xy_m: FloatArray) -> NDArray[np.intp]:
         """Cells (..., 2) as row, column that hold world points; they may lie outside the grid."""

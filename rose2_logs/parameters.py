@@ -209,7 +209,7 @@ def _replaced_block(block_name: str, block: Any, values: Mapping[str, Any]) -> A
 
 
 def _checked(name: str, declared: dataclasses.Field[Any], value: Any) -> Any:
-    kind = type(declared.default)
+    kind: Any = type(declared.default)
     if isinstance(value, bool) is not (kind is bool) or not isinstance(
         value, (int, float) if kind is float else kind
     ):
@@ -217,7 +217,8 @@ def _checked(name: str, declared: dataclasses.Field[Any], value: Any) -> Any:
     meta = declared.metadata
     if kind in (int, float) and not (meta["low"] <= value <= meta["high"]):
         raise ParameterError(f"{name} is {value}; it must lie between {meta['low']} and {meta['high']}")
-    return kind(value)
+    checked: float | int | bool | str = kind(value)
+    return checked
 
 
 def load_parameters(config: Path | None = None, settings: Iterable[str] = ()) -> Parameters:

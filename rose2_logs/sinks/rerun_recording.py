@@ -1,0 +1,290 @@
+"""The run as a Rerun recording: the map with its rooms along time and along coverage."""
+
+from __future__ import annotations
+
+import logging
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+
+from rose2_logs.errors import OutputError
+from rose2_logs.occupancy import FloatArray, GridGeometry
+from rose2_logs.sinks.palette import track_colour
+from rose2_logs.sinks.rerun_blueprint import COVERAGE_UNIT, corners_of, make_blueprint
+from rose2_logs.sinks.ros_messages import label_point, outer_rings
+from rose2_logs.sinks.sink import RunInfo
+from rose2_logs.tracking.frames import RoomEvent, TrackedSnapshot
+
+logger = logging.getLogger(__name__)
+
+FILL_OPACITY = 150
+"""Alpha of a room's fill in 0..255: the map shows through."""
+LAYER_STEP_M = 0.01
+"""Layers lie this far above each other, so that none flickers through another."""
+OUTLINE_POINTS, WALL_POINTS, LINE_POINTS = 2.0, 1.5, 0.75
+"""Widths of lines in points of the screen, which stay readable at any zoom."""
+TIMELINES = ("message_log_time", "ros2_timestamp", "snapshot", "coverage")
+FLUSH_TIMEOUT_S = 60.0
+
+
+class RerunRecording:
+    """Sink that writes a ``.rrd`` with its layout, or shows the run in an open viewer, or both.
+
+    Timelines are ``message_log_time`` and ``ros2_timestamp`` (as in Rerun's own MCAP importer), ``snapshot``,
+    and ``coverage`` in steps of 1e-4. Rooms stand under ``/world/rooms/TRACK``, their areas under
+    ``/run/area/TRACK``; they are cleared when their track is lost.
+
+    Parameters
+    ----------
+    path : path, optional
+        Where to; written beside and renamed when whole. Without it nothing is stored.
+    info : RunInfo
+        The run.
+    live : bool
+        Also show the run in a Rerun viewer, which is started where none is open.
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written.
+    """
+
+    def __init__(self, path: Path | None, info: RunInfo, *, live: bool = False) -> None:
+        self._path = path
+        self._part = path.with_name(f".{path.name}.part") if path else None
+        self._info = info
+        self._live = live
+        self._shown: set[int] = set()
+        self._low, self._high = np.full(2, np.inf), np.full(2, -np.inf)
+        self._frames = 0
+        self._begun: dict[int, int] = {}
+
+    def __enter__(self) -> Self:
+        # The same log gives the same recording id, so that a second run replaces the first in a viewer.
+        fingerprint = str(self._info.provenance.get("sha256", self._info.log_path.name))
+        self._recording = rr.RecordingStream(
+            "rose2_logs", recording_id=f"{self._info.log_path.stem}-{fingerprint[:16]}", send_properties=True
+        )
+        sinks: list[rr.FileSink | rr.GrpcSink] = []
+        if self._part is not None:
+            try:
+                self._part.parent.mkdir(parents=True, exist_ok=True)
+            except OSError as error:
+                raise OutputError(f"{self._part.parent}: cannot be written: {error}") from error
+            sinks.append(rr.FileSink(str(self._part)))
+        if self._live:
+            rr.spawn(connect=False)
+            sinks.append(rr.GrpcSink())
+        self._recording.set_sinks(*sinks)
+        self._recording.set_log_time_enabled(False)
+        self._recording.set_log_tick_enabled(False)
+        self._recording.log("/world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+        self._recording.log("/run/coverage", rr.SeriesLines(names="coverage", widths=2), static=True)
+        self._recording.log("/run/rooms", rr.SeriesLines(names="rooms", widths=2), static=True)
+        return self
+
+    def write(self, frame: TrackedSnapshot) -> None:
+        """Log one snapshot at all its times."""
+        recording, snapshot = self._recording, frame.snapshot
+        recording.set_time("message_log_time", timestamp=np.datetime64(snapshot.log_time_ns, "ns"))
+        recording.set_time("ros2_timestamp", timestamp=np.datetime64(snapshot.stamp_ns, "ns"))
+        recording.set_time("snapshot", sequence=snapshot.index)
+        recording.set_time("coverage", sequence=round(frame.coverage / COVERAGE_UNIT))
+        self._log_map(frame)
+        self._log_rooms(frame)
+        self._log_structure(frame)
+        recording.log("/run/coverage", rr.Scalars(frame.coverage))
+        recording.log("/run/rooms", rr.Scalars(len(frame.track_ids)))
+        for event in frame.events:
+            if event.kind != "continued":
+                recording.log("/events", rr.TextLog(event_text(event), level=_event_level(event)))
+        if self._frames == 0:
+            # A live viewer shows the layout from the beginning; the file gets the final one.
+            recording.send_blueprint(make_blueprint(self._low, self._high))
+        self._frames += 1
+        recording.flush(timeout_sec=FLUSH_TIMEOUT_S)
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        try:
+            if kind is None:
+                self._recording.log(
+                    "/summary", rr.TextDocument(self._summary(), media_type="text/markdown"), static=True
+                )
+                if self._frames:
+                    self._recording.send_blueprint(make_blueprint(self._low, self._high))
+            self._recording.flush(timeout_sec=FLUSH_TIMEOUT_S)
+            self._recording.disconnect()
+            if kind is None and self._path is not None and self._part is not None:
+                try:
+                    self._part.replace(self._path)
+                except OSError as failure:
+                    raise OutputError(f"{self._path}: cannot be written: {failure}") from failure
+        finally:
+            if self._part is not None:
+                self._part.unlink(missing_ok=True)
+
+    def _log_map(self, frame: TrackedSnapshot) -> None:
+        cells, geometry = frame.snapshot.cells, frame.analysis.geometry
+        window = _known_window(cells)
+        corner = np.array([[window[1].start, window[0].start], [window[1].stop, window[0].stop]], float)
+        box = geometry.grid_to_world(
+            np.array([corner[0], corner[1], [corner[0, 0], corner[1, 1]], [corner[1, 0], corner[0, 1]]])
+            * geometry.resolution_m
+        )
+        low, high = corners_of(box)
+        self._low, self._high = np.minimum(self._low, low), np.maximum(self._high, high)
+        # Unknown is 255 as an unsigned byte, which is what the RViz colours expect.
+        grid = cells[window].view(np.uint8)
+        self._recording.log(
+            "/world/map",
+            _grid_map(grid, geometry, window, 0, colormap=rr.components.Colormap.RvizMap),
+        )
+        labels = frame.analysis.rooms.labels[window]
+        colours = np.zeros((len(frame.track_ids) + 1, 4), np.uint8)
+        for number, track in enumerate(frame.track_ids, start=1):
+            colours[number] = (*track_colour(track), FILL_OPACITY)
+        self._recording.log("/world/room_fills", _grid_map(colours[labels], geometry, window, 1))
+        if frame.analysis.structure is not None:
+            clean = np.zeros((*labels.shape, 4), np.uint8)
+            clean[frame.analysis.structure.clean[window]] = (150, 0, 60, 255)
+            self._recording.log("/world/clean_map", _grid_map(clean, geometry, window, 2))
+
+    def _log_rooms(self, frame: TrackedSnapshot) -> None:
+        recording, rooms = self._recording, frame.analysis.rooms
+        for track in sorted(self._shown - set(frame.track_ids)):
+            recording.log(f"/world/rooms/{track}", rr.Clear(recursive=True))
+            recording.log(f"/run/area/{track}", rr.Clear(recursive=False))
+        self._shown = set(frame.track_ids)
+        for number, track in enumerate(frame.track_ids, start=1):
+            colour = track_colour(track)
+            if track not in self._begun:
+                self._begun[track] = frame.snapshot.index
+                recording.log(
+                    f"/run/area/{track}", rr.SeriesLines(colors=[colour], names=f"room {track}"), static=True
+                )
+            shape, area = rooms.polygons[number - 1], float(rooms.areas_m2[number - 1])
+            dark = tuple(int(value * 0.6) for value in colour)
+            recording.log(
+                f"/world/rooms/{track}",
+                rr.LineStrips3D(
+                    [_lifted(ring, 3) for ring in outer_rings(shape)],
+                    colors=[dark],
+                    radii=rr.components.Radius.ui_points(OUTLINE_POINTS),
+                ),
+            )
+            recording.log(
+                f"/world/rooms/{track}/label",
+                rr.Points3D(
+                    _lifted(np.array([label_point(shape)]), 6),
+                    labels=[f"{track}: {area:.0f} m²"],
+                    colors=[dark],
+                    radii=rr.components.Radius.ui_points(2.0),
+                    show_labels=True,
+                ),
+            )
+            recording.log(f"/run/area/{track}", rr.Scalars(area))
+
+    def _log_structure(self, frame: TrackedSnapshot) -> None:
+        analysis = frame.analysis
+        doors = np.array([door.ends_m for door in analysis.rooms.doorways]).reshape(-1, 4)
+        self._log_lines("/world/doorways", doors, 5, (230, 90, 20), 2 * OUTLINE_POINTS)
+        if analysis.walls is not None:
+            self._log_lines("/world/walls", analysis.walls.segments_m, 4, (40, 40, 40), WALL_POINTS)
+            self._log_lines("/world/lines", analysis.walls.lines_m, 4, (60, 110, 230), LINE_POINTS)
+        if analysis.floor_plan is not None:
+            weight = analysis.floor_plan.edge_weight[:, None]
+            colours = (weight * (220, 30, 30) + (1 - weight) * (60, 190, 90)).astype(np.uint8)
+            self._log_lines("/world/edges", analysis.floor_plan.edges_m, 4, colours, LINE_POINTS)
+
+    def _log_lines(
+        self,
+        path: str,
+        ends_m: FloatArray,
+        layer: int,
+        colours: tuple[int, int, int] | NDArray[np.uint8],
+        width: float,
+    ) -> None:
+        strips = list(_lifted(ends_m.reshape(-1, 2), layer).reshape(-1, 2, 3))
+        self._recording.log(
+            path,
+            rr.LineStrips3D(
+                strips,
+                colors=colours if isinstance(colours, np.ndarray) else [colours],
+                radii=rr.components.Radius.ui_points(width),
+            ),
+        )
+
+    def _summary(self) -> str:
+        info = self._info
+        rows = {
+            "log": info.log_path.name,
+            "topic": info.topic,
+            "method": info.method,
+            "maps": self._frames,
+            "rooms at the end": len(self._shown),
+            "rooms over the run": len(self._begun),
+            **{f"version of {name}": version for name, version in info.versions.items()},
+        }
+        # Names come from a log: a bar would end a cell of the table.
+        lines = [f"| {name} | {str(value).replace('|', '/')} |" for name, value in rows.items()]
+        return "\n".join(["| run | |", "|---|---|", *lines])
+
+
+def event_text(event: RoomEvent) -> str:
+    """Tell an event in a sentence."""
+    others = ", ".join(str(track) for track in event.others)
+    if event.kind == "split":
+        return f"room {event.track} split; new: {others}" if others else f"room {event.track} split"
+    if event.kind == "merged":
+        return f"room {event.track} took in {others}" if others else f"room {event.track} merged"
+    return f"room {event.track} {event.kind}"
+
+
+def _event_level(event: RoomEvent) -> str:
+    level = rr.TextLogLevel.WARN if event.kind in ("split", "merged", "lost") else rr.TextLogLevel.INFO
+    return str(level)
+
+
+def _known_window(cells: NDArray[np.int8]) -> tuple[slice, slice]:
+    rows, columns = np.flatnonzero((cells >= 0).any(1)), np.flatnonzero((cells >= 0).any(0))
+    if len(rows) == 0:
+        return slice(0, 1), slice(0, 1)
+    return slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)
+
+
+def _grid_map(
+    pixels: NDArray[np.uint8],
+    geometry: GridGeometry,
+    window: tuple[slice, slice],
+    layer: int,
+    colormap: rr.components.Colormap | None = None,
+) -> rr.GridMap:
+    """Part of a grid as Rerun draws it: its pictures begin at the top, a grid at its origin."""
+    corner = np.array([window[1].start, window[0].start]) * geometry.resolution_m
+    x, y = geometry.grid_to_world(corner).tolist()
+    half = geometry.yaw_rad / 2
+    return rr.GridMap(
+        data=np.ascontiguousarray(np.flipud(pixels)).tobytes(),
+        format=rr.components.ImageFormat(
+            width=pixels.shape[1],
+            height=pixels.shape[0],
+            color_model="L" if pixels.ndim == 2 else "RGBA",
+            channel_datatype="U8",
+        ),
+        cell_size=geometry.resolution_m,
+        translation=[x, y, layer * LAYER_STEP_M],
+        quaternion=rr.Quaternion(xyzw=[0.0, 0.0, float(np.sin(half)), float(np.cos(half))]),
+        colormap=colormap,
+        draw_order=float(layer),
+    )
+
+
+def _lifted(points_m: FloatArray, layer: int) -> FloatArray:
+    """Points (K, 2) as (K, 3) at a layer's height."""
+    return np.column_stack([points_m, np.full(len(points_m), layer * LAYER_STEP_M)])
