@@ -129,6 +129,9 @@ class FloorPlanParameters:
         2.0, "1", "How far from a passage its width is compared with the room's, in widths.", 0.0
     )
     passage_look_max_m: float = _number(3.0, "m", "The same at most: half a large room.", 0.0)
+    border_strip_m: float = _number(
+        0.25, "m", "Strips of a room narrower than this, along a wall's other side, change room.", 0.0
+    )
     room_min_area_m2: float = _number(3.0, "m2", "Smaller pieces of free space are no rooms.", 0.0)
     room_min_clearance_m: float = _number(0.6, "m", "Half the width of the narrowest room.", 0.0)
 

@@ -13,7 +13,7 @@ from shapely.geometry.base import BaseGeometry
 from rose2_logs.errors import ParameterError
 from rose2_logs.floor_plan.doorways import find_doorways
 from rose2_logs.floor_plan.plan import FloorPlan
-from rose2_logs.floor_plan.rooms import number_rooms, outline, predicted_shapes
+from rose2_logs.floor_plan.rooms import number_rooms, outline, predicted_shapes, settle_borders
 from rose2_logs.floor_plan.stage import FloorPlanResult, make_floor_plan
 from rose2_logs.occupancy import (
     BoolArray,
@@ -131,8 +131,13 @@ def analyse(snapshot: OccupancySnapshot, parameters: Parameters, method: str = "
         parameters.topology,
     )
     watch.lap("topology")
-    labels = number_rooms(labels, parameters.floor_plan.room_min_area_m2, resolution)
-    room_of_face, shapes = _room_shapes(plan, labels, resolution, parameters)
+    settled = settle_borders(labels, resolution, parameters.floor_plan.border_strip_m)
+    number = number_rooms(
+        settled, int(labels.max(initial=0)), parameters.floor_plan.room_min_area_m2, resolution
+    )
+    # Which faces are a room's is told by the labels before their borders settled.
+    room_of_face, shapes = _room_shapes(plan, number[labels], number[settled], resolution, parameters)
+    labels = number[settled]
     rooms = _room_map(labels, shapes, explored, geometry, parameters)
     watch.lap("rooms")
     return SnapshotAnalysis(
@@ -163,11 +168,15 @@ class _StopWatch:
 
 
 def _room_shapes(
-    plan: FloorPlanResult, labels: NDArray[np.int32], resolution_m: float, parameters: Parameters
+    plan: FloorPlanResult,
+    unsettled: NDArray[np.int32],
+    labels: NDArray[np.int32],
+    resolution_m: float,
+    parameters: Parameters,
 ) -> tuple[NDArray[np.int32], list[BaseGeometry]]:
     """Room of each face, and predicted shapes: a room's faces, or its cells where a split cut faces."""
     count = int(labels.max(initial=0))
-    pairs, _ = distinct_labels(labels * np.int64(plan.group.max(initial=0) + 1) + plan.labels)
+    pairs, _ = distinct_labels(unsettled * np.int64(plan.group.max(initial=0) + 1) + plan.labels)
     rooms, groups = np.divmod(pairs, int(plan.group.max(initial=0)) + 1)
     # A group that was split, or lost cells to a split, has no faces of its own any more.
     rooms, groups = rooms[rooms > 0], groups[rooms > 0]

@@ -37,19 +37,51 @@ def clearance(
     return greatest[1:].astype(float) * resolution_m
 
 
-def number_rooms(labels: NDArray[np.int32], minimum_m2: float, resolution_m: float) -> NDArray[np.int32]:
-    """Renumber labels 1..R in order of their first cell; labels of less area than `minimum_m2` become 0."""
-    size = np.bincount(labels.ravel())
+def number_rooms(
+    labels: NDArray[np.int32], highest: int, minimum_m2: float, resolution_m: float
+) -> NDArray[np.int32]:
+    """Number the labels up to `highest` by their first cell; those of less area than `minimum_m2` get 0.
+
+    Returns
+    -------
+    number : (N,) int32
+        Number of each label: ``number[labels]`` is the renumbered image.
+    """
+    size = np.bincount(labels.ravel(), minlength=highest + 1)
     keep = size * resolution_m**2 >= minimum_m2
     keep[0] = False
-    if not keep.any():
-        return np.zeros_like(labels)
     present, first = distinct_labels(labels)
     order = present[np.argsort(first)]
     order = order[keep[order]]
     number = np.zeros(len(size), np.int32)
     number[order] = np.arange(1, len(order) + 1)
-    return number[labels]
+    return number
+
+
+def settle_borders(labels: NDArray[np.int32], resolution_m: float, strip_m: float) -> NDArray[np.int32]:
+    """Give strips of a room that lie along the other side of a wall to the room on that side.
+
+    A representative line runs within a wall, but not in the middle of every cell of it, so that a strip of
+    free cells before the wall may fall on the line's other side. What is narrower than `strip_m` is taken
+    away from its room and grown again from the rooms that it is open to.
+
+    Parameters
+    ----------
+    labels : (H, W) int32
+        Rooms of the free cells, 0 elsewhere.
+    """
+    radius = max(1, round(strip_m / resolution_m / 2))
+    kernel = np.ones((2 * radius + 1, 2 * radius + 1), np.uint8)
+    values = labels.astype(np.float32)
+    core = (cv2.erode(values, kernel) == values) & (cv2.dilate(values, kernel) == values)
+    grown = np.where(core, values, 0)
+    open_cells = labels > 0
+    cross = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
+    # Every step reaches a cell further; twice the strip brings back what lies in corners.
+    for _ in range(4 * radius):
+        wider = cv2.dilate(grown, cross)
+        grown = np.where((grown == 0) & open_cells, wider, grown)
+    return np.where(grown > 0, grown, values).astype(np.int32)
 
 
 def predicted_shapes(
