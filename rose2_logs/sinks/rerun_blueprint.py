@@ -10,7 +10,7 @@ from rose2_logs.occupancy import FloatArray
 
 COVERAGE_UNIT = 1e-4
 """Step of the coverage timeline, which counts in whole numbers."""
-EYE_HEIGHT = 1.0
+EYE_HEIGHT = 0.9
 """Height of the eye over the longer side of the map: it fills the view at the viewer's field of view."""
 HIDDEN = ("/world/clean_map", "/world/lines", "/world/edges")
 """Layers that are there to be switched on."""

@@ -21,8 +21,10 @@ from rose2_logs.tracking.frames import RoomEvent, TrackedSnapshot
 
 logger = logging.getLogger(__name__)
 
-FILL_OPACITY = 150
-"""Alpha of a room's fill in 0..255: the map shows through."""
+FILL_OPACITY = 0.6
+"""Share of a room's colour in its cells: the map shows through."""
+UNKNOWN_SHADE = 205
+"""Grey of unknown cells, as map_server draws them."""
 LAYER_STEP_M = 0.01
 """Layers lie this far above each other, so that none flickers through another."""
 OUTLINE_POINTS, WALL_POINTS, LINE_POINTS = 2.0, 1.5, 0.75
@@ -146,14 +148,15 @@ class RerunRecording:
             _grid_map(grid, geometry, window, 0, colormap=rr.components.Colormap.RvizMap),
         )
         labels = frame.analysis.rooms.labels[window]
-        colours = np.zeros((len(frame.track_ids) + 1, 4), np.uint8)
-        for number, track in enumerate(frame.track_ids, start=1):
-            colours[number] = (*track_colour(track), FILL_OPACITY)
-        self._recording.log("/world/room_fills", _grid_map(colours[labels], geometry, window, 1))
+        plain = _shades(cells[window])
+        colours = np.array([(0, 0, 0), *(track_colour(track) for track in frame.track_ids)], float)
+        painted = FILL_OPACITY * colours[labels] + (1 - FILL_OPACITY) * plain
+        fills = np.where((labels > 0)[..., None], painted, plain).astype(np.uint8)
+        self._recording.log("/world/room_fills", _grid_map(fills, geometry, window, 1))
         if frame.analysis.structure is not None:
-            clean = np.zeros((*labels.shape, 4), np.uint8)
-            clean[frame.analysis.structure.clean[window]] = (150, 0, 60, 255)
-            self._recording.log("/world/clean_map", _grid_map(clean, geometry, window, 2))
+            faint = 255 - (255 - plain) / 4
+            clean = np.where(frame.analysis.structure.clean[window][..., None], (150, 0, 60), faint)
+            self._recording.log("/world/clean_map", _grid_map(clean.astype(np.uint8), geometry, window, 2))
 
     def _log_rooms(self, frame: TrackedSnapshot) -> None:
         recording, rooms = self._recording, frame.analysis.rooms
@@ -183,8 +186,8 @@ class RerunRecording:
                 rr.Points3D(
                     _lifted(np.array([label_point(shape)]), 6),
                     labels=[f"{track}: {area:.0f} m²"],
-                    colors=[dark],
-                    radii=rr.components.Radius.ui_points(2.0),
+                    colors=[(255, 255, 255)],
+                    radii=rr.components.Radius.ui_points(1.0),
                     show_labels=True,
                 ),
             )
@@ -251,6 +254,12 @@ def _event_level(event: RoomEvent) -> str:
     return str(level)
 
 
+def _shades(cells: NDArray[np.int8]) -> FloatArray:
+    """Grey (H, W, 3) of each cell: white free, black occupied, grey unknown."""
+    shade = np.where(cells < 0, UNKNOWN_SHADE, 255 * (1 - np.minimum(cells, 100) / 100.0))
+    return np.repeat(shade[..., None], 3, axis=2)
+
+
 def _known_window(cells: NDArray[np.int8]) -> tuple[slice, slice]:
     rows, columns = np.flatnonzero((cells >= 0).any(1)), np.flatnonzero((cells >= 0).any(0))
     if len(rows) == 0:
@@ -274,7 +283,7 @@ def _grid_map(
         format=rr.components.ImageFormat(
             width=pixels.shape[1],
             height=pixels.shape[0],
-            color_model="L" if pixels.ndim == 2 else "RGBA",
+            color_model="L" if pixels.ndim == 2 else "RGB",
             channel_datatype="U8",
         ),
         cell_size=geometry.resolution_m,
