@@ -111,7 +111,7 @@ def read_map(path: Path, stamp_ns: int = 0) -> Grid | None:
         raise InvalidMapError(f"{path}: origin is {origin!r}; it must be three numbers: x, y, yaw")
     x, y, yaw = (float(part) for part in origin)
     shade, opaque = _load_image(_image_path(path, described))
-    pose = (x, y, 0.0, 0.0, 0.0, np.sin(yaw / 2), np.cos(yaw / 2))
+    pose = (x, y, 0.0, 0.0, 0.0, float(np.sin(yaw / 2)), float(np.cos(yaw / 2)))
     return make_grid(
         stamp_ns, FRAME_ID, resolution, pose, _cells(path, described, shade, opaque)[::-1].copy()
     )
@@ -136,7 +136,8 @@ def _cells(
         raise InvalidMapError(
             f"{path}: free_thresh {free_below} must lie below occupied_thresh {occupied_above}, both in 0..1"
         )
-    occupancy = shade if negate else 1 - shade
+    # Rounded, so that a pixel that stands for a threshold exactly is found on it.
+    occupancy = np.round((shade if negate else 1 - shade).astype(float), 6)
     if mode == "scale":
         cells = np.round((occupancy - free_below) / (occupied_above - free_below) * 100)
         cells = np.where(occupancy < free_below, 0, np.where(occupancy > occupied_above, 100, cells))

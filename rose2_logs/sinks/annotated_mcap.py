@@ -14,7 +14,7 @@ from mcap.exceptions import McapError
 from mcap.writer import CompressionType, Writer
 
 from rose2_logs.errors import OutputError
-from rose2_logs.sinks.copied_log import (
+from rose2_logs.sinks.mcap_input import (
     LATCHED_QOS,
     CopiedChannel,
     CopiedLog,

@@ -1,0 +1,507 @@
+"""Every format of a log gives the same maps; damaged, foreign and mapless logs end well."""
+
+import contextlib
+import itertools
+import logging
+import shutil
+import sqlite3
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mcap.writer import CompressionType, IndexType
+from reader_logs import (
+    SHARED,
+    START_NS,
+    Map,
+    McapLog,
+    Text,
+    Update,
+    growing_maps,
+    run_of_maps,
+    serialized,
+    serialized_costmap,
+    write_bag,
+    write_mcap,
+    write_rosbag2,
+)
+from scipy.ndimage import binary_dilation
+from test_messages import SCHEMA, foxglove_message
+
+from rose2_logs.errors import InvalidMapError, LogError, NoMapTopicError
+from rose2_logs.readers import Selection, inspect_log, open_log
+
+needs_shared = pytest.mark.skipif(
+    not SHARED.is_dir(), reason="the folder of real logs is not beside the project"
+)
+
+
+def read(path, **options):
+    with open_log(path, **options) as log:
+        return list(log.snapshots())
+
+
+def assert_are(snapshots, maps, times=None):
+    """The snapshots must be these maps, cell by cell, with their stamps, frames, origins, yaws and times."""
+    assert [each.index for each in snapshots] == list(range(len(maps)))
+    for k, (got, expected) in enumerate(zip(snapshots, maps, strict=True)):
+        np.testing.assert_array_equal(got.cells, expected.cells)
+        assert got.cells.dtype == np.int8
+        assert got.cells.flags.c_contiguous
+        assert not got.cells.flags.writeable
+        assert got.geometry.origin_xy_m == expected.origin
+        assert got.geometry.frame_id == expected.frame
+        assert got.geometry.resolution_m == expected.resolution
+        assert got.geometry.yaw_rad == pytest.approx(expected.yaw)
+        assert got.stamp_ns == expected.stamp_ns
+        assert got.log_time_ns == (START_NS + k * 10**10 if times is None else times[k])
+
+
+MCAP_OPTIONS = {
+    "zstd": {},
+    "lz4": {"compression": CompressionType.LZ4},
+    "uncompressed": {"compression": CompressionType.NONE},
+    "one-chunk": {"chunk_size": 10**7},
+    "unchunked": {"use_chunking": False},
+    "no-index": {"index_types": IndexType.NONE},
+    "no-message-index": {"index_types": IndexType.CHUNK},
+    "no-statistics": {"use_statistics": False},
+    "no-repeated-channels": {"repeat_channels": False},
+    "no-repeated-schemas": {"repeat_schemas": False},
+    "no-summary": {
+        "index_types": IndexType.NONE,
+        "repeat_channels": False,
+        "repeat_schemas": False,
+        "use_statistics": False,
+        "use_summary_offsets": False,
+    },
+    "no-crc": {"enable_crcs": False},
+}
+FORMATS = {
+    "bag": lambda path, log: write_bag(path / "run.bag", log),
+    "bag-lz4": lambda path, log: write_bag(path / "run.bag", log, "LZ4"),
+    "bag-bz2": lambda path, log: write_bag(path / "run.bag", log, "BZ2"),
+    "mcap-ros1": lambda path, log: write_mcap(path / "run.mcap", log, ros=1),
+    **{
+        f"mcap-{name}": lambda path, log, options=options: write_mcap(path / "run.mcap", log, **options)
+        for name, options in MCAP_OPTIONS.items()
+    },
+    **{
+        f"rosbag2-{storage}-{mode}".lower(): lambda path, log, storage=storage, mode=mode: write_rosbag2(
+            path / "run", log, storage, mode
+        )
+        for storage in ("SQLITE3", "MCAP")
+        for mode in ("NONE", "FILE", "MESSAGE")
+    },
+    "rosbag2-mcap-storage": lambda path, log: write_rosbag2(path / "run", log, "MCAP", "STORAGE"),
+    "db3": lambda path, log: write_rosbag2(path / "run", log) / "run.db3",
+}
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_every_format_gives_the_same_maps_and_the_same_description(name, tmp_path):
+    path = FORMATS[name](tmp_path, run_of_maps())
+    with open_log(path) as log:
+        assert_are(list(log.snapshots()), growing_maps())
+        assert log.counts.messages == 6
+        assert (log.first().index, log.last().index) == (0, -1)
+        assert_are([log.first()], growing_maps()[:1])
+        np.testing.assert_array_equal(log.last().cells, growing_maps()[-1].cells)
+        assert log.last().log_time_ns == START_NS + 5 * 10**10
+    info = inspect_log(path)
+    assert info == log.info
+    assert (info.start_ns, info.end_ns) == (START_NS, START_NS + 5 * 10**10 + 10**9)
+    assert info.duration_s == 51
+    assert [(topic.name, topic.message_count, topic.is_map) for topic in info.topics] == [
+        ("/chatter", 6, False),
+        ("/map", 6, True),
+    ]
+    ros1 = ("bag-" in name + "-" and "rosbag2" not in name) or name == "mcap-ros1"
+    assert info.topics[1].encoding == ("ros1" if ros1 else "cdr")
+    assert info.topics[1].message_type == ("nav_msgs/OccupancyGrid" if ros1 else "nav_msgs/msg/OccupancyGrid")
+    files = [path] if path.is_file() else list(path.iterdir())
+    assert info.size_bytes == sum(file.stat().st_size for file in files)
+
+
+@pytest.mark.parametrize("name", ["bag", "mcap-zstd", "rosbag2-sqlite3-none"])
+def test_a_rotated_and_moving_map_keeps_its_place(name, tmp_path):
+    maps = [
+        Map(np.full((4, 5), k, np.int8), origin=(k * 0.5, -k), yaw=k - 1.5, resolution=0.1 / (k + 1))
+        for k in range(3)
+    ]
+    path = FORMATS[name](tmp_path, [("/map", START_NS + k * 10**10, each) for k, each in enumerate(maps)])
+    snapshots = read(path)
+    assert [each.geometry.yaw_rad for each in snapshots] == pytest.approx([-1.5, -0.5, 0.5])
+    assert [each.geometry.origin_xy_m for each in snapshots] == [(0.0, 0.0), (0.5, -1.0), (1.0, -2.0)]
+    assert [each.geometry.resolution_m for each in snapshots] == pytest.approx([0.1, 0.05, 0.1 / 3])
+
+
+@pytest.mark.parametrize("name", ["mcap-one-chunk", "mcap-unchunked", "mcap-zstd", "bag", "db3"])
+def test_maps_come_in_the_order_of_log_time_whatever_the_order_in_the_file(name, tmp_path):
+    log = run_of_maps()
+    shuffled = [log[k] for k in (6, 2, 0, 10, 4, 8)]
+    assert_are(read(FORMATS[name](tmp_path, shuffled)), growing_maps())
+
+
+def test_channels_of_other_encodings_beside_the_map_do_no_harm(tmp_path):
+    log = McapLog(tmp_path / "mixed.mcap")
+    log.raw("/pose", START_NS - 5, ("foxglove.Pose", "protobuf", SCHEMA), "protobuf", b"\x0a\x00")
+    log.raw("/status", START_NS - 4, ("Status", "jsonschema", b"{}"), "json", b'{"ok": true}')
+    log.raw("/binary", START_NS - 3, ("Blob", "flatbuffer", bytes(range(256))), "flatbuffer", b"\xff\xfe")
+    for topic, time, message in run_of_maps():
+        log.add(topic, time, message, ros=1 if topic == "/chatter" else 2)
+    path = log.close()
+    assert_are(read(path), growing_maps())
+    assert {topic.name: topic.encoding for topic in inspect_log(path).topics} == {
+        "/binary": "flatbuffer", "/chatter": "ros1", "/map": "cdr", "/pose": "protobuf", "/status": "json",
+    }  # fmt: skip
+
+
+def test_a_ros2_bag_directory_may_hold_foreign_channels_too(tmp_path):
+    bag = write_rosbag2(tmp_path / "run", run_of_maps(), "MCAP")
+    log = McapLog(bag / "run.mcap")
+    log.raw("/status", START_NS, ("Status", "jsonschema", b"{}"), "json", b"{}")
+    for topic, time, message in run_of_maps():
+        log.add(topic, time, message)
+    log.close()
+    assert_are(read(bag), growing_maps())
+
+
+def test_foxglove_grids_and_nav2_costmaps_in_mcap_are_maps(tmp_path):
+    log = McapLog(tmp_path / "run.mcap")
+    schema = ("foxglove.Grid", "protobuf", SCHEMA)
+    grid = foxglove_message(np.array([[0, 100], [255, 7]], np.uint8), 1).SerializeToString()
+    log.raw("/map", START_NS, schema, "protobuf", grid)
+    costs = serialized_costmap(np.array([[0, 254], [255, 1]], np.uint8))
+    log.raw("/costmap_raw", START_NS, ("nav2_msgs/msg/Costmap", "ros2msg", b""), "cdr", costs)
+    path = log.close()
+    assert read(path)[0].cells.tolist() == [[0, 100], [-1, 7]]
+    assert read(path, topic="/costmap_raw")[0].cells.tolist() == [[0, 100], [-1, 1]]
+
+
+def cut(path: Path, share: float) -> Path:
+    data = path.read_bytes()
+    path.write_bytes(data[: int(len(data) * share)])
+    return path
+
+
+@pytest.mark.parametrize("name", ["mcap-zstd", "mcap-uncompressed", "mcap-unchunked", "mcap-ros1"])
+@pytest.mark.parametrize("share", [0.999, 0.6, 0.3])
+def test_a_cut_off_mcap_gives_the_maps_that_are_whole_and_says_so(name, share, tmp_path, caplog):
+    # Large enough maps that the cut lies among them, not in the summary.
+    maps = [
+        Map(np.random.default_rng(k).integers(-1, 101, (60, 80)), stamp_ns=START_NS + k) for k in range(8)
+    ]
+    log = [("/map", START_NS + k * 10**10, each) for k, each in enumerate(maps)]
+    path = cut(FORMATS[name](tmp_path, log), share)
+    snapshots = read(path)
+    assert 1 <= len(snapshots) <= 8
+    assert share < 0.99 or len(snapshots) == 8
+    assert_are(snapshots, maps[: len(snapshots)])
+    assert not inspect_log(path).indexed
+    # A cut in the summary costs nothing but the index.
+    assert (len(snapshots) == 8) or f"{path}: cut off" in caplog.text
+
+
+def flip(path: Path, at: int) -> None:
+    data = bytearray(path.read_bytes())
+    data[at] ^= 0xFF
+    path.write_bytes(data)
+
+
+def noisy_run() -> tuple[list[Map], list]:
+    """Maps that do not compress, so that a place in the file is a place in a map."""
+    maps = [
+        Map(np.random.default_rng(k).integers(-1, 101, (60, 80)), stamp_ns=START_NS + k) for k in range(5)
+    ]
+    return maps, [("/map", START_NS + k * 10**10, each) for k, each in enumerate(maps)]
+
+
+@pytest.mark.parametrize(
+    # The other formats carry no checksum that would tell.
+    "name",
+    ["mcap-zstd", "mcap-lz4", "mcap-uncompressed", "bag-bz2"],
+)
+def test_a_flipped_byte_costs_the_maps_around_it_and_is_counted(name, tmp_path, caplog):
+    maps, messages = noisy_run()
+    path = FORMATS[name](tmp_path, messages)
+    file = path if path.is_file() else path / "run.db3"
+    data = file.read_bytes()
+    at = len(data) // 2
+    if name == "mcap-uncompressed":
+        at = data.index(serialized(maps[2], 2)[-2000:-1000])
+    flip(file, at)
+    with open_log(path) as log:
+        snapshots = list(log.snapshots())
+        assert log.counts.damaged == 1
+        assert log.counts.messages == 5 == len(snapshots) + log.counts.damaged
+        np.testing.assert_array_equal(log.last().cells, maps[-1].cells)
+    whole = {each.cells.tobytes() for each in snapshots}
+    assert whole <= {each.cells.astype(np.int8).tobytes() for each in maps}
+    assert "damaged" in caplog.text
+    assert "/map" in caplog.text
+
+
+def test_without_index_a_damaged_chunk_is_left_out_and_said(tmp_path, caplog):
+    _maps, messages = noisy_run()
+    path = FORMATS["mcap-no-summary"](tmp_path, messages)
+    flip(path, path.stat().st_size // 2)
+    assert len(read(path)) == 4
+    assert "1 damaged" in caplog.text
+
+
+def test_when_all_maps_are_damaged_the_reading_fails_and_says_so(tmp_path):
+    _, messages = noisy_run()
+    path = FORMATS["mcap-zstd"](tmp_path, messages[:1])
+    flip(path, path.stat().st_size // 2)
+    with open_log(path) as log:
+        for reading in (lambda: list(log.snapshots()), log.first, log.last):
+            with pytest.raises(LogError, match="1 messages are damaged"):
+                reading()
+
+
+def test_the_last_map_and_a_time_range_are_reached_past_damage_that_is_never_read(tmp_path, caplog):
+    maps, messages = noisy_run()
+    path = FORMATS["mcap-uncompressed"](tmp_path, messages)
+    data = path.read_bytes()
+    for each in maps[1:3]:
+        flip(path, data.index(serialized(each, 2)[-2000:-1000]))
+    selection = Selection(start_ns=START_NS + 3 * 10**10)
+    with open_log(path, selection=selection) as log:
+        assert_are(list(log.snapshots()), maps[3:], [START_NS + 3 * 10**10, START_NS + 4 * 10**10])
+    with open_log(path, selection=Selection(max_snapshots=2)) as log:
+        assert_are(list(log.snapshots()), [maps[0], maps[4]], [START_NS, START_NS + 4 * 10**10])
+        assert log.counts.skipped == 3
+        log.first()
+        log.last()
+    assert caplog.text == "", "the damaged maps were read"
+
+
+@pytest.mark.parametrize("name", ["bag", "mcap-zstd", "rosbag2-sqlite3-none"])
+def test_an_invalid_map_names_the_file_the_message_and_the_topic(name, tmp_path):
+    log = [
+        ("/map", START_NS, growing_maps(1)[0]),
+        ("/map", START_NS + 1, Map(np.zeros((2, 2)), resolution=-1)),
+    ]
+    path = FORMATS[name](tmp_path, log)
+    with open_log(path) as reader, pytest.raises(InvalidMapError) as caught:
+        list(reader.snapshots())
+    assert f"{path}: message 2 of 2 on /map: the map's resolution is -1.0" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_several_files_are_read_as_one_log(tmp_path):
+    log = run_of_maps()
+    halves = [log[:6], log[6:]]
+    for suffix, write in ((".mcap", write_mcap), (".bag", write_bag)):
+        files = [write(tmp_path / f"part{k}{suffix}", half) for k, half in enumerate(halves)]
+        # The order of the files is not that of time.
+        assert_are(read(files[::-1]), growing_maps())
+        assert_are(read(str(tmp_path / f"part*{suffix}")), growing_maps())
+        assert inspect_log(files).topics[1].message_count == 6
+    files = [
+        shutil.copy(write_rosbag2(tmp_path / f"bag{k}", half) / f"bag{k}.db3", tmp_path)
+        for k, half in enumerate(halves)
+    ]
+    assert_are(read(files), growing_maps())
+    with pytest.raises(LogError, match="different kinds"):
+        open_log([tmp_path / "part0.mcap", tmp_path / "part1.bag"])
+
+
+@pytest.mark.parametrize("storage", ["SQLITE3", "MCAP"])
+def test_a_split_ros2_bag_is_read_through_all_its_files(storage, tmp_path):
+    log = run_of_maps()
+    bag = write_rosbag2(tmp_path / "run", log[:6], storage)
+    second = write_rosbag2(tmp_path / "second", log[6:], storage)
+    suffix = "db3" if storage == "SQLITE3" else "mcap"
+    shutil.move(second / f"second.{suffix}", bag / f"run_1.{suffix}")
+    metadata = (bag / "metadata.yaml").read_text()
+    entry = f"- run.{suffix}\n"
+    indent = metadata[: metadata.index(entry)].rsplit("\n", 1)[1]
+    (bag / "metadata.yaml").write_text(metadata.replace(entry, f"{entry}{indent}- run_1.{suffix}\n", 1))
+    assert_are(read(bag), growing_maps())
+    (bag / f"run_1.{suffix}").unlink()
+    with pytest.raises(LogError, match=f"run_1.{suffix}"):
+        open_log(bag)
+
+
+@pytest.mark.parametrize("storage", ["SQLITE3", "MCAP"])
+def test_a_ros2_bag_whose_recorder_died_before_writing_metadata_is_read_all_the_same(storage, tmp_path):
+    bag = write_rosbag2(tmp_path / "run", run_of_maps(), storage)
+    (bag / "metadata.yaml").unlink()
+    assert_are(read(bag), growing_maps())
+
+
+def test_the_topic_is_the_one_asked_for_else_map_else_the_only_one(tmp_path):
+    first, second, third = growing_maps(3)
+    both = [("/map", START_NS, first), ("/costmap", START_NS, second), ("/empty_map", START_NS, Text(""))]
+    path = write_mcap(tmp_path / "both.mcap", both)
+    for asked, topic, expected in ((None, "/map", first), ("costmap", "/costmap", second)):
+        with open_log(path, topic=asked) as log:
+            assert log.topic == topic
+            assert_are(list(log.snapshots()), [expected])
+    with open_log(write_bag(tmp_path / "one.bag", [("/grid", START_NS, third)])) as log:
+        assert log.topic == "/grid"
+    several = [("/a", START_NS, first), ("/b", START_NS, second)]
+    with pytest.raises(NoMapTopicError, match="choose one: /a, /b"):
+        open_log(write_rosbag2(tmp_path / "several", several))
+    with pytest.raises(NoMapTopicError, match=r"/other is not .* its map topics are /costmap, /map"):
+        open_log(path, topic="/other")
+
+
+def test_a_log_without_maps_can_be_inspected_but_not_opened(tmp_path):
+    path = write_mcap(tmp_path / "talk.mcap", [("/chatter", START_NS, Text("hello"))])
+    assert [topic.name for topic in inspect_log(path).topics] == ["/chatter"]
+    with pytest.raises(NoMapTopicError, match=r"no topic holds occupancy grids .* std_msgs/msg/String"):
+        open_log(path)
+    empty = write_mcap(tmp_path / "empty.mcap", [])
+    info = inspect_log(empty)
+    assert (info.start_ns, info.duration_s, info.topics) == (None, 0, ())
+    with pytest.raises(NoMapTopicError):
+        open_log(empty)
+
+
+def test_a_map_topic_on_which_nothing_was_recorded_is_said_to_be_empty(tmp_path):
+    bag = write_bag(tmp_path / "run.bag", [("/map_updates", START_NS, Update(0, 0, np.zeros((1, 1))))])
+    with pytest.raises(NoMapTopicError):
+        open_log(bag)
+    log = [("/map", START_NS, growing_maps(1)[0])]
+    path = write_rosbag2(tmp_path / "run", log)
+    with sqlite3.connect(path / "run.db3") as database:
+        database.execute("DELETE FROM messages")
+    with pytest.raises(NoMapTopicError, match="no message was recorded on the map topics /map"):
+        open_log(path / "run.db3")
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "match"),
+    [
+        ("missing.bag", None, "no such file"),
+        ("empty.mcap", b"", "is empty"),
+        ("text.mcap", b"just some text", "does not begin as .mcap"),
+        ("text.bag", b"just some text", "does not begin as .bag"),
+        ("text.db3", b"just some text", "does not begin as .db3"),
+        ("short.bag", b"#ROSBAG V2.0\n", "cannot be read as a bag"),
+        ("short.mcap", b"\x89MCAP0\r\n", None),
+        ("short.db3", b"SQLite format 3\0", "cannot be read as a bag"),
+        ("laser.log", b"FLASER 1 2 3", "not a kind of log"),
+        ("map.yaml", b"- a list", "does not describe a map"),
+        ("map.pgm", b"P5 1 1 255 \0", "map.yaml beside it"),
+    ],
+)
+def test_what_is_no_log_ends_with_one_line_that_names_the_file(name, content, match, tmp_path):
+    path = tmp_path / name
+    if content is not None:
+        path.write_bytes(content)
+    with (
+        pytest.raises(LogError if "yaml" not in name else Exception, match=match) as caught,
+        open_log(path) as log,
+    ):
+        list(log.snapshots())
+    assert name in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_directory_that_is_no_log_ends_with_one_line(tmp_path):
+    with pytest.raises(LogError, match="neither a bag"):
+        open_log(tmp_path)
+    (tmp_path / "metadata.yaml").write_text("a: [")
+    with pytest.raises(LogError, match="does not describe a ROS 2 bag"):
+        open_log(tmp_path)
+
+
+def test_a_wrong_suffix_does_not_matter_the_content_does(tmp_path):
+    path = write_mcap(tmp_path / "run.mcap", run_of_maps())
+    assert_are(read(path.rename(tmp_path / "run.bag")), growing_maps())
+
+
+@pytest.mark.parametrize(
+    "name", ["bag", "mcap-zstd", "mcap-unchunked", "rosbag2-sqlite3-none", "rosbag2-mcap-none"]
+)
+def test_random_damage_gives_maps_or_a_known_error_never_a_crash(name, tmp_path):
+    path = FORMATS[name](tmp_path, run_of_maps(3))
+    file = path if path.is_file() else next(each for each in path.iterdir() if each.suffix != ".yaml")
+    whole = file.read_bytes()
+    rng = np.random.default_rng(5)
+    logging.disable(logging.WARNING)
+    try:
+        for _ in range(60):
+            data = bytearray(whole)
+            for at in rng.integers(0, len(data), 8):
+                data[at] = rng.integers(256)
+            file.write_bytes(data)
+            with contextlib.suppress(LogError, InvalidMapError):
+                assert len(read(path)) <= 3
+    finally:
+        logging.disable(logging.NOTSET)
+
+
+def test_importing_the_readers_loads_no_format_library():
+    code = (
+        "import sys, rose2_logs.readers\n"
+        "heavy = ('rosbags', 'mcap', 'apsw', 'google', 'PIL', 'yaml')\n"
+        "print([name for name in heavy if name in sys.modules])"
+    )
+    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert out.strip() == "[]"
+
+
+@needs_shared
+def test_the_three_forms_of_a_real_log_are_identical_and_equal_the_benchmark_maps():
+    from PIL import Image
+
+    forms = [
+        read(SHARED / "bags" / name) for name in ("fr79.bag", "fr79.ros2_mcap", "fr79.ros2_sqlite3_zstd")
+    ]
+    assert len(forms[0]) == 13
+    for other in forms[1:]:
+        for one, two in zip(forms[0], other, strict=True):
+            np.testing.assert_array_equal(one.cells, two.cells)
+            assert one.geometry == two.geometry
+            assert (one.index, one.log_time_ns, one.stamp_ns, one.topic) == (
+                two.index, two.log_time_ns, two.stamp_ns, two.topic,
+            )  # fmt: skip
+    for k, snapshot in enumerate(forms[0]):
+        image = np.asarray(
+            Image.open(SHARED / "benchmark" / "incremental_fr79" / f"map{k + 3:02}.png").convert("L")
+        )
+        expected = np.select([image == 254, image == 0], [0, 100], -1)
+        np.testing.assert_array_equal(snapshot.cells, expected[::-1])
+
+
+@needs_shared
+def test_a_real_canvas_that_moves_and_grows_stays_in_place_in_the_world():
+    snapshots = read(SHARED / "bags" / "intel.ros2_mcap")
+    assert len(snapshots) == 22
+    assert len({each.geometry.shape for each in snapshots}) > 1
+    assert len({each.geometry.origin_xy_m for each in snapshots}) > 1
+    for before, now in itertools.pairwise(snapshots):
+        # Most walls of one map are walls of the next one, within two cells of the same place in the world;
+        # the mapper's corrections move the others.
+        rows, columns = np.nonzero(before.cells == 100)
+        walls = binary_dilation(now.cells == 100, np.ones((3, 3)), iterations=2)
+        there = now.geometry.world_to_cell(before.geometry.cell_centres(rows, columns))
+        assert walls[there[:, 0], there[:, 1]].mean() > 0.5
+
+
+@needs_shared
+@pytest.mark.parametrize("name", ["base_cmaps.bag", "base_cmaps_mcap"])
+def test_a_third_party_log_with_two_costmaps_asks_which(name):
+    path = SHARED / "bags" / "third_party" / name
+    topics = [f"/move_base/{which}_costmap/costmap" for which in ("global", "local")]
+    with pytest.raises(NoMapTopicError, match=", ".join(topics)):
+        open_log(path)
+    sizes = [read(path, topic=topic)[0].geometry.shape for topic in topics]
+    assert sizes[0] != sizes[1]
+
+
+@needs_shared
+@pytest.mark.parametrize("name", ["grid_map.bag", "no_map_cartographer.bag"])
+def test_a_third_party_log_without_maps_says_so_in_one_line(name):
+    path = SHARED / "bags" / "third_party" / name
+    with pytest.raises(NoMapTopicError, match="no topic holds occupancy grids") as caught:
+        open_log(path)
+    assert "\n" not in str(caught.value)
+    assert inspect_log(path).topics

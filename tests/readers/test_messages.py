@@ -1,0 +1,288 @@
+"""Map messages decoded from bytes that rosbags and protobuf wrote."""
+
+import math
+
+import numpy as np
+import pytest
+from google.protobuf import descriptor_pb2, descriptor_pool, message_factory, timestamp_pb2
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from reader_logs import START_NS, Map, Update, serialized, serialized_costmap, typestore
+
+from rose2_logs.errors import InvalidMapError
+from rose2_logs.readers.messages import Grid, Patch, decoder
+
+GRID = "nav_msgs/msg/OccupancyGrid"
+ENCODINGS = {1: "ros1", 2: "cdr"}
+
+
+def decode(data: bytes, message_type: str = GRID, encoding: str = "cdr", schema: bytes = b""):
+    found = decoder(message_type, encoding, schema)
+    assert found is not None
+    return found(memoryview(data))
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    ros=st.sampled_from([1, 2]),
+    little_endian=st.booleans(),
+    shape=st.tuples(st.integers(1, 5), st.integers(1, 7)),
+    frame=st.text(st.characters(exclude_characters="\0", exclude_categories=["Cs"]), max_size=9),
+    yaw=st.floats(-3.1, 3.1),
+    origin=st.tuples(st.floats(-1e4, 1e4), st.floats(-1e4, 1e4)),
+    resolution=st.sampled_from([0.01, 0.025, 0.05, 0.1, 1.0]),
+    stamp_ns=st.integers(0, 2**31 * 10**9 - 1),
+    seed=st.integers(0, 9),
+)
+def test_a_grid_of_either_ros_and_byte_order_comes_back_as_it_was_written(
+    ros, little_endian, shape, frame, yaw, origin, resolution, stamp_ns, seed
+):
+    cells = np.random.default_rng(seed).integers(-1, 101, shape).astype(np.int8)
+    written = Map(cells, resolution, origin, yaw, frame, stamp_ns)
+    grid = decode(serialized(written, ros, little_endian), encoding=ENCODINGS[ros])
+    assert isinstance(grid, Grid)
+    np.testing.assert_array_equal(grid.cells, cells)
+    assert grid.cells.dtype == np.int8
+    assert grid.cells.flags.c_contiguous
+    geometry = grid.geometry
+    assert (grid.stamp_ns, geometry.frame_id, geometry.origin_xy_m) == (stamp_ns, frame, origin)
+    assert geometry.resolution_m == resolution, "the nearest short decimal of the single-precision field"
+    assert math.isclose(geometry.yaw_rad, yaw, abs_tol=1e-12)
+
+
+@pytest.mark.parametrize("ros", [1, 2])
+def test_the_cells_are_a_view_of_the_message_not_a_copy(ros):
+    data = bytearray(serialized(Map(np.zeros((2, 3))), ros))
+    grid = decode(data, encoding=ENCODINGS[ros])
+    data[-1] = 42
+    assert grid.cells[-1, -1] == 42
+
+
+@pytest.mark.parametrize("ros", [1, 2])
+def test_a_message_cut_anywhere_is_an_invalid_map_and_nothing_else(ros):
+    data = serialized(Map(np.zeros((2, 3))), ros)
+    for length in range(len(data)):
+        with pytest.raises(InvalidMapError):
+            decode(data[:length], encoding=ENCODINGS[ros])
+
+
+@pytest.mark.parametrize(
+    ("width", "height"), [(4, 3), (2, 2), (2**32 - 1, 2**32 - 1), (0, 5)], ids=["4x3", "2x2", "huge", "0x5"]
+)
+def test_a_size_that_is_not_that_of_the_data_is_an_error(width, height):
+    store = typestore(2)
+    message = store.deserialize_cdr(serialized(Map(np.zeros((2, 3))), 2), GRID)
+    message.info.width, message.info.height = width, height
+    with pytest.raises(InvalidMapError, match=f"{width} x {height} cells, but its data has 6"):
+        decode(bytes(store.serialize_cdr(message, GRID)))
+
+
+def test_a_grid_without_cells_is_no_map_and_its_zero_resolution_no_error():
+    assert decode(serialized(Map(np.zeros((0, 0)), resolution=0.0), 2)) is None
+
+
+@pytest.mark.parametrize("resolution", [0.0, -0.05, math.nan, math.inf])
+def test_a_resolution_that_is_no_positive_number_is_an_error(resolution):
+    with pytest.raises(InvalidMapError, match="resolution"):
+        decode(serialized(Map(np.zeros((2, 3)), resolution=resolution), 2))
+
+
+@pytest.mark.parametrize("origin", [(math.nan, 0.0), (0.0, math.inf)])
+def test_an_origin_that_is_not_finite_is_an_error(origin):
+    with pytest.raises(InvalidMapError, match="origin"):
+        decode(serialized(Map(np.zeros((2, 3)), origin=origin), 2))
+
+
+@pytest.mark.parametrize(
+    ("quaternion", "yaw"),
+    [((0, 0, 0, 0), 0.0), ((0, 0, 2, 2), math.pi / 2), ((0, 0, -1, 1e-9), -math.pi), ((0, 0, 0, -1), 0.0)],
+    ids=["left unset", "not of length 1", "half a turn", "negative"],
+)
+def test_any_quaternion_about_z_gives_its_yaw(quaternion, yaw):
+    store = typestore(2)
+    message = store.deserialize_cdr(serialized(Map(np.zeros((2, 3))), 2), GRID)
+    turn = message.info.origin.orientation
+    turn.x, turn.y, turn.z, turn.w = map(float, quaternion)
+    grid = decode(bytes(store.serialize_cdr(message, GRID)))
+    difference = grid.geometry.yaw_rad - yaw
+    assert abs(math.remainder(difference, 2 * math.pi)) < 1e-6
+
+
+def test_values_outside_the_range_of_occupancy_count_as_unknown():
+    cells = np.array([[-128, -2, -1, 0, 100, 101, 127]], np.int8)
+    assert decode(serialized(Map(cells), 2)).cells.tolist() == [[-1, -1, -1, 0, 100, -1, -1]]
+
+
+def test_bytes_that_are_not_cdr_are_an_error():
+    with pytest.raises(InvalidMapError, match="CDR"):
+        decode(b"\x00\x09\x00\x00" + bytes(100))
+
+
+@pytest.mark.parametrize("ros", [1, 2])
+def test_a_patch_comes_back_with_its_place_and_values(ros):
+    cells = np.array([[1, 2, 3], [4, 5, -1]], np.int8)
+    data = serialized(Update(5, 7, cells), ros)
+    patch = decode(data, "map_msgs/OccupancyGridUpdate", ENCODINGS[ros])
+    assert isinstance(patch, Patch)
+    assert (patch.row, patch.column, patch.stamp_ns) == (7, 5, START_NS)
+    np.testing.assert_array_equal(patch.cells, cells)
+
+
+def test_costs_of_nav2_become_percent_in_their_order():
+    costs = np.arange(256, dtype=np.uint8).reshape(16, 16)
+    grid = decode(serialized_costmap(costs), "nav2_msgs/msg/Costmap")
+    percent = grid.cells.ravel()
+    assert (percent[0], percent[1], percent[252], percent[253], percent[254], percent[255]) == (
+        0, 1, 98, 99, 100, -1,
+    )  # fmt: skip
+    assert (np.diff(percent[:255].astype(int)) >= 0).all()
+    assert grid.geometry.frame_id == "odom"
+    assert grid.geometry.origin_xy_m == (1.0, 2.0)
+
+
+@pytest.mark.parametrize(
+    ("message_type", "encoding"),
+    [("nav_msgs/msg/OccupancyGrid", "json"), ("sensor_msgs/msg/Image", "cdr"), ("foxglove.Grid", "json")],
+)
+def test_other_types_and_encodings_are_not_maps(message_type, encoding):
+    assert decoder(message_type, encoding) is None
+
+
+# foxglove.Grid, as its public schema lays it out.
+def foxglove_files():
+    number, text, data, message = 1, 9, 12, 11
+    fixed32, enum, repeated = 7, 14, 3
+    files = []
+
+    def add(name, fields, imports=(), enums=()):
+        file = descriptor_pb2.FileDescriptorProto(
+            name=f"foxglove/{name}.proto", package="foxglove", syntax="proto3"
+        )
+        file.dependency.extend(imports)
+        made = file.message_type.add(name=name)
+        for k, (field, kind, type_name, label) in enumerate(fields, 1):
+            made.field.add(name=field, number=k, type=kind, type_name=type_name, label=label)
+        for name_of_enum, values in enums:
+            made_enum = made.enum_type.add(name=name_of_enum)
+            for k, value in enumerate(values):
+                made_enum.value.add(name=value, number=k)
+        files.append(file)
+
+    for name, parts in (("Vector2", "xy"), ("Vector3", "xyz"), ("Quaternion", "xyzw")):
+        add(name, [(part, number, None, 1) for part in parts])
+    add(
+        "Pose",
+        [("position", message, ".foxglove.Vector3", 1), ("orientation", message, ".foxglove.Quaternion", 1)],
+        ["foxglove/Vector3.proto", "foxglove/Quaternion.proto"],
+    )
+    kinds = ["UNKNOWN", "UINT8", "INT8", "UINT16", "INT16", "UINT32", "INT32", "FLOAT32", "FLOAT64"]
+    add(
+        "PackedElementField",
+        [
+            ("name", text, None, 1),
+            ("offset", fixed32, None, 1),
+            ("type", enum, ".foxglove.PackedElementField.NumericType", 1),
+        ],
+        enums=[("NumericType", kinds)],
+    )
+    add(
+        "Grid",
+        [
+            ("timestamp", message, ".google.protobuf.Timestamp", 1),
+            ("frame_id", text, None, 1),
+            ("pose", message, ".foxglove.Pose", 1),
+            ("column_count", fixed32, None, 1),
+            ("cell_size", message, ".foxglove.Vector2", 1),
+            ("row_stride", fixed32, None, 1),
+            ("cell_stride", fixed32, None, 1),
+            ("fields", message, ".foxglove.PackedElementField", repeated),
+            ("data", data, None, 1),
+        ],
+        [
+            "google/protobuf/timestamp.proto",
+            "foxglove/Pose.proto",
+            "foxglove/Vector2.proto",
+            "foxglove/PackedElementField.proto",
+        ],
+    )
+    timestamp = descriptor_pb2.FileDescriptorProto()
+    timestamp_pb2.DESCRIPTOR.CopyToProto(timestamp)
+    return [timestamp, *files]
+
+
+# Imports come after what needs them: writers promise no order.
+SCHEMA = descriptor_pb2.FileDescriptorSet(file=foxglove_files()[::-1]).SerializeToString()
+
+
+def foxglove_message(values, kind, *, name="occupancy", padding=0):
+    pool = descriptor_pool.DescriptorPool()
+    for file in foxglove_files():
+        pool.Add(file)
+    grid = message_factory.GetMessageClass(pool.FindMessageTypeByName("foxglove.Grid"))()
+    grid.timestamp.seconds, grid.timestamp.nanos, grid.frame_id = 12, 34, "odom"
+    grid.pose.position.x, grid.pose.position.y = 1.5, -2.5
+    grid.pose.orientation.z, grid.pose.orientation.w = math.sin(0.2), math.cos(0.2)
+    grid.column_count, grid.cell_size.x, grid.cell_size.y = values.shape[1], 0.1, 0.1
+    cell = values.itemsize + padding
+    grid.cell_stride, grid.row_stride = cell, values.shape[1] * cell + padding
+    grid.fields.add(name=name, offset=padding, type=kind)
+    rows = np.zeros((values.shape[0], grid.row_stride), np.uint8)
+    for k in range(values.shape[1]):
+        at = k * cell + padding
+        rows[:, at : at + values.itemsize] = np.ascontiguousarray(values[:, k : k + 1]).view(np.uint8)
+    grid.data = rows.tobytes()
+    return grid
+
+
+@pytest.mark.parametrize("padding", [0, 3])
+@pytest.mark.parametrize(
+    ("dtype", "kind", "values", "expected"),
+    [
+        ("u1", 1, [[0, 50, 100], [255, 101, 7]], [[0, 50, 100], [-1, -1, 7]]),
+        ("i1", 2, [[0, 50, 100], [-1, 101, 7]], [[0, 50, 100], [-1, -1, 7]]),
+        ("<i4", 6, [[0, 50, 100], [-1, 1000, 7]], [[0, 50, 100], [-1, -1, 7]]),
+        ("<f4", 7, [[0, 0.5, 1], [math.nan, -1, 0.07]], [[0, 50, 100], [-1, -1, 7]]),
+    ],
+)
+def test_a_foxglove_grid_of_one_channel_becomes_percent(padding, dtype, kind, values, expected):
+    message = foxglove_message(np.array(values, dtype), kind, padding=padding)
+    grid = decode(message.SerializeToString(), "foxglove.Grid", "protobuf", SCHEMA)
+    assert grid.cells.tolist() == expected
+    assert grid.cells.dtype == np.int8
+    assert grid.cells.flags.c_contiguous
+    assert grid.stamp_ns == 12_000_000_034
+    assert grid.geometry.origin_xy_m == (1.5, -2.5)
+    assert (grid.geometry.resolution_m, grid.geometry.frame_id) == (0.1, "odom")
+    assert math.isclose(grid.geometry.yaw_rad, 0.4)
+
+
+def two_channels(grid):
+    grid.fields.add(name="height", offset=0, type=1)
+    grid.fields[0].name = "cost"
+
+
+@pytest.mark.parametrize(
+    ("spoil", "match"),
+    [
+        (lambda grid: setattr(grid.cell_size, "y", 0.2), "square"),
+        (lambda grid: grid.ClearField("fields"), "channels are none"),
+        (two_channels, "channels are cost, height"),
+        (lambda grid: setattr(grid, "row_stride", 4), "do not fit"),
+        (lambda grid: setattr(grid, "column_count", 100), "do not fit"),
+        (lambda grid: setattr(grid.fields[0], "offset", 1), "do not fit"),
+        (lambda grid: setattr(grid.fields[0], "type", 0), "number type"),
+    ],
+    ids=["oblong cells", "no channel", "two channels", "row stride", "columns", "offset", "number type"],
+)
+def test_a_foxglove_grid_that_contradicts_itself_is_an_error(spoil, match):
+    message = foxglove_message(np.zeros((2, 3), np.uint8), 1)
+    spoil(message)
+    with pytest.raises(InvalidMapError, match=match):
+        decode(message.SerializeToString(), "foxglove.Grid", "protobuf", SCHEMA)
+
+
+def test_broken_protobuf_is_an_error():
+    with pytest.raises(InvalidMapError, match="cannot be decoded"):
+        decode(b"\x0a\xff\xff", "foxglove.Grid", "protobuf", SCHEMA)
+    with pytest.raises(InvalidMapError, match="schema"):
+        decoder("foxglove.Grid", "protobuf", b"\x0a\xff\xff")
