@@ -71,6 +71,10 @@ def edge_evidence(
     walls, free : (H, W) bool
         Cells of walls and free cells.
     """
+    if len(lines_m) == 0:
+        nothing = np.zeros(len(edges_m))
+        length = np.hypot(edges_m[:, 2] - edges_m[:, 0], edges_m[:, 3] - edges_m[:, 1])
+        return EdgeEvidence(nothing, nothing, length, nothing)
     line, step_m, is_wall, is_free = _read_lines(lines_m, walls, free, resolution_m, parameters)
     offset = np.concatenate([[0], np.cumsum(np.bincount(line, minlength=len(lines_m)))])
     owner, start, end = _place_edges(edges_m, lines_m)

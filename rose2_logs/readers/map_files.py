@@ -137,11 +137,11 @@ def _cells(
             f"{path}: free_thresh {free_below} must lie below occupied_thresh {occupied_above}, both in 0..1"
         )
     # Rounded, so that a pixel that stands for a threshold exactly is found on it.
-    occupancy = np.round((shade if negate else 1 - shade).astype(float), 6)
+    occupancy: NDArray[np.float64] = np.round((shade if negate else 1 - shade).astype(float), 6)
     if mode == "scale":
-        cells = np.round((occupancy - free_below) / (occupied_above - free_below) * 100)
-        cells = np.where(occupancy < free_below, 0, np.where(occupancy > occupied_above, 100, cells))
-        return (cells if opaque is None else np.where(opaque, cells, UNKNOWN)).astype(np.int8)
+        percent = np.round((occupancy - free_below) / (occupied_above - free_below) * 100)
+        percent = np.where(occupancy < free_below, 0, np.where(occupancy > occupied_above, 100, percent))
+        return (percent if opaque is None else np.where(opaque, percent, UNKNOWN)).astype(np.int8)
     unknown = ~opaque if opaque is not None else np.zeros(shade.shape, np.bool_)
     saved_as_unknown = np.round(shade * 255) == SAVED_UNKNOWN
     if (

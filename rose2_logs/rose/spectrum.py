@@ -12,6 +12,9 @@ from scipy import fft, ndimage, signal
 from rose2_logs.occupancy import BoolArray, FloatArray
 from rose2_logs.parameters import SpectrumParameters
 
+REFINE_STEPS = 13
+"""Angles tried in each of the two steps; the second is six times finer than the first."""
+
 
 @dataclass(frozen=True, eq=False)
 class Spectrum:
@@ -119,3 +122,37 @@ def dominant_directions(energy: FloatArray, parameters: SpectrumParameters) -> t
     directions = np.mod((peaks - bins + shift) * np.pi / bins, np.pi)
     order = np.lexsort((directions, -centre))
     return directions[order], centre[order]
+
+
+def refined_directions(
+    directions_rad: FloatArray, occupied: BoolArray, resolution_m: float, parameters: SpectrumParameters
+) -> FloatArray:
+    """Turn each direction to where the spectrum is strongest nearby, without the lattice of the transform.
+
+    By the projection-slice theorem the power along a ray of the spectrum is that of the cells projected onto
+    the ray, so the sum of squares of the projection's histogram is read at any angle, in two finer steps.
+
+    Returns
+    -------
+    directions_rad : (D,) float
+        In [0, pi), in the order given.
+    """
+    row, column = np.nonzero(occupied)
+    step = max(1, len(row) // parameters.refine_max_cells)
+    x, y = column[::step] * resolution_m, row[::step] * resolution_m
+    width = max(2 * parameters.wall_sigma_m, resolution_m)
+
+    def power(angle: float) -> float:
+        offset = (y * np.cos(angle) - x * np.sin(angle)) / width
+        counts = np.bincount(np.rint(offset - offset.min()).astype(np.intp))
+        return float(np.square(counts, dtype=float).sum())
+
+    refined = []
+    for direction in directions_rad.tolist():
+        best, reach = direction, parameters.refine_reach_rad
+        for _ in range(2):
+            candidates = best + np.linspace(-1, 1, REFINE_STEPS) * reach
+            best = float(candidates[int(np.argmax([power(angle) for angle in candidates.tolist()]))])
+            reach /= (REFINE_STEPS - 1) / 2
+        refined.append(best % np.pi)
+    return np.array(refined)

@@ -11,7 +11,12 @@ from numpy.typing import NDArray
 from rose2_logs.occupancy import BoolArray, FloatArray
 from rose2_logs.parameters import SpectrumParameters
 from rose2_logs.rose.clean_map import attached_cells, clean_threshold, structure_score
-from rose2_logs.rose.spectrum import angular_energy, compute_spectrum, dominant_directions
+from rose2_logs.rose.spectrum import (
+    angular_energy,
+    compute_spectrum,
+    dominant_directions,
+    refined_directions,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +47,7 @@ def find_structure(
     """
     spectrum = compute_spectrum(occupied, resolution_m, parameters)
     directions, strengths = dominant_directions(angular_energy(spectrum, parameters), parameters)
+    directions = refined_directions(directions, occupied, resolution_m, parameters)
     score = structure_score(spectrum, occupied, directions, parameters)
     threshold = clean_threshold(score, occupied, free_m2, count_segments, parameters)
     clean = occupied & (score >= threshold)

@@ -38,8 +38,8 @@ def split_rooms(
         large = np.flatnonzero(size >= parameters.split_min_area_m2)
         if len(large) == 0:
             break
-        _, first = distinct_labels(part)
-        room_of_part = labels.ravel()[first[large]]
+        present, first = distinct_labels(part)
+        room_of_part = labels.ravel()[first[np.searchsorted(present, large)]]
         rooms, count = np.unique(room_of_part, return_counts=True)
         divided = False
         for room in rooms[count > 1]:

@@ -1,0 +1,115 @@
+"""Stage C: faces, what is seen along edges, grouping, borders, doorways."""
+
+import numpy as np
+import pytest
+import shapely
+
+from rose2_logs.floor_plan.doorways import find_doorways
+from rose2_logs.floor_plan.evidence import EdgeEvidence, edge_evidence
+from rose2_logs.floor_plan.faces import build_faces, rasterise
+from rose2_logs.floor_plan.grouping import group_faces
+from rose2_logs.floor_plan.rooms import outline, settle_borders
+from rose2_logs.parameters import FloorPlanParameters
+
+PARAMETERS = FloorPlanParameters()
+GRID_LINES = np.array([(x, -1, x, 7) for x in (2, 4)] + [(-1, y, 7, y) for y in (1, 3, 5)], float)
+
+
+def test_lines_cut_the_frame_into_faces_that_fill_it():
+    graph = build_faces(GRID_LINES, (0, 0, 6, 6))
+    assert len(graph.polygons) == 12
+    assert shapely.area(graph.polygons).sum() == pytest.approx(36)
+    inner = (graph.edge_faces >= 0).all(1)
+    assert inner.sum() == 3 * 3 + 2 * 4
+    assert (graph.edge_faces[:, 0] >= 0).all()
+
+
+def test_a_line_that_ends_in_the_open_cuts_nothing():
+    graph = build_faces(np.array([(1.0, 1.0, 3.0, 1.0)]), (0, 0, 6, 6))
+    assert len(graph.polygons) == 1
+
+
+def test_a_face_within_a_face_is_a_hole_of_it():
+    square = np.array([(2, 2, 4, 2), (4, 2, 4, 4), (4, 4, 2, 4), (2, 4, 2, 2)], float)
+    graph = build_faces(square, (0, 0, 6, 6))
+    assert sorted(shapely.area(graph.polygons).round(6)) == [4, 32]
+    assert ((graph.edge_faces >= 0).all(1)).sum() == 4
+
+
+def test_painted_faces_cover_every_cell():
+    graph = build_faces(GRID_LINES, (0, 0, 6, 6))
+    painted = rasterise(graph.polygons, np.arange(1, 13, dtype=np.int32), (120, 120), 0.05)
+    assert (painted > 0).all()
+    sizes = np.bincount(painted.ravel(), minlength=13)[1:] * 0.05**2
+    assert np.allclose(sizes, shapely.area(graph.polygons), rtol=0.1)
+
+
+def test_wall_and_gap_of_an_edge_are_measured_and_a_doorway_is_narrow():
+    walls, free = np.zeros((120, 120), bool), np.ones((120, 120), bool)
+    walls[58:62] = True
+    walls[58:62, 50:70] = False  # a door of 1 m in a wall of 6 m
+    free &= ~walls
+    lines = np.array([(0.0, 3.0, 6.0, 3.0), (3.0, 0.0, 3.0, 6.0)])
+    edges = np.array([(0.0, 3.0, 6.0, 3.0), (3.0, 0.0, 3.0, 2.5)])
+    evidence = edge_evidence(edges, lines, walls, free, 0.05, PARAMETERS)
+    assert evidence.wall_m[0] == pytest.approx(5.0, abs=0.1)
+    assert evidence.open_m[0] == pytest.approx(1.0, abs=0.1)
+    assert evidence.passage_share[0] < PARAMETERS.join_min_passage
+    assert evidence.wall_m[1] == pytest.approx(0.0, abs=0.1)
+    assert evidence.weight[0] == pytest.approx(5 / 6, abs=0.03)
+
+
+def make_evidence(wall, is_open, passage):
+    wall, is_open = np.array(wall, float), np.array(is_open, float)
+    return EdgeEvidence(wall, is_open, wall + is_open, np.array(passage, float))
+
+
+@pytest.mark.parametrize("order", [[0, 1, 2], [2, 1, 0], [1, 2, 0]])
+def test_what_is_open_joins_and_a_door_does_not_in_any_order_of_edges(order):
+    # Faces 0 and 1 are one room cut by a line; 2 lies behind a wall with a door.
+    faces = np.array([(0, 1), (1, 2), (0, 2)], np.int32)[order]
+    evidence = make_evidence(
+        np.array([0, 3, 3])[order], np.array([4, 1, 0])[order], np.array([1, 0.3, 0])[order]
+    )
+    group = group_faces(faces, evidence, np.array([8.0, 8.0, 16.0]), np.full(3, 1.5), PARAMETERS)
+    assert group[0] == group[1] != group[2]
+
+
+def test_a_niche_joins_its_room_and_a_face_that_was_not_seen_takes_no_part():
+    faces = np.array([(0, 1), (0, 2)], np.int32)
+    evidence = make_evidence([0.5, 0], [0.5, 4], [0.4, 1])
+    group = group_faces(faces, evidence, np.array([16.0, 0.5, 0.0]), np.array([2, 0.3, 2]), PARAMETERS)
+    assert group.tolist() == [0, 0, -1]
+
+
+def test_a_strip_along_the_other_side_of_a_wall_changes_room():
+    labels = np.ones((60, 60), np.int32)
+    labels[32:] = 2
+    labels[30, 10:50] = 0  # the wall, with room 1 spilling over to rows 31
+    settled = settle_borders(labels, 0.05, 0.25)
+    assert (settled[31, 15:45] == 2).all()
+    assert (settled[:29] == 1).all()
+    assert ((settled > 0) == (labels > 0)).all()
+
+
+def test_a_doorway_is_found_where_it_was_drawn():
+    labels = np.zeros((40, 80), np.int32)
+    labels[:, :39] = 1
+    labels[:, 40:] = 2
+    labels[10:28, 39] = 1
+    ((rooms, ends),) = find_doorways(labels, 0.05, 0.3)
+    assert rooms == (1, 2)
+    assert np.allclose(ends[:, 0], 2.0, atol=0.05)
+    assert np.linalg.norm(ends[1] - ends[0]) == pytest.approx(0.9, abs=0.1)
+
+
+def test_rooms_that_do_not_touch_have_no_doorway():
+    assert find_doorways(np.array([[1, 0, 2]], np.int32), 0.05, 0.0) == []
+
+
+def test_an_outline_has_the_area_and_the_hole_of_its_cells():
+    mask = np.ones((6, 8), bool)
+    mask[2:4, 3:5] = False
+    shape = outline(mask, 0.5)
+    assert shape.area == pytest.approx(mask.sum() * 0.25)
+    assert shape.bounds == (0, 0, 4, 3)

@@ -1,0 +1,65 @@
+"""Stage A: directions, score, clean map."""
+
+import numpy as np
+import pytest
+from drawn_maps import office
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rose2_logs.parameters import SpectrumParameters
+from rose2_logs.rose.clean_map import attached_cells, clean_threshold, structure_score
+from rose2_logs.rose.spectrum import angular_energy, compute_spectrum, dominant_directions, refined_directions
+
+PARAMETERS = SpectrumParameters()
+
+
+def directions_of(occupied):
+    spectrum = compute_spectrum(occupied, 0.05, PARAMETERS)
+    directions, _ = dominant_directions(angular_energy(spectrum, PARAMETERS), PARAMETERS)
+    return refined_directions(directions, occupied, 0.05, PARAMETERS)
+
+
+def away(one, other):
+    difference = np.abs(one - other) % np.pi
+    return np.minimum(difference, np.pi - difference)
+
+
+@settings(max_examples=12, deadline=None)
+@given(turn=st.floats(0, np.pi))
+def test_the_two_directions_of_a_building_are_found_at_any_angle(turn):
+    directions = directions_of(office(turn_rad=turn)[0] == 100)
+    for true in (turn, turn + np.pi / 2):
+        assert away(directions, true).min() < np.radians(1.0)
+
+
+@pytest.mark.parametrize("occupied", [np.zeros((40, 50), bool), np.ones((1, 1), bool), np.eye(3, dtype=bool)])
+def test_maps_without_structure_give_no_error(occupied):
+    assert np.isfinite(directions_of(occupied)).all()
+
+
+def test_a_long_wall_scores_high_and_a_chair_leg_low_whatever_the_wall_is_thick():
+    occupied = np.zeros((200, 300), bool)
+    occupied[50, 20:280] = occupied[100:106, 20:280] = occupied[150:153, 150:153] = True
+    spectrum = compute_spectrum(occupied, 0.05, PARAMETERS)
+    score = structure_score(spectrum, occupied, np.array([0.0]), PARAMETERS)
+    assert score[50, 100:200].min() > 0.9
+    assert score[100:106, 100:200].min() > 0.7
+    assert score[150:153, 150:153].max() < 0.45
+    assert (score[~occupied] == 0).all()
+
+
+def test_the_threshold_is_the_lowest_that_leaves_few_enough_segments():
+    occupied = np.ones((10, 10), bool)
+    score = np.linspace(0, 1, 100, dtype=np.float32).reshape(10, 10)
+    free_m2 = 40 / PARAMETERS.segments_max_per_m2
+    threshold = clean_threshold(score, occupied, free_m2, lambda clean: int(clean.sum()), PARAMETERS)
+    assert (score >= threshold).sum() <= 40
+    assert (score >= threshold - PARAMETERS.threshold_step).sum() > 40
+
+
+def test_jambs_that_touch_a_wall_are_attached_and_lone_cells_are_not():
+    clean, candidates = np.zeros((5, 9), bool), np.zeros((5, 9), bool)
+    clean[2, :4] = candidates[2, 4:6] = candidates[0, 8] = True
+    attached = attached_cells(clean, candidates)
+    assert attached[2, :6].all()
+    assert attached.sum() == 6

@@ -1,0 +1,96 @@
+"""The Rerun recording, verified and read back by Rerun itself, and looked at in its viewer."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from saved_maps import save_run
+
+from rose2_logs.readers import Selection
+from rose2_logs.run import RunOptions, analyse_log
+
+PROJECT = Path(__file__).parents[2]
+BIN = Path(sys.executable).parent
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory):
+    options = RunOptions(selection=Selection(max_snapshots=8), annotated_log=False)
+    return analyse_log(PROJECT / "sample_logs" / "office.mcap", tmp_path_factory.mktemp("out"), options)
+
+
+@pytest.fixture(scope="module")
+def recording(result):
+    (path,) = [file for file in result.files if file.suffix == ".rrd"]
+    return path
+
+
+def values(recording: Path, entity: str) -> dict[int, float]:
+    """Scalars of an entity by snapshot."""
+    import rerun as rr
+
+    with rr.server.Server(datasets={"run": [str(recording)]}) as server:
+        frame = server.client().get_dataset("run").filter_contents([entity]).reader(index="snapshot")
+        table = frame.to_arrow_table()
+    (column,) = [name for name in table.column_names if name.endswith("Scalars:scalars")]
+    rows = zip(table["snapshot"].to_pylist(), table[column].to_pylist(), strict=True)
+    return {number: value[0] for number, value in rows if value}
+
+
+def test_rerun_finds_the_file_whole(recording):
+    done = subprocess.run(
+        [BIN / "rerun", "rrd", "verify", recording], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_the_logged_values_are_those_of_the_tables(result, recording):
+    snapshots = pq.read_table(result.folder / "snapshots.parquet").to_pylist()
+    coverage = values(recording, "/run/coverage")
+    assert coverage == {row["snapshot"]: pytest.approx(row["coverage"]) for row in snapshots}
+    rooms = pq.read_table(result.folder / "rooms.parquet").to_pylist()
+    track = rooms[-1]["track"]
+    areas = {row["snapshot"]: row["area_m2"] for row in rooms if row["track"] == track}
+    assert values(recording, f"/run/area/{track}") == pytest.approx(areas)
+
+
+def test_a_run_that_fails_leaves_no_recording(tmp_path):
+    from rose2_logs.parameters import Parameters
+    from rose2_logs.sinks.rerun_recording import RerunRecording
+    from rose2_logs.sinks.sink import RunInfo
+
+    path = tmp_path / "run.rrd"
+    info = RunInfo(save_run(tmp_path / "maps"), "/map", "rose2", Parameters(), {}, {})
+    with pytest.raises(RuntimeError, match="stopped"), RerunRecording(path, info):
+        raise RuntimeError("stopped")
+    assert [file.name for file in tmp_path.iterdir()] == ["maps"]
+
+
+@pytest.mark.skipif(
+    not list(Path("/usr/share/vulkan/icd.d").glob("lvp_icd*")),
+    reason="the headless viewer needs a Vulkan driver (mesa-vulkan-drivers)",
+)
+def test_the_viewer_draws_the_rooms_and_reports_no_error(recording, tmp_path):
+    from PIL import Image
+
+    picture = tmp_path / "view.png"
+    tool = PROJECT / "tools" / "screenshot_recording.py"
+    done = subprocess.run(
+        [sys.executable, tool, recording, picture],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+        env={"PATH": f"{BIN}:/usr/bin:/bin", "HOME": str(tmp_path)},
+    )
+    assert done.returncode == 0, done.stderr[-2000:]
+    pixels = np.asarray(Image.open(picture).convert("RGB")).astype(int)
+    view = pixels[100:1000, : pixels.shape[1] // 2]
+    coloured = (view.max(-1) - view.min(-1)) > 40
+    # The map fills a good part of its view and most of it is rooms.
+    assert coloured.mean() > 0.15

@@ -1,0 +1,50 @@
+"""Stage D: rooms whose free space falls apart are split."""
+
+import numpy as np
+
+from rose2_logs.parameters import TopologyParameters
+from rose2_logs.topology.splitting import split_rooms
+from rose2_logs.topology.voronoi import voronoi_graph
+
+PARAMETERS = TopologyParameters()
+NO_LINES = np.zeros((0, 4))
+AXES = np.array([0.0, np.pi / 2])
+
+
+def dumbbell():
+    """One label over two rooms of 4 x 3 m that a gap of 0.3 m connects."""
+    walls = np.zeros((100, 170), bool)
+    walls[:, 84:86] = True
+    walls[47:53, 84:86] = False
+    labels = np.where(walls, 0, 1).astype(np.int32)
+    return labels, walls
+
+
+def test_a_room_that_only_a_narrow_gap_holds_together_is_split_along_a_dominant_direction():
+    labels, walls = dumbbell()
+    split = split_rooms(labels, walls, NO_LINES, AXES, 0.05, PARAMETERS)
+    assert len(np.unique(split[split > 0])) == 2
+    assert len(np.unique(split[:, :80])) == len(np.unique(split[:, 90:])) == 1
+
+
+def test_a_representative_line_that_divides_the_parts_is_where_the_cut_goes():
+    labels, walls = dumbbell()
+    line = np.array([(4.3, 0.0, 4.3, 5.0)])
+    split = split_rooms(labels, walls, line, AXES, 0.05, PARAMETERS)
+    columns = np.flatnonzero(split[50, :-1] != split[50, 1:])
+    assert columns.tolist() == [85]
+
+
+def test_a_room_in_one_piece_stays_whole():
+    labels = np.ones((80, 80), np.int32)
+    split = split_rooms(labels, np.zeros((80, 80), bool), NO_LINES, AXES, 0.05, PARAMETERS)
+    assert (split == labels).all()
+
+
+def test_the_voronoi_graph_runs_in_the_middle_of_a_corridor():
+    labels = np.zeros((40, 200), np.int32)
+    labels[10:30] = 1
+    graph = voronoi_graph(labels, labels == 0, 0.05, 0.25)
+    middle = graph[(graph[:, 1] > 30) & (graph[:, 1] < 170)]
+    assert len(middle) > 100
+    assert np.abs(middle[:, 0] - 19.5).max() <= 1
