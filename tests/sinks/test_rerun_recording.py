@@ -32,14 +32,18 @@ def recording(result):
 
 def values(recording: Path, entity: str) -> dict[int, float]:
     """Scalars of an entity by snapshot."""
-    import rerun as rr
+    from rerun.chunk import RrdReader
 
-    with rr.server.Server(datasets={"run": [str(recording)]}) as server:
-        frame = server.client().get_dataset("run").filter_contents([entity]).reader(index="snapshot")
-        table = frame.to_arrow_table()
-    (column,) = [name for name in table.column_names if name.endswith("Scalars:scalars")]
-    rows = zip(table["snapshot"].to_pylist(), table[column].to_pylist(), strict=True)
-    return {number: value[0] for number, value in rows if value}
+    found = {}
+    for chunk in RrdReader(str(recording)).stream():
+        batch = chunk.to_record_batch()
+        if str(chunk.entity_path) == entity and {"snapshot", "Scalars:scalars"} <= set(batch.schema.names):
+            assert {"coverage", "message_log_time", "ros2_timestamp"} <= set(batch.schema.names)
+            rows = zip(
+                batch.column("snapshot").to_pylist(), batch.column("Scalars:scalars").to_pylist(), strict=True
+            )
+            found |= {number: value[0] for number, value in rows if value}
+    return found
 
 
 def test_rerun_finds_the_file_whole(recording):
