@@ -40,6 +40,8 @@ OUTLINE_WIDTH_M = 0.06
 LINE_WIDTH_M = 0.03
 LABEL_TOLERANCE_M = 0.05
 """A label lies at the deepest point of its room to this."""
+TOUCH_M = 1e-3
+"""How much wider a shape is drawn that cannot be triangulated as it is: far below a cell."""
 ADD, DELETE_ALL = 0, 3
 LINE_STRIP, LINE_LIST, TEXT, TRIANGLES = 4, 5, 9, 11
 
@@ -128,8 +130,7 @@ class MessageMaker:
             zip(frame.track_ids, rooms.polygons, strict=True), key=lambda pair: pair[0]
         ):
             red, green, blue = (value / 255 for value in track_colour(track))
-            triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(shape))
-            corners = shapely.get_coordinates(triangles).reshape(-1, 4, 2)[:, :3].reshape(-1, 2)
+            corners = triangle_corners(shape)
             fill, line = (red, green, blue, FILL_OPACITY), (red * 0.7, green * 0.7, blue * 0.7, 1.0)
             made.append(self._marker(frame, "rooms", track, TRIANGLES, corners, fill, 1.0))
             for number, ring in enumerate(outer_rings(shape)):
@@ -240,6 +241,22 @@ class MessageMaker:
             mesh_file=types["visualization_msgs/msg/MeshFile"](filename="", data=np.zeros(0, np.uint8)),
             mesh_use_embedded_materials=False,
         )
+
+
+def triangle_corners(shape: BaseGeometry) -> NDArray[np.float64]:
+    """Corners (3 K, 2) of triangles that fill a shape, world metres.
+
+    GEOS fails on some outlines of cells in which a ring touches itself at a corner; a hair wider they touch
+    along a line instead, and it does not.
+    """
+    triangles = []
+    for part in shapely.get_parts(shape):
+        try:
+            found = shapely.constrained_delaunay_triangles(part)
+        except shapely.errors.GEOSException:
+            found = shapely.constrained_delaunay_triangles(part.buffer(TOUCH_M, join_style="mitre"))
+        triangles.append(shapely.get_coordinates(shapely.get_parts(found)).reshape(-1, 4, 2)[:, :3])
+    return np.concatenate([np.zeros((0, 2)), *(corners.reshape(-1, 2) for corners in triangles)])
 
 
 def outer_rings(shape: BaseGeometry) -> list[NDArray[np.float64]]:

@@ -10,14 +10,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import shapely
 from mcap.reader import make_reader
 from mcap.writer import Writer
 from rosbags.highlevel import AnyReader
 from saved_maps import save_run
 
 from rose2_logs.errors import OutputError
+from rose2_logs.floor_plan.rooms import outline
 from rose2_logs.run import RunOptions, analyse_log
 from rose2_logs.sinks.annotated_mcap import ADDED, ATTACHMENT, METADATA
+from rose2_logs.sinks.ros_messages import triangle_corners
 
 PROJECT = Path(__file__).parents[2]
 SHARED = PROJECT.parent / "shared" / "bags"
@@ -165,6 +168,15 @@ def test_channels_of_other_encodings_attachments_and_empty_channels_are_kept(tmp
         )
         assert {item.name for item in reader.iter_attachments()} == {"a.txt", ATTACHMENT}
         assert {"site", METADATA} <= {record.name for record in reader.iter_metadata()}
+
+
+def test_triangles_fill_any_outline_of_cells():
+    rng = np.random.default_rng(3)
+    for _ in range(60):
+        shape = outline(rng.random((14, 14)) < rng.uniform(0.3, 0.9), 0.05)
+        corners = triangle_corners(shape).reshape(-1, 3, 2)
+        area = shapely.area(shapely.polygons(corners)).sum()
+        assert area == pytest.approx(shape.area, rel=0.05)
 
 
 def test_an_annotated_log_is_not_annotated_again_and_nothing_is_left_behind(tmp_path):
