@@ -22,6 +22,11 @@ def _number(default: float, unit: str, why: str, low: float = 0.0, high: float =
     return field(default=default, metadata={"unit": unit, "why": why, "low": low, "high": high})
 
 
+def _choice(default: str, choices: tuple[str, ...], why: str) -> Any:
+    """Declare a parameter that takes one of a few names."""
+    return field(default=default, metadata={"unit": "name", "why": why, "choices": choices})
+
+
 @dataclass(frozen=True)
 class OccupancyParameters:
     """Which cells count as occupied and which as free."""
@@ -126,6 +131,14 @@ class FloorPlanParameters:
     shape_min_seen: float = _number(
         0.2, "share", "A face seen this much belongs to its room's predicted shape; the paper's value.", 0, 1
     )
+    grouping: str = _choice(
+        "agglomerative",
+        ("agglomerative", "dbscan"),
+        "How faces are joined to rooms: by whole borders, or pair by pair with DBSCAN as in the paper.",
+    )
+    dbscan_max_weight: float = _number(
+        0.24, "share", "DBSCAN joins faces with edges up to this weight: exp(-w / 0.125) = 0.15.", 0, 1
+    )
     join_min_openness: float = _number(
         0.7, "share", "Faces join when at least this share of their known border is open.", 0, 1
     )
@@ -228,6 +241,8 @@ def _checked(name: str, declared: dataclasses.Field[Any], value: Any) -> Any:
     ):
         raise ParameterError(f"{name} must be of type {kind.__name__}, not {value!r}")
     meta = declared.metadata
+    if "choices" in meta and value not in meta["choices"]:
+        raise ParameterError(f"{name} is {value!r}; it must be one of {', '.join(meta['choices'])}")
     if kind in (int, float) and not (meta["low"] <= value <= meta["high"]):
         raise ParameterError(f"{name} is {value}; it must lie between {meta['low']} and {meta['high']}")
     checked: float | int | bool | str = kind(value)

@@ -7,6 +7,8 @@ from collections import defaultdict
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
+from sklearn.cluster import DBSCAN
 
 from rose2_logs.floor_plan.evidence import EdgeEvidence
 from rose2_logs.occupancy import FloatArray
@@ -23,7 +25,10 @@ def group_faces(
     clearance_m: FloatArray,
     parameters: FloorPlanParameters,
 ) -> NDArray[np.int32]:
-    """Join the two groups with the best connection, again and again, until no connection is good enough.
+    """Join faces that no wall divides.
+
+    By default the two groups with the best connection are joined, again and again, until no connection is
+    good enough; the paper's DBSCAN over pairs of faces is there to compare.
 
     The openness of a border is its open length over its known length, wall or open, taken over the whole
     border between two groups, so that a door in a long wall never joins what the wall divides. The best
@@ -43,6 +48,36 @@ def group_faces(
         0.. for faces with free area, -1 for the others.
     """
     groups = _Groups(edge_faces, evidence, free_m2, clearance_m)
+    if parameters.grouping == "dbscan":
+        _join_by_dbscan(groups, parameters)
+    else:
+        _join_by_whole_borders(groups, parameters)
+    _absorb_small(groups, parameters)
+    return groups.labels()
+
+
+def _join_by_dbscan(groups: _Groups, parameters: FloorPlanParameters) -> None:
+    """Join faces by DBSCAN with the weight of the edges between them as their distance (paper, III-C)."""
+    count = len(groups.alive)
+    pairs = [
+        (a, b, border[1] / (border[0] + border[1]))
+        for a, neighbours in groups.borders.items()
+        for b, border in neighbours.items()
+        if border[0] >= parameters.join_min_open_m
+    ]
+    first, second, weight = np.array(pairs or np.zeros((0, 3))).reshape(-1, 3).T
+    # A distance of nothing would be read as no neighbour by the sparse matrix.
+    distance = csr_matrix((weight + 1e-9, (first.astype(int), second.astype(int))), shape=(count, count))
+    model = DBSCAN(eps=parameters.dbscan_max_weight, min_samples=1, metric="precomputed")
+    cluster = model.fit_predict(distance)
+    for number in np.unique(cluster):
+        members = np.flatnonzero((cluster == number) & groups.alive)
+        for member in members[1:].tolist():
+            groups.join(int(members[0]), member)
+
+
+def _join_by_whole_borders(groups: _Groups, parameters: FloorPlanParameters) -> None:
+    """Join the pair of groups with the best border, as long as there is one that is open enough."""
     heap: list[tuple[float, float, int, int, Border]] = []
 
     def push(a: int, b: int) -> None:
@@ -64,8 +99,6 @@ def group_faces(
             continue
         for c in groups.join(a, b):
             push(a, c)
-    _absorb_small(groups, parameters)
-    return groups.labels()
 
 
 def _absorb_small(groups: _Groups, parameters: FloorPlanParameters) -> None:
@@ -111,8 +144,9 @@ class _Groups:
         self._parent[b] = a
         self.free_m2[a] += self.free_m2[b]
         self.clearance_m[a] = max(self.clearance_m[a], self.clearance_m[b])
-        taken = self.borders.pop(b)
-        del self.borders[a][b], taken[a]
+        taken = self.borders.pop(b, {})
+        self.borders[a].pop(b, None)
+        taken.pop(a, None)
         for c, (open_m, closed_m, passage) in taken.items():
             before = self.borders[a].get(c, (0.0, 0.0, 0.0))
             border = (before[0] + open_m, before[1] + closed_m, max(before[2], passage))

@@ -1,5 +1,7 @@
 """Stage C: faces, what is seen along edges, grouping, borders, doorways."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 import shapely
@@ -64,14 +66,16 @@ def make_evidence(wall, is_open, passage):
     return EdgeEvidence(wall, is_open, wall + is_open, np.array(passage, float))
 
 
+@pytest.mark.parametrize("grouping", ["agglomerative", "dbscan"])
 @pytest.mark.parametrize("order", [[0, 1, 2], [2, 1, 0], [1, 2, 0]])
-def test_what_is_open_joins_and_a_door_does_not_in_any_order_of_edges(order):
+def test_what_is_open_joins_and_a_door_does_not_in_any_order_of_edges(order, grouping):
     # Faces 0 and 1 are one room cut by a line; 2 lies behind a wall with a door.
     faces = np.array([(0, 1), (1, 2), (0, 2)], np.int32)[order]
     evidence = make_evidence(
         np.array([0, 3, 3])[order], np.array([4, 1, 0])[order], np.array([1, 0.3, 0])[order]
     )
-    group = group_faces(faces, evidence, np.array([8.0, 8.0, 16.0]), np.full(3, 1.5), PARAMETERS)
+    parameters = dataclasses.replace(PARAMETERS, grouping=grouping)
+    group = group_faces(faces, evidence, np.array([8.0, 8.0, 16.0]), np.full(3, 1.5), parameters)
     assert group[0] == group[1] != group[2]
 
 
