@@ -79,7 +79,7 @@ class RerunRecording:
                 raise OutputError(f"{self._part.parent}: cannot be written: {error}") from error
             sinks.append(rr.FileSink(str(self._part)))
         if self._live:
-            rr.spawn(connect=False)
+            self._recording.spawn(connect=False)
             sinks.append(rr.GrpcSink())
         self._recording.set_sinks(*sinks)
         self._recording.set_log_time_enabled(False)
