@@ -155,6 +155,14 @@ def classify(
     return free, occupied
 
 
+def known_window(known: BoolArray) -> tuple[slice, slice]:
+    """Rows and columns of the smallest part of a mask that holds all of it; the first cell if it is empty."""
+    rows, columns = np.flatnonzero(known.any(1)), np.flatnonzero(known.any(0))
+    if len(rows) == 0:
+        return slice(0, 1), slice(0, 1)
+    return slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)
+
+
 def distinct_labels(labels: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDArray[np.intp]]:
     """Find the distinct values of a label image and where each comes first in reading order.
 

@@ -22,6 +22,7 @@ from rose2_logs.occupancy import (
     OccupancySnapshot,
     classify,
     distinct_labels,
+    known_window,
 )
 from rose2_logs.parameters import Parameters
 from rose2_logs.rooms import Doorway, RoomMap
@@ -223,10 +224,7 @@ class _Explored:
 
     @classmethod
     def of(cls, known: BoolArray, geometry: GridGeometry) -> _Explored:
-        rows, columns = np.flatnonzero(known.any(1)), np.flatnonzero(known.any(0))
-        if len(rows) == 0:
-            return cls((slice(0, 1), slice(0, 1)), geometry)
-        return cls((slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)), geometry)
+        return cls(known_window(known), geometry)
 
     def points(self, xy_m: FloatArray) -> FloatArray:
         """World positions of points (..., 2) of the window's frame."""

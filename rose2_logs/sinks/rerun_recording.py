@@ -12,7 +12,7 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from rose2_logs.errors import OutputError
-from rose2_logs.occupancy import FloatArray, GridGeometry
+from rose2_logs.occupancy import FloatArray, GridGeometry, known_window
 from rose2_logs.sinks.palette import track_colour
 from rose2_logs.sinks.rerun_blueprint import COVERAGE_UNIT, corners_of, make_blueprint
 from rose2_logs.sinks.ros_messages import label_point, outer_rings
@@ -133,7 +133,7 @@ class RerunRecording:
 
     def _log_map(self, frame: TrackedSnapshot) -> None:
         cells, geometry = frame.snapshot.cells, frame.analysis.geometry
-        window = _known_window(cells)
+        window = known_window(cells >= 0)
         corner = np.array([[window[1].start, window[0].start], [window[1].stop, window[0].stop]], float)
         box = geometry.grid_to_world(
             np.array([corner[0], corner[1], [corner[0, 0], corner[1, 1]], [corner[1, 0], corner[0, 1]]])
@@ -258,13 +258,6 @@ def _shades(cells: NDArray[np.int8]) -> FloatArray:
     """Grey (H, W, 3) of each cell: white free, black occupied, grey unknown."""
     shade = np.where(cells < 0, UNKNOWN_SHADE, 255 * (1 - np.minimum(cells, 100) / 100.0))
     return np.repeat(shade[..., None], 3, axis=2)
-
-
-def _known_window(cells: NDArray[np.int8]) -> tuple[slice, slice]:
-    rows, columns = np.flatnonzero((cells >= 0).any(1)), np.flatnonzero((cells >= 0).any(0))
-    if len(rows) == 0:
-        return slice(0, 1), slice(0, 1)
-    return slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)
 
 
 def _grid_map(
