@@ -60,16 +60,6 @@ class SpectrumParameters:
     direction_min_gap_rad: float = _number(
         math.radians(5.0), "rad", "Directions closer than this are one.", 0.0, 1.5
     )
-    refine_reach_rad: float = _number(
-        math.radians(3.0),
-        "rad",
-        "How far the refinement of a direction looks; the lattice's error.",
-        0.0,
-        0.2,
-    )
-    refine_max_cells: int = _number(
-        20000, "cells", "Occupied cells used to refine a direction; more change nothing.", 100, 10**9
-    )
     structure_length_m: float = _number(
         2.0, "m", "Length of wall over which a cell gathers its score: more than most furniture.", 0.01
     )

@@ -12,9 +12,6 @@ from scipy import fft, ndimage, signal
 from rose2_logs.occupancy import BoolArray, FloatArray
 from rose2_logs.parameters import SpectrumParameters
 
-REFINE_STEPS = 13
-"""Angles tried in each of the two steps; the second is six times finer than the first."""
-
 
 @dataclass(frozen=True, eq=False)
 class Spectrum:
@@ -66,11 +63,10 @@ def _walls_of_one_thickness(occupied: BoolArray, resolution_m: float, sigma_m: f
 
 
 def angular_energy(spectrum: Spectrum, parameters: SpectrumParameters) -> FloatArray:
-    """Amplitude of the spectrum over the direction of the walls that cause it.
+    """Sum the spectrum's magnitude over the direction of the walls that cause it.
 
-    A wall along direction t has its energy on the frequencies perpendicular to t; the power summed over
-    the plane is proportional to the length of the wall. Its square root is returned, an amplitude, so that a
-    long corridor does not hide the short walls of the rooms along it.
+    A wall along direction t has its energy on the frequencies perpendicular to t. The magnitude is unfolded
+    to polar coordinates and summed over the radius, so weighted that each point of the plane counts the same.
 
     Returns
     -------
@@ -78,20 +74,27 @@ def angular_energy(spectrum: Spectrum, parameters: SpectrumParameters) -> FloatA
         Bin b is centred on the wall direction b * pi / B.
     """
     bins = round(np.pi / parameters.angle_step_rad)
-    radius = np.hypot(spectrum.frequency_x, spectrum.frequency_y)
-    use = (radius > 1 / parameters.longest_wave_m) & (radius < 1 / parameters.shortest_wave_m)
-    if not use.any():
+    step_x, step_y = float(spectrum.frequency_x[0, 1]), float(spectrum.frequency_y[1, 0])
+    lowest = 1 / parameters.longest_wave_m
+    highest = min(
+        1 / parameters.shortest_wave_m, float(spectrum.frequency_x.max()), float(spectrum.frequency_y.max())
+    )
+    if highest <= lowest:
         return np.zeros(bins)
-    row, column = np.nonzero(use)
-    angle = np.arctan2(spectrum.frequency_y[row, 0], spectrum.frequency_x[0, column]) + np.pi / 2
-    index = np.rint(angle / np.pi * bins).astype(np.intp) % bins
-    power = np.square(np.abs(spectrum.values[use]))
-    # The columns of a half plane stand for two frequencies each, but for the first.
-    power[column == 0] /= 2
-    energy = np.bincount(index, weights=power, minlength=bins)
-    energy = ndimage.gaussian_filter1d(energy, parameters.angle_sigma_rad / np.pi * bins, mode="wrap")
-    amplitude: FloatArray = np.sqrt(energy)
-    return amplitude
+    radius = np.arange(lowest, highest, min(step_x, step_y))
+    across = np.arange(bins) * np.pi / bins - np.pi / 2
+    magnitude = np.fft.fftshift(np.abs(spectrum.values), axes=0)
+    polar = cv2.remap(
+        magnitude.astype(np.float32),
+        (np.outer(np.cos(across), radius) / step_x).astype(np.float32),
+        (np.outer(np.sin(across), radius) / step_y + len(magnitude) // 2).astype(np.float32),
+        cv2.INTER_LINEAR,
+        borderMode=cv2.BORDER_REPLICATE,
+    )
+    energy: FloatArray = ndimage.gaussian_filter1d(
+        polar.astype(float) @ radius, parameters.angle_sigma_rad / np.pi * bins, mode="wrap"
+    )
+    return energy
 
 
 def dominant_directions(energy: FloatArray, parameters: SpectrumParameters) -> tuple[FloatArray, FloatArray]:
@@ -122,37 +125,3 @@ def dominant_directions(energy: FloatArray, parameters: SpectrumParameters) -> t
     directions = np.mod((peaks - bins + shift) * np.pi / bins, np.pi)
     order = np.lexsort((directions, -centre))
     return directions[order], centre[order]
-
-
-def refined_directions(
-    directions_rad: FloatArray, occupied: BoolArray, resolution_m: float, parameters: SpectrumParameters
-) -> FloatArray:
-    """Turn each direction to where the spectrum is strongest nearby, without the lattice of the transform.
-
-    By the projection-slice theorem the power along a ray of the spectrum is that of the cells projected onto
-    the ray, so the sum of squares of the projection's histogram is read at any angle, in two finer steps.
-
-    Returns
-    -------
-    directions_rad : (D,) float
-        In [0, pi), in the order given.
-    """
-    row, column = np.nonzero(occupied)
-    step = max(1, len(row) // parameters.refine_max_cells)
-    x, y = column[::step] * resolution_m, row[::step] * resolution_m
-    width = max(2 * parameters.wall_sigma_m, resolution_m)
-
-    def power(angle: float) -> float:
-        offset = (y * np.cos(angle) - x * np.sin(angle)) / width
-        counts = np.bincount(np.rint(offset - offset.min()).astype(np.intp))
-        return float(np.square(counts, dtype=float).sum())
-
-    refined = []
-    for direction in directions_rad.tolist():
-        best, reach = direction, parameters.refine_reach_rad
-        for _ in range(2):
-            candidates = best + np.linspace(-1, 1, REFINE_STEPS) * reach
-            best = float(candidates[int(np.argmax([power(angle) for angle in candidates.tolist()]))])
-            reach /= (REFINE_STEPS - 1) / 2
-        refined.append(best % np.pi)
-    return np.array(refined)

@@ -15,7 +15,6 @@ from rose2_logs.rose.spectrum import (
     angular_energy,
     compute_spectrum,
     dominant_directions,
-    refined_directions,
 )
 
 
@@ -47,7 +46,6 @@ def find_structure(
     """
     spectrum = compute_spectrum(occupied, resolution_m, parameters)
     directions, strengths = dominant_directions(angular_energy(spectrum, parameters), parameters)
-    directions = refined_directions(directions, occupied, resolution_m, parameters)
     score = structure_score(spectrum, occupied, directions, parameters)
     threshold = clean_threshold(score, occupied, free_m2, count_segments, parameters)
     clean = occupied & (score >= threshold)
