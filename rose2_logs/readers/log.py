@@ -211,5 +211,7 @@ def choose_topic(info: LogInfo, asked: str | None = None) -> str:
         if name.lstrip("/") == PREFERRED_TOPIC:
             return name
     if len(filled) > 1:
-        raise NoMapTopicError(f"{info.path}: several topics hold maps, choose one: {', '.join(filled)}")
+        raise NoMapTopicError(
+            f"{info.path}: several topics hold maps, choose one: {', '.join(filled)} (--topic)"
+        )
     return next(iter(filled))

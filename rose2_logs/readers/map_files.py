@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import re
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
@@ -107,8 +108,8 @@ def read_map(path: Path, stamp_ns: int = 0) -> Grid | None:
     described = _load_yaml(path)
     resolution = _number(path, described, "resolution", None)
     origin = described.get("origin")
-    if not (isinstance(origin, Sequence) and len(origin) == 3 and all(_is_number(part) for part in origin)):
-        raise InvalidMapError(f"{path}: origin is {origin!r}; it must be three numbers: x, y, yaw")
+    if not (isinstance(origin, Sequence) and len(origin) == 3 and all(_is_finite(part) for part in origin)):
+        raise InvalidMapError(f"{path}: origin is {origin!r}; it must be three finite numbers: x, y, yaw")
     x, y, yaw = (float(part) for part in origin)
     shade, opaque = _load_image(_image_path(path, described))
     pose = (x, y, 0.0, 0.0, 0.0, float(np.sin(yaw / 2)), float(np.cos(yaw / 2)))
@@ -215,6 +216,10 @@ def _image_path(path: Path, described: Mapping[str, Any]) -> Path:
 
 def _is_number(value: object) -> bool:
     return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+def _is_finite(value: object) -> bool:
+    return isinstance(value, (int, float)) and _is_number(value) and -math.inf < value < math.inf
 
 
 def _number(path: Path, described: Mapping[str, Any], name: str, default: float | None) -> float:
