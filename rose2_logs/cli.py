@@ -217,13 +217,21 @@ def segment(
 
 
 @app.command(
-    epilog="Example: [bold]rose2-logs evaluate cases.json --predictions labels --json figures.json[/bold]"
+    epilog="Example: [bold]rose2-logs evaluate cases.json --pictures pictures --json figures.json[/bold]"
 )
 def evaluate(
     cases: Annotated[Path, typer.Argument(metavar="CASES.json", help="Maps with true rooms.")],
     predictions: Annotated[
         Path | None,
         typer.Option(metavar="DIR", help="Write DIR/<group>/<name>.png label images.", show_default=False),
+    ] = None,
+    pictures: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR",
+            help="Draw DIR/<group>/<name>.png: map, true rooms, found rooms, errors.",
+            show_default=False,
+        ),
     ] = None,
     json_file: Annotated[
         Path | None, typer.Option("--json", metavar="FILE", help="Write the figures.", show_default=False)
@@ -241,6 +249,7 @@ def evaluate(
     from rose2_logs import reporting
     from rose2_logs.evaluation.benchmark import evaluate_cases, figures
     from rose2_logs.evaluation.cases import load_cases
+    from rose2_logs.sinks.comparison_picture import write_case_picture
     from rose2_logs.sinks.label_image import write_label_image
     from rose2_logs.sinks.summary import write_json
 
@@ -251,6 +260,8 @@ def evaluate(
         for result in evaluate_cases(chosen, method, parameters, workers):
             if predictions is not None:
                 write_label_image(predictions / result.case.group / f"{result.case.name}.png", result.labels)
+            if pictures is not None:
+                write_case_picture(pictures, result)
             results.append(result.without_labels())
             advance(result.case.name)
     if json_file is not None:
