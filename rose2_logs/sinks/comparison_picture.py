@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
@@ -11,11 +10,9 @@ from numpy.typing import NDArray
 from PIL import Image as PillowImage
 from PIL import ImageDraw, ImageFont
 
-from rose2_logs.evaluation.benchmark import CaseResult
-from rose2_logs.evaluation.comparison import Comparison, Mark, compare
+from rose2_logs.evaluation.comparison import Comparison, Mark
 from rose2_logs.evaluation.scores import Scores
 from rose2_logs.occupancy import known_window
-from rose2_logs.sinks.label_image import write_image
 from rose2_logs.sinks.palette import track_colour
 
 Image = NDArray[np.uint8]
@@ -57,26 +54,6 @@ MARK_WORDS: dict[Mark, str] = {
     Mark.LEAKED: "leaked: outside every true room",
     Mark.MISSED: "missed: in no found room",
 }
-
-
-def write_case_picture(folder: Path, result: CaseResult) -> None:
-    """Write the picture of an evaluated case to ``<group>/<name>.png`` in a folder.
-
-    Raises
-    ------
-    CasesError
-        If an image of the case cannot be read any more.
-    OutputError
-        If the file cannot be written.
-    """
-    case = result.case
-    picture = draw_comparison(
-        np.flipud(case.snapshot().cells),
-        compare(case.truth(), result.labels),
-        result.scores,
-        f"{case.group}/{case.name}",
-    )
-    write_image(folder / case.group / f"{case.name}.png", picture)
 
 
 def draw_comparison(cells: NDArray[np.int8], comparison: Comparison, scores: Scores, title: str) -> Image:
@@ -121,8 +98,13 @@ def figures_line(scores: Scores) -> str:
     )
 
 
-def draw_panels(cells: NDArray[np.int8], comparison: Comparison) -> tuple[Image, Image, Image, Image]:
-    """Draw the four panels map, truth, found and errors, all of the same size, without any caption."""
+def draw_panels(
+    cells: NDArray[np.int8], comparison: Comparison, *, numbered: bool = True
+) -> tuple[Image, Image, Image, Image]:
+    """Draw the four panels map, truth, found and errors, all of the same size, without any caption.
+
+    A found room has the colour of its partner, and a colour of its own, striped, where it has none.
+    """
     drawn = (cells >= 0) | (comparison.truth > 0) | (comparison.found > 0)
     window = _with_margin(known_window(drawn), drawn.shape)
     cells, marks = cells[window], comparison.marks[window]
@@ -146,7 +128,7 @@ def draw_panels(cells: NDArray[np.int8], comparison: Comparison) -> tuple[Image,
             panel[striped] = PAPER
         panel[walls] = OCCUPIED_COLOUR
         panel[_borders(labels)] = BORDER_COLOUR
-        panels.append(_numbered(panel, labels))
+        panels.append(_numbered(panel, labels) if numbered else panel)
     errors: Image = np.where((marks != Mark.NONE)[..., None], mark_colours[marks], plain)
     errors[walls] = OCCUPIED_COLOUR
     return plain, panels[0], panels[1], errors
