@@ -217,7 +217,7 @@ def segment(
 
 
 @app.command(
-    epilog="Example: [bold]rose2-logs evaluate cases.json --predictions labels --json figures.json[/bold]"
+    epilog="Example: [bold]rose2-logs evaluate cases.json --pictures pictures --json figures.json[/bold]"
 )
 def evaluate(
     cases: Annotated[Path, typer.Argument(metavar="CASES.json", help="Maps with true rooms.")],
@@ -225,12 +225,28 @@ def evaluate(
         Path | None,
         typer.Option(metavar="DIR", help="Write DIR/<group>/<name>.png label images.", show_default=False),
     ] = None,
+    pictures: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR",
+            help="Draw DIR/<group>/<name>.png: map, true rooms, found rooms, errors; and contact sheets.",
+            show_default=False,
+        ),
+    ] = None,
     json_file: Annotated[
         Path | None, typer.Option("--json", metavar="FILE", help="Write the figures.", show_default=False)
     ] = None,
     group: Annotated[
         str | None, typer.Option(help="Only the cases of one group.", show_default=False)
     ] = None,
+    along: Annotated[
+        bool,
+        typer.Option(
+            "--along",
+            help="Take each group's cases, in their order, as the maps of one run: figures over coverage, "
+            "the free area over that of the group's last map. With --pictures also as DIR/<group>.along.png.",
+        ),
+    ] = False,
     workers: Workers = 1,
     method: Method = "rose2",
     config: Config = None,
@@ -238,24 +254,40 @@ def evaluate(
     debug: Debug = False,
 ) -> None:
     """Segment maps whose true rooms are known and print the figures."""
+    from contextlib import nullcontext
+
     from rose2_logs import reporting
+    from rose2_logs.evaluation.along import along_as_json, along_runs
     from rose2_logs.evaluation.benchmark import evaluate_cases, figures
     from rose2_logs.evaluation.cases import load_cases
-    from rose2_logs.sinks.label_image import write_label_image
+    from rose2_logs.sinks.case_pictures import CasePictures
+    from rose2_logs.sinks.curves import draw_along
+    from rose2_logs.sinks.label_image import write_image, write_label_image
     from rose2_logs.sinks.summary import write_json
 
     parameters = _parameters(config, settings, method)
     chosen = load_cases(cases, group)
     results = []
-    with reporting.case_progress(len(chosen)) as advance:
+    drawn = CasePictures(pictures) if pictures is not None else nullcontext()
+    with drawn as drawer, reporting.case_progress(len(chosen)) as advance:
         for result in evaluate_cases(chosen, method, parameters, workers):
             if predictions is not None:
                 write_label_image(predictions / result.case.group / f"{result.case.name}.png", result.labels)
+            if drawer is not None:
+                drawer.add(result)
             results.append(result.without_labels())
             advance(result.case.name)
+    runs = along_runs(results) if along else {}
     if json_file is not None:
-        write_json(json_file, {"method": method, "parameters": parameters.resolved(), **figures(results)})
-    reporting.print_figures(results)
+        found = figures(results) | ({"along": along_as_json(runs)} if along else {})
+        write_json(json_file, {"method": method, "parameters": parameters.resolved(), **found})
+    if pictures is not None:
+        for name, points in runs.items():
+            write_image(pictures / f"{name}.along.png", draw_along(f"{name}, {method}", points))
+    if along:
+        reporting.print_along(runs)
+    else:
+        reporting.print_figures(results)
 
 
 def _parameters(config: Path | None, settings: list[str] | None, method: str) -> Parameters:

@@ -6,7 +6,7 @@ import json
 import logging
 import sys
 import traceback
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -16,12 +16,14 @@ from rich.markup import escape
 if TYPE_CHECKING:
     from rich.progress import Progress
 
+    from rose2_logs.evaluation.along import RunPoint
     from rose2_logs.evaluation.benchmark import CaseResult
     from rose2_logs.log_facts import LogFacts, MapFacts
     from rose2_logs.run import OnSnapshot, RunResult
     from rose2_logs.static_map import StaticMapResult
     from rose2_logs.tracking.frames import TrackedSnapshot
 
+ALONG_FIGURES = ("iou_seg", "iou_gt", "iou_sym")
 PIPE_WIDTH = 120
 """Columns of tables that do not go to a terminal."""
 
@@ -192,6 +194,28 @@ def print_figures(results: Sequence[CaseResult]) -> None:
         seconds = sum(result.seconds for result in members) / len(members)
         head = f"[bold]{escape(group)}, mean of {len(members)}"
         table.add_row(head, *row(mean), f"{seconds:.1f}", end_section=True)
+    _out.print(table)
+
+
+def print_along(runs: Mapping[str, Sequence[RunPoint]]) -> None:
+    """Print the figures of each run's maps over its coverage, and their means."""
+    from rich.table import Table
+
+    from rose2_logs.evaluation.scores import mean_scores
+
+    table = Table(box=None, pad_edge=False)
+    table.add_column("map", no_wrap=True)
+    for heading in ("coverage", *ALONG_FIGURES, "rooms found/true"):
+        table.add_column(heading, justify="right")
+    for group, points in runs.items():
+        for point in points:
+            figures = [f"{getattr(point.scores, name):.2f}" for name in ALONG_FIGURES]
+            rooms = f"{point.scores.rooms_seg:.0f}/{point.scores.rooms_gt:.0f}"
+            table.add_row(escape(point.name), f"{point.coverage:.1%}", *figures, rooms)
+        mean = mean_scores(point.scores for point in points)
+        figures = [f"{getattr(mean, name):.2f}" for name in ALONG_FIGURES]
+        head = f"[bold]{escape(group)}, mean of {len(points)}"
+        table.add_row(head, "", *figures, f"{mean.rooms_seg:.3g}/{mean.rooms_gt:.3g}", end_section=True)
     _out.print(table)
 
 

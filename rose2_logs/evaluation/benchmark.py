@@ -32,6 +32,8 @@ class CaseResult:
         The segmented rooms, row 0 at the top as in the case's images.
     scores : Scores
         Figures against the true rooms.
+    free_area_m2 : float
+        Area of the map's known free cells.
     seconds : float
         Time of the segmentation.
     """
@@ -39,6 +41,7 @@ class CaseResult:
     case: Case
     labels: NDArray[np.int32]
     scores: Scores
+    free_area_m2: float
     seconds: float
 
     def without_labels(self) -> CaseResult:
@@ -70,10 +73,10 @@ def evaluate_case(case: Case, method: str, parameters: Parameters) -> CaseResult
     if snapshot.cells.shape != truth.shape:
         raise CasesError(f"{case.rooms_path}: of shape {truth.shape}, but its map is {snapshot.cells.shape}")
     start = time.perf_counter()
-    rooms = analyse(snapshot, parameters, method).rooms
+    analysis = analyse(snapshot, parameters, method)
     seconds = time.perf_counter() - start
-    labels = np.ascontiguousarray(np.flipud(rooms.labels))
-    return CaseResult(case, labels, score(truth, labels), seconds)
+    labels = np.ascontiguousarray(np.flipud(analysis.rooms.labels))
+    return CaseResult(case, labels, score(truth, labels), analysis.free_area_m2, seconds)
 
 
 def figures(results: Sequence[CaseResult]) -> dict[str, Any]:
@@ -81,7 +84,7 @@ def figures(results: Sequence[CaseResult]) -> dict[str, Any]:
     maps = [
         {"group": result.case.group, "name": result.case.name}
         | dataclasses.asdict(result.scores)
-        | {"seconds": result.seconds}
+        | {"free_area_m2": result.free_area_m2, "seconds": result.seconds}
         for result in results
     ]
     counts = Counter(result.case.group for result in results)

@@ -186,14 +186,23 @@ def test_segment_does_not_replace_unasked(cli, tmp_path: Path):
     assert cli("segment", path, "-o", tmp_path, "--overwrite")[0] == 0
 
 
-def test_evaluate_writes_predictions_and_figures(cli, tmp_path: Path):
+@pytest.fixture
+def cases(tmp_path: Path) -> Path:
+    """Two maps of a run through two drawn rooms, with their true rooms."""
+    listed = []
+    for name, seen in (("half", 180), ("flat", 240)):
+        save_map(tmp_path, name, two_rooms(seen))
+        truth = np.where(two_rooms(seen) == 254, 1 + (np.arange(240) >= 117)[None, :], 0)
+        write_label_image(tmp_path / f"{name}.rooms.png", truth)
+        files = {"map": f"{name}.png", "rooms": f"{name}.rooms.png"}
+        listed.append({"group": "drawn", "name": name, "resolution_m": RESOLUTION_M} | files)
+    path = tmp_path / "cases.json"
+    path.write_text(json.dumps({"cases": listed}))
+    return path
+
+
+def test_evaluate_writes_predictions_and_figures(cli, cases: Path, tmp_path: Path):
     """Two drawn rooms are found as they are; JSON and label images are where they were asked for."""
-    save_map(tmp_path, "flat", two_rooms())
-    truth = np.where(two_rooms() == 254, 1 + (np.arange(240) >= 117)[None, :], 0)
-    write_label_image(tmp_path / "rooms.png", truth)
-    case = {"group": "drawn", "name": "flat", "map": "flat.png", "rooms": "rooms.png"}
-    cases = tmp_path / "cases.json"
-    cases.write_text(json.dumps({"cases": [case | {"resolution_m": RESOLUTION_M}]}))
     code, out, _ = cli(
         "evaluate", cases, "--predictions", tmp_path / "p", "--json", tmp_path / "f.json", "--method", "rose2"
     )
@@ -201,6 +210,36 @@ def test_evaluate_writes_predictions_and_figures(cli, tmp_path: Path):
     assert "drawn" in out
     figures = json.loads((tmp_path / "f.json").read_text())
     assert figures["groups"]["drawn"]["iou_sym"] > 90
-    assert figures["maps"][0]["rooms_seg"] == 2
+    assert [row["rooms_seg"] for row in figures["maps"]] == [2, 2]
+    assert "along" not in figures
     with Image.open(tmp_path / "p" / "drawn" / "flat.png") as image:
         assert image.size == (240, 120)
+
+
+def test_evaluate_draws_each_case_and_a_sheet(cli, cases: Path, tmp_path: Path):
+    """A picture for each map and a contact sheet of the group."""
+    assert cli("evaluate", cases, "--pictures", tmp_path / "p")[0] == 0
+    names = sorted(path.relative_to(tmp_path / "p").as_posix() for path in (tmp_path / "p").rglob("*.png"))
+    assert names == ["drawn.sheet_1.png", "drawn/flat.png", "drawn/half.png"]
+
+
+def test_evaluate_along_a_run(cli, cases: Path, tmp_path: Path):
+    """Coverage of each map in the table and the JSON, and the curve beside the pictures."""
+    code, out, _ = cli(
+        "evaluate",
+        cases,
+        "--group",
+        "drawn",
+        "--along",
+        "--json",
+        tmp_path / "f.json",
+        "--pictures",
+        tmp_path,
+    )
+    assert code == 0
+    assert "100.0%" in out
+    along = json.loads((tmp_path / "f.json").read_text())["along"]["drawn"]
+    assert [point["name"] for point in along] == ["half", "flat"]
+    assert 0.6 < along[0]["coverage"] < 0.9
+    assert along[1]["coverage"] == 1.0
+    assert (tmp_path / "drawn.along.png").exists()

@@ -1,0 +1,148 @@
+"""Curves over an axis as a picture: for figures along a run, without a plotting library."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image as PillowImage
+from PIL import ImageDraw, ImageFont
+
+from rose2_logs.evaluation.along import RunPoint
+from rose2_logs.occupancy import FloatArray
+
+Image = NDArray[np.uint8]
+Colour = tuple[int, int, int]
+
+WIDTH_PX, HEIGHT_PX = 900, 360
+LEFT_PX, RIGHT_PX, TOP_PX, BOTTOM_PX = 60, 190, 40, 50
+"""Space around the axes: for the numbers, the names of the curves, the title, the axis' name."""
+TEXT_PX, LINE_PX, DOT_PX = 14, 2, 3
+SMOOTHING = 2
+"""Drawn so many times as large and then reduced: lines without steps."""
+TICKS_MAX = 8
+ROUND_STEPS = (1.0, 2.0, 5.0, 10.0)
+PAPER, INK, GRID = (255, 255, 255), (0, 0, 0), (225, 225, 225)
+LINE_COLOURS: tuple[Colour, ...] = (
+    (31, 119, 180),
+    (214, 39, 40),
+    (44, 160, 44),
+    (255, 127, 14),
+    (148, 103, 189),
+    (140, 86, 75),
+    (23, 190, 207),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """One curve.
+
+    Attributes
+    ----------
+    name : str
+        For the legend.
+    x, y : (N,) float
+        Its points, joined in their order.
+    """
+
+    name: str
+    x: FloatArray
+    y: FloatArray
+
+
+def draw_along(title: str, points: Sequence[RunPoint]) -> Image:
+    """Draw the figures of a run over its coverage, and below them the number of rooms found and true."""
+    x = np.array([100 * point.coverage for point in points])
+
+    def curve(figure: str, name: str | None = None) -> Curve:
+        return Curve(name or figure, x, np.array([getattr(point.scores, figure) for point in points]))
+
+    figures = [curve(name) for name in ("iou_seg", "iou_gt", "iou_sym")]
+    rooms = [curve("rooms_seg", "rooms found"), curve("rooms_gt", "rooms true")]
+    return np.concatenate(
+        [
+            draw_curves(figures, title, "coverage, %", y_range=(0.0, 100.0)),
+            draw_curves(rooms, "number of rooms", "coverage, %"),
+        ]
+    )
+
+
+def draw_curves(
+    curves: Sequence[Curve], title: str, x_label: str, y_range: tuple[float, float] | None = None
+) -> Image:
+    """Draw curves with axes, grid and legend.
+
+    Parameters
+    ----------
+    curves : sequence of Curve
+        At least one, with at least one point.
+    title, x_label : str
+        Above and below the axes.
+    y_range : (float, float), optional
+        Ends of the vertical axis; by default from 0 to a round number above every curve.
+
+    Returns
+    -------
+    (H, W, 3) uint8
+        RGB.
+    """
+    x_low, x_high = _round_range(np.concatenate([curve.x for curve in curves]))
+    top = np.concatenate([curve.y for curve in curves])
+    y_low, y_high = y_range if y_range is not None else (0.0, _round_range(np.append(top, 0.0))[1])
+    s = SMOOTHING
+    image = PillowImage.new("RGB", (WIDTH_PX * s, HEIGHT_PX * s), PAPER)
+    draw, font = ImageDraw.Draw(image), ImageFont.load_default(TEXT_PX * s)
+    left, right = LEFT_PX * s, (WIDTH_PX - RIGHT_PX) * s
+    upper, lower = TOP_PX * s, (HEIGHT_PX - BOTTOM_PX) * s
+
+    def to_pixels(x: float, y: float) -> tuple[float, float]:
+        along, up = (x - x_low) / (x_high - x_low), (y - y_low) / (y_high - y_low)
+        return left + along * (right - left), lower - up * (lower - upper)
+
+    for value in _ticks(x_low, x_high):
+        place = to_pixels(value, y_low)[0]
+        draw.line((place, upper, place, lower), GRID, s)
+        draw.text((place, lower + TEXT_PX * s), f"{value:g}", INK, font, anchor="mm")
+    for value in _ticks(y_low, y_high):
+        place = to_pixels(x_low, value)[1]
+        draw.line((left, place, right, place), GRID, s)
+        draw.text((left - TEXT_PX * s / 2, place), f"{value:g}", INK, font, anchor="rm")
+    draw.rectangle((left, upper, right, lower), outline=INK, width=s)
+    draw.text((left, upper / 2), title, INK, ImageFont.load_default((TEXT_PX + 3) * s), anchor="lm")
+    draw.text(((left + right) / 2, (HEIGHT_PX - TEXT_PX) * s), x_label, INK, font, anchor="mm")
+    for number, curve in enumerate(curves):
+        colour = LINE_COLOURS[number % len(LINE_COLOURS)]
+        pixels = [to_pixels(x, y) for x, y in zip(curve.x.tolist(), curve.y.tolist(), strict=True)]
+        draw.line(pixels, colour, LINE_PX * s, joint="curve")
+        for x, y in pixels:
+            draw.ellipse((x - DOT_PX * s, y - DOT_PX * s, x + DOT_PX * s, y + DOT_PX * s), colour)
+        beside = upper + (number + 0.5) * 1.6 * TEXT_PX * s
+        draw.line((right + 10 * s, beside, right + 34 * s, beside), colour, LINE_PX * s)
+        draw.text((right + 42 * s, beside), curve.name, INK, font, anchor="lm")
+    return np.asarray(image.reduce(s))
+
+
+def _step(low: float, high: float) -> float:
+    """Return the least round step that gives at most `TICKS_MAX` ticks."""
+    exact = (high - low) / TICKS_MAX
+    power = 10.0 ** np.floor(np.log10(exact))
+    return float(next(round_step * power for round_step in ROUND_STEPS if round_step * power >= exact))
+
+
+def _round_range(values: FloatArray) -> tuple[float, float]:
+    """Ends of an axis that holds all values, at multiples of its step."""
+    low, high = float(values.min()), float(values.max())
+    if high <= low:
+        low, high = low - 1.0, high + 1.0
+    step = _step(low, high)
+    return float(np.floor(low / step) * step), float(np.ceil(high / step) * step)
+
+
+def _ticks(low: float, high: float) -> list[float]:
+    step = _step(low, high)
+    first, last = np.ceil(low / step - 1e-9), np.floor(high / step + 1e-9)
+    # Adding nothing turns a negative zero into zero.
+    return [float(number) * step + 0.0 for number in np.arange(first, last + 1)]

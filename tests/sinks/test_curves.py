@@ -1,0 +1,53 @@
+"""Curves: where points are drawn, round axes, runs of one point."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rose2_logs.evaluation.along import RunPoint
+from rose2_logs.evaluation.scores import Scores
+from rose2_logs.sinks.curves import (
+    BOTTOM_PX,
+    HEIGHT_PX,
+    LEFT_PX,
+    LINE_COLOURS,
+    RIGHT_PX,
+    TOP_PX,
+    WIDTH_PX,
+    Curve,
+    draw_along,
+    draw_curves,
+)
+
+
+def pixels_of(image, colour) -> np.ndarray:
+    """Rows and columns within the axes that have a colour."""
+    inside = image[:, : WIDTH_PX - RIGHT_PX + 1]
+    return np.argwhere((np.abs(inside.astype(int) - colour) < 8).all(-1))
+
+
+def test_ends_of_a_curve_lie_where_the_axes_say():
+    """A line from the lower left to the upper right corner of the axes."""
+    image = draw_curves([Curve("up", np.array([0.0, 100.0]), np.array([0.0, 100.0]))], "t", "x", (0.0, 100.0))
+    assert image.shape == (HEIGHT_PX, WIDTH_PX, 3)
+    places = pixels_of(image, LINE_COLOURS[0])
+    left, right = places[places[:, 1].argmin()], places[places[:, 1].argmax()]
+    assert left == pytest.approx([HEIGHT_PX - BOTTOM_PX, LEFT_PX], abs=5)
+    assert right == pytest.approx([TOP_PX, WIDTH_PX - RIGHT_PX], abs=5)
+
+
+def test_the_vertical_axis_holds_every_point_from_zero():
+    """37 of an axis to 40 lies just below its top."""
+    image = draw_curves([Curve("flat", np.array([1.0, 2.0]), np.array([37.0, 37.0]))], "t", "x")
+    places = pixels_of(image, LINE_COLOURS[0])
+    height = HEIGHT_PX - BOTTOM_PX - TOP_PX
+    assert places[:, 0].mean() == pytest.approx(TOP_PX + height * 3 / 40, abs=2)
+
+
+def test_a_run_of_one_map_is_drawn():
+    """An axis of no length would divide by zero."""
+    scores = Scores(1.0, 2.0, 3.0, 40.0, 50.0, 6.0, 0, 0)
+    image = draw_along("one", [RunPoint("m", 1.0, scores)])
+    assert image.shape == (2 * HEIGHT_PX, WIDTH_PX, 3)
+    assert len(pixels_of(image, LINE_COLOURS[2]))
