@@ -12,7 +12,7 @@ from benchmarking.accuracy import Accuracy
 from benchmarking.markdown import bold, difference, figures_of, percent, rooms_of, table
 from benchmarking.transforms import TRANSFORMS
 from rose2_logs.evaluation.benchmark import CaseResult, group_means
-from rose2_logs.evaluation.scores import FIGURES, Scores
+from rose2_logs.evaluation.scores import FIGURES, Scores, mean_scores
 from rose2_logs.provenance import software_versions
 from rose2_logs.sinks.curves import Curve, draw_curves
 from rose2_logs.sinks.label_image import write_image
@@ -151,7 +151,7 @@ def _ablations(accuracy: Accuracy) -> list[str]:
     if not accuracy.ablations:
         return []
     means = _means(accuracy)
-    head = ["without", *accuracy.groups, "mean of groups"]
+    head = ["without", *accuracy.groups, "mean of groups", "rooms"]
     lines = [
         "## Ablations",
         "",
@@ -172,7 +172,8 @@ def _ablations(accuracy: Accuracy) -> list[str]:
             f"{bold(difference(sym))} ({difference(seg)}, {difference(true)})"
             for sym, seg, true in [*changes.tolist(), changes.mean(axis=0).tolist()]
         ]
-        rows.append([ablation.name, *cells])
+        # A setting that breaks the method instead of turning a part off shows in the number of rooms.
+        rows.append([ablation.name, *cells, rooms_of(mean_scores(changed.values()))])
     lines += table(head, rows)
     lines += [
         f"- **{ablation.name}** ({ablation.method}): {ablation.sentence} `{'`, `'.join(ablation.settings)}`"
