@@ -132,10 +132,8 @@ def _along(accuracy: Accuracy, group: str, folder: Path) -> list[str]:
     charts.append(draw_curves([*curves("rooms_seg"), true], "number of rooms", "coverage, %"))
     path = Path("along") / f"{group}.png"
     write_image(folder / path, np.concatenate(charts))
-    head = ["map", "coverage", *(f"{method}: {name}" for method in runs for name in IOU)]
     rows = [
-        [points[0].name, f"{points[0].coverage:.1%}"]
-        + [cell for point in points for cell in figures_of(point.scores, IOU)]
+        [points[0].name, f"{points[0].coverage:.1%}", *(_at_a_glance(point.scores) for point in points)]
         for points in zip(*runs.values(), strict=True)
     ]
     return [
@@ -143,8 +141,15 @@ def _along(accuracy: Accuracy, group: str, folder: Path) -> list[str]:
         "",
         f"![{group} over coverage]({quote(path.as_posix())})",
         "",
-        *table(head, rows),
+        "iou_sym (iou_seg, iou_gt), rooms.",
+        "",
+        *table(["map", "coverage", *runs], rows),
     ]
+
+
+def _at_a_glance(scores: Scores) -> str:
+    symmetric, found, true = figures_of(scores, IOU)
+    return f"{symmetric} ({found}, {true}), {rooms_of(scores)}"
 
 
 def _ablations(accuracy: Accuracy) -> list[str]:
