@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -53,7 +53,7 @@ def _points(members: Sequence[CaseResult]) -> list[RunPoint]:
     ]
 
 
-def along_as_json(runs: dict[str, tuple[RunPoint, ...]]) -> dict[str, list[dict[str, Any]]]:
+def along_as_json(runs: Mapping[str, Sequence[RunPoint]]) -> dict[str, list[dict[str, Any]]]:
     """Return the points of each run as JSON values."""
     return {
         group: [
