@@ -40,20 +40,24 @@ class CriticalLines:
     length: FloatArray
     clearance: FloatArray
 
-    def cells(self, which: BoolArray) -> NDArray[np.intp]:
-        """Row and column (M, 2) of the cells on some of the lines."""
+    def cells(self, which: BoolArray, middle: FloatArray) -> NDArray[np.intp]:
+        """Row and column (M, 2) of the cells on some of the lines; `middle` as for `nearest_cells`."""
         points = self.points[which].astype(float)
         ends = [end[which].astype(float) for end in (self.first, self.second)]
-        return np.concatenate([cells_on_lines(points, end) for end in ends])
+        return np.concatenate([cells_on_lines(points, end, middle) for end in ends])
 
 
 def critical_lines(
-    points: NDArray[np.intp], boundary: NDArray[np.intp], distance: NDArray[np.float32]
+    points: NDArray[np.intp],
+    boundary: NDArray[np.intp],
+    distance: NDArray[np.float32],
+    middle: FloatArray,
 ) -> CriticalLines:
     """Join critical points with the boundary on two sides.
 
     A line's first end is the nearest boundary cell. The second is the nearest one that is farther from the
-    point than the first, and farther from the first than the point's distance from obstacles.
+    point than the first, and farther from the first than the point's distance from obstacles. Of equally near
+    cells the one nearest to the middle of the map counts, so that lines turn with the map.
 
     Parameters
     ----------
@@ -63,6 +67,8 @@ def critical_lines(
         Row and column of the boundary cells.
     distance : (H, W) float32
         Distance from obstacles in cells.
+    middle : (2,) float
+        Row and column of the middle of the map.
 
     Returns
     -------
@@ -71,12 +77,15 @@ def critical_lines(
     """
     clearance = distance[points[:, 0], points[:, 1]].astype(float)
     tree = cKDTree(boundary)
+    from_middle = np.linalg.norm(boundary - middle, axis=1)
     first = np.zeros(len(points), np.intp)
     second = np.full(len(points), -1, np.intp)
     open_points = np.arange(len(points))
     asked = min(NEAREST_ASKED, len(boundary))
     while len(open_points) and asked:
         far, index = tree.query(points[open_points], k=np.arange(1, asked + 1))
+        order = np.lexsort((from_middle[index], far))
+        far, index = np.take_along_axis(far, order, 1), np.take_along_axis(index, order, 1)
         one = index[:, :1]
         between = np.linalg.norm(boundary[index] - boundary[one], axis=-1)
         fits = (far > far[:, :1]) & (between > clearance[open_points, None])

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rose2_logs.baselines.regions import SQUARE
+from rose2_logs.baselines.regions import SQUARE, ranks_by_size
 from rose2_logs.occupancy import BoolArray
 
 
@@ -14,8 +14,8 @@ def grow(seeds: NDArray[np.int32], free: BoolArray) -> NDArray[np.int32]:
     """Let every free cell take the label of the seed from which the fewest steps lead to it.
 
     A step leads to any of the eight neighbours. Of several seeds that are as near, the one with more cells
-    takes the cell, which does not depend on how the map lies; of seeds of the same size the one with the
-    lower label. Free cells that no seed reaches stay without a label.
+    takes the cell, and then the one nearer to the middle of all: `ranks_by_size`. Free cells that no seed
+    reaches stay without a label.
 
     Parameters
     ----------
@@ -32,15 +32,11 @@ def grow(seeds: NDArray[np.int32], free: BoolArray) -> NDArray[np.int32]:
     framed = np.pad(np.where(free, seeds, 0), 1)
     width = framed.shape[1]
     steps = np.array([-width - 1, -width, -width + 1, -1, 1, width - 1, width, width + 1])
-    size = np.bincount(framed.ravel())
-    size[0] = 0
-    by_size = np.argsort(-size, kind="stable")
     # While they spread, seeds are called by their rank: of two ranks the lower one wins.
-    rank_of_label = np.empty(len(size), np.int32)
-    rank_of_label[by_size] = np.arange(len(size))
+    rank_of_label = ranks_by_size(framed)
     rank = rank_of_label[framed].ravel()
     is_open = np.pad(free, 1).ravel() & (framed.ravel() == 0)
-    nobody = np.int32(len(size))
+    nobody = len(rank_of_label)
     rank[is_open] = nobody
     turn = np.zeros(len(rank), np.intp)
     near_open = cv2.dilate(is_open.reshape(framed.shape).astype(np.uint8), SQUARE).ravel() > 0
@@ -56,5 +52,6 @@ def grow(seeds: NDArray[np.int32], free: BoolArray) -> NDArray[np.int32]:
         front = reached[turn[reached] == np.arange(len(reached))]
         is_open[front] = False
     rank[is_open] = rank_of_label[0]
-    labels: NDArray[np.int32] = by_size.astype(np.int32)[rank].reshape(framed.shape)
+    label_of_rank = np.argsort(rank_of_label).astype(np.int32)
+    labels: NDArray[np.int32] = label_of_rank[rank].reshape(framed.shape)
     return labels[1:-1, 1:-1]

@@ -7,6 +7,7 @@ import heapq
 import numpy as np
 from numpy.typing import NDArray
 
+from rose2_logs.baselines.regions import ranks_by_size
 from rose2_logs.parameters import VoronoiMergeParameters
 
 WALL = 0
@@ -34,10 +35,10 @@ def merge_rooms(
     """
     rooms = _Rooms(labels, resolution_m)
     # Only rooms near the last two that were joined can have become joinable.
-    pending = [(area, room) for room, area in enumerate(rooms.area_m2) if room != WALL]
+    pending = [rooms.turn(room) for room in range(WALL + 1, len(rooms.area_m2))]
     heapq.heapify(pending)
     while pending:
-        area, room = heapq.heappop(pending)
+        area, _, room = heapq.heappop(pending)
         if rooms.joined_to[room] != room or rooms.area_m2[room] != area:
             continue
         target = rooms.widest_neighbour(room)
@@ -45,9 +46,13 @@ def merge_rooms(
             continue
         rooms.join(room, target)
         for changed in sorted(rooms.within_two(target)):
-            heapq.heappush(pending, (rooms.area_m2[changed], changed))
-    _, number = np.unique(rooms.joined_to, return_inverse=True)
-    return number.astype(np.int32)[labels]
+            heapq.heappush(pending, rooms.turn(changed))
+    held = rooms.joined_to[labels]
+    held[labels == WALL] = WALL
+    kept = np.unique(held[held != WALL])
+    number = np.zeros(len(rooms.joined_to), np.int32)
+    number[kept] = np.arange(1, len(kept) + 1)
+    return number[held]
 
 
 def _is_joined(rooms: _Rooms, room: int, target: int, p: VoronoiMergeParameters) -> bool:
@@ -87,11 +92,16 @@ class _Rooms:
         size = np.bincount(labels.ravel(), minlength=1)
         self.area_m2: list[float] = (size * resolution_m**2).tolist()
         self.joined_to = np.arange(len(size))
+        self._rank: list[int] = ranks_by_size(labels).tolist()
         self._border: list[dict[int, int]] = [{} for _ in size]
         for low, high, length in zip(*_borders(labels), strict=True):
             self._border[low][high] = length
             self._border[high][low] = length
         self._perimeter = [sum(border.values()) for border in self._border]
+
+    def turn(self, room: int) -> tuple[float, int, int]:
+        """When a room is looked at, as a key of order, with the room last: the smallest first."""
+        return self.area_m2[room], -self._rank[room], room
 
     def share(self, room: int, other: int) -> float:
         """Share of a room's perimeter along another room, or along walls."""
@@ -102,11 +112,11 @@ class _Rooms:
         return len(self._border[room].keys() - {WALL})
 
     def widest_neighbour(self, room: int) -> int | None:
-        """Return the room with the longest common border; of several the largest, then the lowest label."""
+        """Return the room with the longest common border; of several the largest."""
         borders = self._border[room]
         return min(
             borders.keys() - {WALL},
-            key=lambda other: (-borders[other], -self.area_m2[other], other),
+            key=lambda other: (-borders[other], -self.area_m2[other], self._rank[other]),
             default=None,
         )
 

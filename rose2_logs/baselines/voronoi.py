@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from rose2_logs.baselines.critical_lines import best_lines, critical_lines
 from rose2_logs.baselines.growing import grow
 from rose2_logs.baselines.merging import merge_rooms
-from rose2_logs.baselines.regions import connected_parts, obstacle_distance
+from rose2_logs.baselines.regions import connected_parts, middle_of, obstacle_distance
 from rose2_logs.baselines.voronoi_graph import boundary_cells, narrowest_cells, voronoi_cells
 from rose2_logs.occupancy import BoolArray
 from rose2_logs.parameters import VoronoiBaselineParameters, VoronoiMergeParameters
@@ -52,8 +52,9 @@ def cut_rooms(
     )
     uncut = free.copy()
     if len(narrow):
-        lines = critical_lines(narrow, boundary_cells(free), distance)
-        row, column = lines.cells(best_lines(lines, parameters.critical_min_gap)).T
+        middle = middle_of(free)
+        lines = critical_lines(narrow, boundary_cells(free), distance, middle)
+        row, column = lines.cells(best_lines(lines, parameters.critical_min_gap), middle).T
         uncut[row, column] = False
     # A line's cells may touch at corners only, so that pieces must not be connected through corners.
     part, size = connected_parts(uncut, connectivity=4)

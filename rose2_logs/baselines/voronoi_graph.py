@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import QhullError, Voronoi
 
-from rose2_logs.baselines.regions import CROSS, cells_on_lines, eroded, nearest_cells, opened
+from rose2_logs.baselines.regions import CROSS, cells_on_lines, eroded, middle_of, nearest_cells, opened
 from rose2_logs.occupancy import BoolArray
 
 AROUND = np.array([(-1, -1), (-1, 0), (-1, 1), (0, -1), (0, 1), (1, -1), (1, 0), (1, 1)])
@@ -44,12 +44,14 @@ def voronoi_cells(free: BoolArray, clear_rounds: int, prune_passes: int) -> Bool
         return graph
     ends = np.array(diagram.ridge_vertices).reshape(-1, 2)
     ends = ends[(ends >= 0).all(1)]
-    cell = nearest_cells(diagram.vertices)
+    middle = middle_of(free)
+    cell = nearest_cells(diagram.vertices, middle)
     inside: BoolArray = np.all((cell >= 0) & (cell < free.shape), axis=1)
     row, column = np.where(inside[:, None], cell, 0).T
     is_clear = inside & clear[row, column]
     ends = ends[is_clear[ends].all(1)]
-    row, column = cells_on_lines(*diagram.vertices[ends.T]).T
+    first, last = diagram.vertices[ends[:, 0]], diagram.vertices[ends[:, 1]]
+    row, column = cells_on_lines(first, last, middle).T
     graph[row, column] = True
     return _pruned(graph, prune_passes)
 
