@@ -66,7 +66,7 @@ Debug = Annotated[
     bool, typer.Option("--debug", help="Show the traceback of errors.", callback=_set_debug, is_eager=True)
 ]
 Workers = Annotated[int, typer.Option(min=1, help="Processes; results do not depend on their number.")]
-Method = Annotated[str, typer.Option(help="Segmentation method.")]
+Method = Annotated[str, typer.Option(help="Segmentation: rose2, morphological, distance or voronoi.")]
 Config = Annotated[
     Path | None,
     typer.Option(metavar="FILE.toml", help="Parameters, one table per stage.", show_default=False),

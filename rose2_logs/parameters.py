@@ -163,6 +163,71 @@ class TopologyParameters:
 
 
 @dataclass(frozen=True)
+class MorphologicalParameters:
+    """Baseline: morphological segmentation (survey of Bormann et al., ICRA 2016)."""
+
+    room_min_area_m2: float = _number(0.8, "m2", "A part that erosion leaves is a room above; the survey's.")
+    room_max_area_m2: float = _number(47.0, "m2", "And below this area; the survey's value.")
+    max_rounds: int = _number(73, "rounds", "Rounds of erosion, one cell each; the survey's value.", 0, 10**5)
+
+
+@dataclass(frozen=True)
+class DistanceParameters:
+    """Baseline: distance transform segmentation (survey of Bormann et al., ICRA 2016)."""
+
+    room_min_area_m2: float = _number(0.35, "m2", "Least area of a room's seed; the survey's value.")
+    room_max_area_m2: float = _number(163.0, "m2", "Greatest area of a room's seed; the survey's value.")
+
+
+@dataclass(frozen=True)
+class VoronoiBaselineParameters:
+    """Baseline: Voronoi segmentation (survey of Bormann et al., ICRA 2016)."""
+
+    room_min_area_m2: float = _number(0.1, "m2", "Least area of a piece between cuts; the survey's value.")
+    room_max_area_m2: float = _number(1e6, "m2", "Greatest area of a piece; the survey's value: any.")
+    clear_rounds: int = _number(2, "rounds", "The graph keeps this many cells clear of obstacles.", 0, 100)
+    prune_passes: int = _number(100, "passes", "Loose ends of the graph shorter than this go.", 0, 10**5)
+    neighbourhood_cells2: float = _number(
+        280.0, "cells^2", "Cells of a neighbourhood times the distance from obstacles; the survey's value.", 1
+    )
+    neighbourhood_max_rounds: int = _number(
+        150, "rounds", "Most steps from a neighbourhood's centre; the survey's value.", 0, 10**5
+    )
+    critical_min_gap: float = _number(
+        0.5, "1", "Closer critical points, by their distance from obstacles, compete; the survey's value."
+    )
+
+
+@dataclass(frozen=True)
+class VoronoiMergeParameters:
+    """Baseline: which pieces the Voronoi segmentation joins; the values are those of the survey's program.
+
+    Borders and walls are shares of a perimeter.
+    """
+
+    dead_end_max_area_m2: float = _number(
+        12.5, "m2", "Area of a room with one neighbour; the survey's value."
+    )
+    dead_end_max_wall: float = _number(0.75, "share", "Wall of a room with one neighbour.", 0, 1)
+    small_max_area_m2: float = _number(2.0, "m2", "Area of a small room.")
+    small_min_border: float = _number(0.2, "share", "Border of a small room with its target.", 0, 1)
+    small_target_max_wall: float = _number(0.8, "share", "Wall of a small room's target.", 0, 1)
+    niche_min_cover: float = _number(0.98, "share", "Wall and border of a niche: it has no other side.", 0, 1)
+    niche_min_wall: float = _number(0.5, "share", "Wall of a niche.", 0, 1)
+    niche_min_border: float = _number(0.15, "share", "Border of a niche with its target.", 0, 1)
+    niche_target_min_cover: float = _number(
+        0.95, "share", "Wall and two longest borders of a niche's target with more than two neighbours.", 0, 1
+    )
+    open_min_border: float = _number(0.2, "share", "Border of a room that is open to its target.", 0, 1)
+    half_open_min_border: float = _number(0.1, "share", "The same where walls fit a corridor's piece.", 0, 1)
+    half_open_wall: float = _number(
+        0.95, "share", "Wall and twice the border of a corridor's piece, at least.", 0, 1
+    )
+    open_min_border_back: float = _number(0.1, "share", "The same border in the target's perimeter.", 0, 1)
+    wide_min_border: float = _number(0.4, "share", "Border with which any room is joined.", 0, 1)
+
+
+@dataclass(frozen=True)
 class TrackingParameters:
     """Identity of rooms over the snapshots of a run."""
 
@@ -186,6 +251,10 @@ class Parameters:
     walls: WallParameters = field(default_factory=WallParameters)
     floor_plan: FloorPlanParameters = field(default_factory=FloorPlanParameters)
     topology: TopologyParameters = field(default_factory=TopologyParameters)
+    morphological: MorphologicalParameters = field(default_factory=MorphologicalParameters)
+    distance: DistanceParameters = field(default_factory=DistanceParameters)
+    voronoi: VoronoiBaselineParameters = field(default_factory=VoronoiBaselineParameters)
+    voronoi_merge: VoronoiMergeParameters = field(default_factory=VoronoiMergeParameters)
     tracking: TrackingParameters = field(default_factory=TrackingParameters)
 
     def resolved(self) -> dict[str, dict[str, float | int | bool | str]]:

@@ -10,6 +10,7 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
+from rose2_logs.baselines.stage import BASELINES, room_outlines, segment_by_baseline
 from rose2_logs.errors import ParameterError
 from rose2_logs.floor_plan.doorways import find_doorways
 from rose2_logs.floor_plan.plan import FloorPlan
@@ -33,8 +34,8 @@ from rose2_logs.walls.segments import detect_segments
 from rose2_logs.walls.stage import WallResult, find_walls
 from rose2_logs.walls.walls import Walls
 
-METHODS = ("rose2",)
-"""Names of the segmentation methods."""
+METHODS = ("rose2", *BASELINES)
+"""Names of the segmentation methods: the paper's, and those that it compares with."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,6 +105,23 @@ def analyse(snapshot: OccupancySnapshot, parameters: Parameters, method: str = "
     watch.lap("prepare")
 
     free_m2 = float(np.count_nonzero(free)) * geometry.cell_area_m2
+    if method in BASELINES:
+        labels = segment_by_baseline(method, free, resolution, parameters)
+        watch.lap(method)
+        rooms = _room_map(labels, room_outlines(labels, resolution), explored, geometry, parameters)
+        watch.lap("rooms")
+        return SnapshotAnalysis(
+            index=snapshot.index,
+            log_time_ns=snapshot.log_time_ns,
+            stamp_ns=snapshot.stamp_ns,
+            geometry=geometry,
+            free_area_m2=free_m2,
+            rooms=rooms,
+            structure=None,
+            walls=None,
+            floor_plan=None,
+            seconds=watch.seconds,
+        )
     structure = find_structure(
         occupied,
         free_m2,

@@ -1,0 +1,57 @@
+"""The baselines by name, and the outlines of the rooms that they find."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import find_objects
+from shapely.affinity import translate
+from shapely.geometry.base import BaseGeometry
+
+from rose2_logs.baselines.distance import segment_distance
+from rose2_logs.baselines.morphological import segment_morphological
+from rose2_logs.baselines.voronoi import segment_voronoi
+from rose2_logs.floor_plan.rooms import number_rooms, outline
+from rose2_logs.occupancy import BoolArray
+from rose2_logs.parameters import Parameters
+
+BASELINES: dict[str, Callable[[BoolArray, float, Parameters], NDArray[np.int32]]] = {
+    "morphological": lambda free, resolution_m, p: segment_morphological(free, resolution_m, p.morphological),
+    "distance": lambda free, resolution_m, p: segment_distance(free, resolution_m, p.distance),
+    "voronoi": lambda free, resolution_m, p: segment_voronoi(free, resolution_m, p.voronoi, p.voronoi_merge),
+}
+"""Segmentation of free cells, side of a cell and all parameters into labels, by the method's name."""
+
+
+def segment_by_baseline(
+    method: str, free: BoolArray, resolution_m: float, parameters: Parameters
+) -> NDArray[np.int32]:
+    """Segment free space by one of `BASELINES`.
+
+    Parameters
+    ----------
+    method : str
+    free : (H, W) bool
+        The free cells; all others, unknown ones too, are obstacles.
+    resolution_m : float
+        Side of a cell.
+    parameters : Parameters
+
+    Returns
+    -------
+    labels : (H, W) int32
+        Rooms 1.. by their first cell, 0 for none; so are free cells from which no room can be reached.
+    """
+    labels = BASELINES[method](free, resolution_m, parameters)
+    return number_rooms(labels, int(labels.max(initial=0)), 0.0, resolution_m)[labels]
+
+
+def room_outlines(labels: NDArray[np.int32], resolution_m: float) -> list[BaseGeometry]:
+    """Outlines of the cells of rooms 1.. in the grid frame, metres."""
+    shapes = []
+    for room, (rows, columns) in enumerate(find_objects(labels), start=1):
+        shape = outline(labels[rows, columns] == room, resolution_m)
+        shapes.append(translate(shape, columns.start * resolution_m, rows.start * resolution_m))
+    return shapes
