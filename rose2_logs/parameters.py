@@ -61,16 +61,26 @@ class SpectrumParameters:
         math.radians(5.0), "rad", "Directions closer than this are one.", 0.0, 1.5
     )
     structure_length_m: float = _number(
-        2.0, "m", "Length of wall over which a cell gathers its score: more than most furniture.", 0.01
+        4.0,
+        "m",
+        "Length of wall over which a cell gathers its score: a room's side, more than furniture.",
+        0.01,
     )
-    threshold_min: float = _number(0.35, "score", "Least threshold of the clean map that is tried.", 0, 1)
+    piece_max_gap_m: float = _number(0.25, "m", "Occupied cells hang together over gaps of five cells.", 0.0)
+    piece_min_extent_m: float = _number(
+        1.2, "m", "Pieces longer than a door is wide may be walls by themselves.", 0.0
+    )
+    piece_min_score: float = _number(
+        0.5, "score", "Shorter pieces are walls where this share of the line through them is wall.", 0, 1
+    )
+    threshold_min: float = _number(0.25, "score", "Least threshold of the clean map that is tried.", 0, 1)
     threshold_max: float = _number(0.85, "score", "Greatest threshold of the clean map that is tried.", 0, 1)
     threshold_step: float = _number(0.05, "score", "Step of the search for the threshold.", 0.001, 1)
     attached_share: float = _number(
         0.75, "share", "Cells of this share of the threshold that touch the clean map are wall too.", 0, 1
     )
-    segments_max_per_m2: float = _number(
-        0.75, "1/m2", "Line segments per free area of a clean map; empty floor plans have 0.3 to 0.7.", 0.0
+    walls_max_per_m2: float = _number(
+        0.17, "1/m2", "Wall clusters per free area of a clean map; empty floor plans have about 0.1.", 0.0
     )
 
 
@@ -78,19 +88,16 @@ class SpectrumParameters:
 class WallParameters:
     """Stage B: segments, wall clusters, representative lines (paper, III-B)."""
 
-    hough_angle_step_rad: float = _number(
-        math.radians(1.0), "rad", "Step of the Hough transform's angle; the paper's value.", 1e-3, 0.2
-    )
-    hough_min_votes_m: float = _number(
-        0.5, "m", "Length of cells on a line for a segment to be looked for; a door's jamb.", 0.01
-    )
     segment_min_length_m: float = _number(0.4, "m", "Shortest segment: a wall beside a door.", 0.01)
     segment_max_gap_m: float = _number(0.25, "m", "Gap bridged within a segment; the paper's 5 cells.", 0.0)
+    segment_min_fill: float = _number(
+        0.6, "share", "Least share of a segment that cells cover: more than half is wall.", 0, 1
+    )
     direction_tolerance_rad: float = _number(
         math.radians(6.0), "rad", "A segment this near to a dominant direction follows it.", 0.0, 0.8
     )
     local_direction_step_rad: float = _number(
-        math.pi / 18, "rad", "Curved walls are approximated by chords every 10 degrees.", 0.02, 0.8
+        math.pi / 36, "rad", "Curved walls are approximated by chords every 5 degrees.", 0.02, 0.8
     )
     cluster_lateral_m: float = _number(0.15, "m", "Offset within one wall cluster: a wall's thickness.", 0.01)
     cluster_gap_m: float = _number(0.6, "m", "Gap along one wall cluster: furniture before a wall.", 0.01)

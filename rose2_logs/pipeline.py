@@ -30,8 +30,7 @@ from rose2_logs.rooms import Doorway, RoomMap
 from rose2_logs.rose.stage import RoseResult, find_structure
 from rose2_logs.rose.structure import Structure
 from rose2_logs.topology.splitting import split_rooms
-from rose2_logs.walls.segments import detect_segments
-from rose2_logs.walls.stage import WallResult, find_walls
+from rose2_logs.walls.stage import WallResult, count_walls, find_walls
 from rose2_logs.walls.walls import Walls
 
 METHODS = ("rose2", *BASELINES)
@@ -126,12 +125,12 @@ def analyse(snapshot: OccupancySnapshot, parameters: Parameters, method: str = "
         occupied,
         free_m2,
         resolution,
-        lambda clean: len(detect_segments(clean, resolution, parameters.walls)),
+        lambda clean, directions: count_walls(clean, directions, resolution, parameters.walls),
         parameters.spectrum,
     )
     watch.lap("structure")
     walls = find_walls(
-        occupied,
+        structure.supported,
         structure.clean,
         structure.attached,
         structure.directions_rad,

@@ -43,11 +43,37 @@ def structure_score(
     return np.clip(score, 0, 1, out=score)
 
 
+def supported_cells(
+    score: NDArray[np.float32], occupied: BoolArray, resolution_m: float, parameters: SpectrumParameters
+) -> BoolArray:
+    """Leave out small pieces of occupied cells that no structure supports: chairs, tables, people.
+
+    A piece is what hangs together over gaps of `piece_max_gap_m`. One shorter than `piece_min_extent_m` is a
+    wall only where it lies in line with others, which its mean score tells.
+
+    Returns
+    -------
+    supported : (H, W) bool
+        The occupied cells of the other pieces.
+    """
+    width = 2 * round(parameters.piece_max_gap_m / resolution_m / 2) + 1
+    joined = cv2.dilate(occupied.astype(np.uint8), np.ones((width, width), np.uint8))
+    count, piece, stats, _ = cv2.connectedComponentsWithStats(joined, connectivity=8)
+    cells = piece[occupied]
+    total = np.bincount(cells, weights=score[occupied], minlength=count)
+    mean = total / np.maximum(np.bincount(cells, minlength=count), 1)
+    # The box of a dilated piece is wider by the dilation.
+    sides = (stats[:, [cv2.CC_STAT_WIDTH, cv2.CC_STAT_HEIGHT]] - (width - 1)) * resolution_m
+    wall = (np.hypot(*sides.T) >= parameters.piece_min_extent_m) | (mean >= parameters.piece_min_score)
+    supported: BoolArray = occupied & wall[piece]
+    return supported
+
+
 def clean_threshold(
     score: NDArray[np.float32],
     occupied: BoolArray,
     free_m2: float,
-    count_segments: Callable[[BoolArray], int],
+    count_walls: Callable[[BoolArray], int],
     parameters: SpectrumParameters,
 ) -> float:
     """Find the lowest threshold whose clean map has few enough line segments for its free space.
@@ -60,16 +86,16 @@ def clean_threshold(
     ----------
     free_m2 : float
         Free area of the map.
-    count_segments : callable
+    count_walls : callable
         Number of line segments of a clean map.
     """
-    allowed = parameters.segments_max_per_m2 * free_m2
+    allowed = parameters.walls_max_per_m2 * free_m2
     step = parameters.threshold_step
     steps = np.arange(parameters.threshold_min, parameters.threshold_max + step / 2, step)
     low, high = 0, len(steps) - 1
     while low < high:
         middle = (low + high) // 2
-        if count_segments(occupied & (score >= steps[middle])) <= allowed:
+        if count_walls(occupied & (score >= steps[middle])) <= allowed:
             high = middle
         else:
             low = middle + 1

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rose2_logs.occupancy import BoolArray, FloatArray
 from rose2_logs.parameters import SpectrumParameters
-from rose2_logs.rose.clean_map import attached_cells, clean_threshold, structure_score
+from rose2_logs.rose.clean_map import attached_cells, clean_threshold, structure_score, supported_cells
 from rose2_logs.rose.spectrum import (
     angular_energy,
     compute_spectrum,
@@ -22,7 +22,8 @@ from rose2_logs.rose.spectrum import (
 class RoseResult:
     """Stage A in the grid frame: see `rose.structure.Structure`, which is the same in the world.
 
-    `attached` (H, W) holds the clean map and the cells of lower score that touch it: jambs, ends of walls.
+    `attached` (H, W) holds the clean map and the cells of lower score that touch it: jambs, ends of walls;
+    `supported` (H, W) all occupied cells but those of small pieces that no structure supports.
     """
 
     directions_rad: FloatArray
@@ -31,23 +32,27 @@ class RoseResult:
     threshold: float
     clean: BoolArray
     attached: BoolArray
+    supported: BoolArray
 
 
 def find_structure(
     occupied: BoolArray,
     free_m2: float,
     resolution_m: float,
-    count_segments: Callable[[BoolArray], int],
+    count_walls: Callable[[BoolArray, FloatArray], int],
     parameters: SpectrumParameters,
 ) -> RoseResult:
     """Spectrum, dominant directions, structure score, clean map of the occupied cells (H, W).
 
-    `free_m2` and `count_segments` set the clean map's threshold, see `clean_threshold`.
+    `free_m2` and `count_walls` set the clean map's threshold, see `clean_threshold`.
     """
     spectrum = compute_spectrum(occupied, resolution_m, parameters)
     directions, strengths = dominant_directions(angular_energy(spectrum, parameters), parameters)
     score = structure_score(spectrum, occupied, directions, parameters)
-    threshold = clean_threshold(score, occupied, free_m2, count_segments, parameters)
-    clean = occupied & (score >= threshold)
-    attached = attached_cells(clean, occupied & (score >= parameters.attached_share * threshold))
-    return RoseResult(directions, strengths, score, threshold, clean, attached)
+    supported = supported_cells(score, occupied, resolution_m, parameters)
+    threshold = clean_threshold(
+        score, supported, free_m2, lambda clean: count_walls(clean, directions), parameters
+    )
+    clean = supported & (score >= threshold)
+    attached = attached_cells(clean, supported & (score >= parameters.attached_share * threshold))
+    return RoseResult(directions, strengths, score, threshold, clean, attached, supported)

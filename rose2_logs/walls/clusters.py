@@ -10,6 +10,7 @@ from sklearn.cluster import DBSCAN
 
 from rose2_logs.occupancy import FloatArray
 from rose2_logs.parameters import WallParameters
+from rose2_logs.walls.segments import Segments
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,21 +39,16 @@ class WallClusters:
     of_segment: NDArray[np.int32]
 
 
-def cluster_segments(
-    segments_m: FloatArray,
-    directions_rad: FloatArray,
-    direction: NDArray[np.int32],
-    parameters: WallParameters,
-) -> WallClusters:
-    """Align the segments with their direction and join those close to each other by DBSCAN.
+def cluster_segments(segments: Segments, parameters: WallParameters) -> WallClusters:
+    """Join the segments of one direction that are close to each other by DBSCAN.
 
     Distance is lateral offset over `cluster_lateral_m` or gap along the wall over `cluster_gap_m`, the larger
     of the two. Each cluster lies at the median offset of its segments, weighted by their length.
     """
-    offset, start, end = along_and_across(segments_m, directions_rad[direction])
-    of_segment = np.full(len(segments_m), -1, np.int32)
+    direction, offset, start, end = segments.direction, segments.offset, segments.start, segments.end
+    of_segment = np.full(len(offset), -1, np.int32)
     count = 0
-    for index in range(len(directions_rad)):
+    for index in range(len(segments.directions_rad)):
         chosen = np.flatnonzero(direction == index)
         if len(chosen):
             labels = _dbscan_intervals(offset[chosen], start[chosen], end[chosen], parameters)
@@ -73,17 +69,6 @@ def cluster_segments(
         covered_length(start, end, of_segment, count),
         of_segment,
     )
-
-
-def along_and_across(
-    segments_m: FloatArray, angle_rad: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Offset across and interval along a direction of each segment, which is turned about its middle."""
-    c, s = np.cos(angle_rad), np.sin(angle_rad)
-    middle_x, middle_y = (segments_m[:, 0] + segments_m[:, 2]) / 2, (segments_m[:, 1] + segments_m[:, 3]) / 2
-    along = middle_x * c + middle_y * s
-    half = np.hypot(segments_m[:, 2] - segments_m[:, 0], segments_m[:, 3] - segments_m[:, 1]) / 2
-    return middle_y * c - middle_x * s, along - half, along + half
 
 
 def _dbscan_intervals(

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from rose2_logs.occupancy import FloatArray
 from rose2_logs.parameters import WallParameters
 from rose2_logs.walls.clusters import WallClusters
+from rose2_logs.walls.segments import line_ends
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +81,7 @@ def representative_lines(
     keep = weight >= parameters.line_min_weight
     renumber = np.where(keep, np.cumsum(keep) - 1, -1).astype(np.int32)
     return RepresentativeLines(
-        line_points(directions_rad[direction], line_offset, first, last)[keep],
+        line_ends(directions_rad[direction], line_offset, first, last)[keep],
         direction[keep],
         np.minimum(weight[keep], 1.0),
         renumber[of_cluster],
@@ -103,11 +104,3 @@ def _shared_offsets(clusters: WallClusters, lateral_m: float) -> FloatArray:
                 taken.append(float(value))
                 shared[member] = value
     return shared
-
-
-def line_points(angle_rad: FloatArray, offset: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
-    """Ends (L, 4) of lines given by direction, offset across it and interval along it."""
-    c, s = np.cos(angle_rad), np.sin(angle_rad)
-    return np.column_stack(
-        [start * c - offset * s, start * s + offset * c, end * c - offset * s, end * s + offset * c]
-    )

@@ -11,7 +11,7 @@ from rose2_logs.occupancy import BoolArray, FloatArray
 from rose2_logs.parameters import WallParameters
 from rose2_logs.walls.clusters import cluster_segments
 from rose2_logs.walls.lines import RepresentativeLines, representative_lines
-from rose2_logs.walls.segments import detect_local_segments, detect_segments, group_by_angle
+from rose2_logs.walls.segments import detect_segments, join_segments, local_directions
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,17 +51,33 @@ def find_walls(
     parameters: WallParameters,
 ) -> WallResult:
     """Segments, wall clusters and representative lines of a clean map (H, W) and what is attached to it."""
-    along = detect_segments(clean, resolution_m, parameters)
-    local, local_walls = detect_local_segments(occupied, clean, resolution_m, parameters)
-    segments = np.concatenate([along, local])
-    directions, direction = group_by_angle(segments, dominant_rad, parameters)
-    clusters = cluster_segments(segments, directions, direction, parameters)
-    lines = representative_lines(clusters, directions, len(dominant_rad), parameters)
+    along, _ = detect_segments(clean, dominant_rad, resolution_m, parameters.segment_min_length_m, parameters)
+    # Off the dominant directions nothing but its length tells a wall from furniture.
+    local, local_walls = detect_segments(
+        occupied & ~clean,
+        local_directions(dominant_rad, parameters),
+        resolution_m,
+        parameters.local_segment_min_length_m,
+        parameters,
+    )
+    segments = join_segments(along, local)
+    clusters = cluster_segments(segments, parameters)
+    lines = representative_lines(clusters, segments.directions_rad, len(dominant_rad), parameters)
     return WallResult(
-        segments,
-        direction,
+        segments.ends_m,
+        segments.direction,
         lines.of_cluster[clusters.of_segment],
-        directions,
+        segments.directions_rad,
         lines,
         attached | local_walls,
     )
+
+
+def count_walls(
+    clean: BoolArray, dominant_rad: FloatArray, resolution_m: float, parameters: WallParameters
+) -> int:
+    """Number of wall clusters along the dominant directions of a clean map (H, W)."""
+    segments, _ = detect_segments(
+        clean, dominant_rad, resolution_m, parameters.segment_min_length_m, parameters
+    )
+    return len(cluster_segments(segments, parameters).offset)

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rose2_logs.parameters import SpectrumParameters
-from rose2_logs.rose.clean_map import attached_cells, clean_threshold, structure_score
+from rose2_logs.rose.clean_map import attached_cells, clean_threshold, structure_score, supported_cells
 from rose2_logs.rose.spectrum import angular_energy, compute_spectrum, dominant_directions
 
 PARAMETERS = SpectrumParameters()
@@ -51,7 +51,7 @@ def test_a_long_wall_scores_high_and_a_chair_leg_low_whatever_the_wall_is_thick(
 def test_the_threshold_is_the_lowest_that_leaves_few_enough_segments():
     occupied = np.ones((10, 10), bool)
     score = np.linspace(0, 1, 100, dtype=np.float32).reshape(10, 10)
-    free_m2 = 40 / PARAMETERS.segments_max_per_m2
+    free_m2 = 40 / PARAMETERS.walls_max_per_m2
     threshold = clean_threshold(score, occupied, free_m2, lambda clean: int(clean.sum()), PARAMETERS)
     assert (score >= threshold).sum() <= 40
     assert (score >= threshold - PARAMETERS.threshold_step).sum() > 40
@@ -63,3 +63,14 @@ def test_jambs_that_touch_a_wall_are_attached_and_lone_cells_are_not():
     attached = attached_cells(clean, candidates)
     assert attached[2, :6].all()
     assert attached.sum() == 6
+
+
+def test_small_pieces_are_left_out_unless_they_lie_in_line_with_walls():
+    occupied = np.zeros((100, 200), bool)
+    occupied[20, 10:190] = occupied[60, 20:30] = occupied[80, 20:30] = True
+    score = np.where(occupied, 0.1, 0).astype(np.float32)
+    score[80] = np.where(occupied[80], PARAMETERS.piece_min_score + 0.1, 0)
+    supported = supported_cells(score, occupied, 0.05, PARAMETERS)
+    assert supported[20].sum() == 180
+    assert supported[60].sum() == 0
+    assert supported[80].sum() == 10
