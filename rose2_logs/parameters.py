@@ -77,10 +77,10 @@ class SpectrumParameters:
     threshold_max: float = _number(0.85, "score", "Greatest threshold of the clean map that is tried.", 0, 1)
     threshold_step: float = _number(0.05, "score", "Step of the search for the threshold.", 0.001, 1)
     attached_share: float = _number(
-        0.75, "share", "Cells of this share of the threshold that touch the clean map are wall too.", 0, 1
+        0.4, "share", "Cells of this share of the threshold that touch the clean map are wall too.", 0, 1
     )
     walls_max_per_m2: float = _number(
-        0.17, "1/m2", "Wall clusters per free area of a clean map; empty floor plans have about 0.1.", 0.0
+        0.155, "1/m2", "Wall clusters per free area of a clean map; empty floor plans have about 0.1.", 0.0
     )
 
 
@@ -104,11 +104,11 @@ class WallParameters:
     local_segment_min_length_m: float = _number(
         1.2, "m", "Off the dominant directions only walls longer than most furniture count.", 0.01
     )
-    line_lateral_m: float = _number(0.3, "m", "Both faces of one wall share a representative line.", 0.0)
+    line_lateral_m: float = _number(0.2, "m", "Both faces of one wall share a representative line.", 0.0)
     extension_m: float = _number(
         8.0, "m", "A wall may go on unseen for a room's width beyond its evidence.", 0.0
     )
-    local_extension_m: float = _number(0.6, "m", "A chord of a curved wall reaches to the next chord.", 0.0)
+    local_extension_m: float = _number(1.0, "m", "A chord of a curved wall reaches to the next chord.", 0.0)
     extension_per_length: float = _number(
         4.0, "1", "A short wall reaches not further than this times itself."
     )
@@ -120,10 +120,10 @@ class FloorPlanParameters:
     """Stage C: edge weights, faces, rooms (paper, III-C)."""
 
     wall_tolerance_m: float = _number(
-        0.2, "m", "A wall counts for an edge when it lies this near: a wall's half thickness and drift.", 0.0
+        0.15, "m", "A wall counts for an edge when it lies this near: a wall's half thickness and drift.", 0.0
     )
     face_min_seen: float = _number(
-        0.05, "share", "A face less seen than this is outside: it holds rays through windows.", 0, 1
+        0.1, "share", "A face less seen than this is outside: it holds rays through windows.", 0, 1
     )
     shape_min_seen: float = _number(
         0.2, "share", "A face seen this much belongs to its room's predicted shape; the paper's value.", 0, 1
@@ -143,7 +143,7 @@ class FloorPlanParameters:
         0.15, "m", "Least open border for faces to join: three cells of 5 cm.", 0
     )
     join_min_passage: float = _number(
-        0.75, "1", "Faces join when the passage is this wide against the narrower one's width.", 0
+        0.7, "1", "Faces join when the passage is this wide against the narrower one's width.", 0
     )
     passage_look_widths: float = _number(
         2.0, "1", "How far from a passage its width is compared with the room's, in widths.", 0.0
