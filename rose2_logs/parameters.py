@@ -68,7 +68,7 @@ class SpectrumParameters:
     )
     piece_max_gap_m: float = _number(0.25, "m", "Occupied cells hang together over gaps of five cells.", 0.0)
     piece_min_extent_m: float = _number(
-        1.2, "m", "Pieces longer than a door is wide may be walls by themselves.", 0.0
+        1.6, "m", "Pieces longer than a door is wide may be walls by themselves.", 0.0
     )
     piece_min_score: float = _number(
         0.5, "score", "Shorter pieces are walls where this share of the line through them is wall.", 0, 1
@@ -77,10 +77,10 @@ class SpectrumParameters:
     threshold_max: float = _number(0.85, "score", "Greatest threshold of the clean map that is tried.", 0, 1)
     threshold_step: float = _number(0.05, "score", "Step of the search for the threshold.", 0.001, 1)
     attached_share: float = _number(
-        0.4, "share", "Cells of this share of the threshold that touch the clean map are wall too.", 0, 1
+        0.5, "share", "Cells of this share of the threshold that touch the clean map are wall too.", 0, 1
     )
     walls_max_per_m2: float = _number(
-        0.155, "1/m2", "Wall clusters per free area of a clean map; empty floor plans have about 0.1.", 0.0
+        0.15, "1/m2", "Wall clusters per free area of a clean map; empty floor plans have about 0.1.", 0.0
     )
 
 
