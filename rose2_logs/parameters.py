@@ -160,11 +160,23 @@ class FloorPlanParameters:
 class TopologyParameters:
     """Stage D: Voronoi graph, splitting of rooms, doorways (paper, III-D)."""
 
-    voronoi_min_clearance_m: float = _number(
-        0.25, "m", "The graph keeps clear of walls by the half width of a small robot.", 0.0
+    summit_reach_m: float = _number(
+        0.15, "m", "A summit of the clearance is the highest this far around: a wall's thickness.", 0.0
     )
-    split_min_area_m2: float = _number(2.0, "m2", "Smaller parts of a graph are niches.", 0.0)
-    split_min_purity: float = _number(0.9, "share", "A cut leaves this share of each part on its side.", 0, 1)
+    passage_min_ratio: float = _number(
+        0.3,
+        "share",
+        "A passage joins when its clearance is this much of that beside it; doors have less.",
+        0,
+        1,
+    )
+    split_min_clearance_m: float = _number(
+        0.5, "m", "Parts narrower on both sides of their middle are niches.", 0.0
+    )
+    split_min_area_m2: float = _number(3.0, "m2", "Smaller parts are niches: the least room.", 0.0)
+    split_min_purity: float = _number(
+        0.98, "share", "A cut leaves this share of each part on its side.", 0, 1
+    )
     max_rounds: int = _number(5, "1", "Rounds of splitting; the paper's implementation has five.", 0, 100)
     doorway_min_width_m: float = _number(0.3, "m", "Narrower contacts of two rooms are noise.", 0.0)
 

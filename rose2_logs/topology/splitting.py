@@ -1,4 +1,4 @@
-"""Rooms whose Voronoi graph is not connected are split (paper, III-D)."""
+"""Rooms whose Voronoi graph is not connected, or only through narrow passages, are split (paper, III-D)."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from rose2_logs.occupancy import BoolArray, FloatArray, distinct_labels
 from rose2_logs.parameters import TopologyParameters
-from rose2_logs.topology.voronoi import clear_parts
+from rose2_logs.topology.voronoi import parts_between_passages
 
 
 def split_rooms(
@@ -18,9 +18,9 @@ def split_rooms(
     resolution_m: float,
     parameters: TopologyParameters,
 ) -> NDArray[np.int32]:
-    """Split rooms until the Voronoi graph of each is connected.
+    """Split rooms until the Voronoi graph of each is connected by more than narrow passages.
 
-    Two large parts of a room's graph are divided along the representative line that best keeps them apart;
+    Two large parts of a room are divided along the representative line that best keeps them apart;
     where none does, along the dominant direction that does, midway between the parts. A cut touches the cells
     of its own room only.
 
@@ -32,7 +32,7 @@ def split_rooms(
     labels = labels.copy()
     lines = _as_normals(lines_m)
     for _ in range(parameters.max_rounds):
-        part = clear_parts(labels, walls, resolution_m, parameters.voronoi_min_clearance_m)
+        part = parts_between_passages(labels, walls, resolution_m, parameters)
         size = np.bincount(part.ravel()) * resolution_m**2
         size[0] = 0
         large = np.flatnonzero(size >= parameters.split_min_area_m2)

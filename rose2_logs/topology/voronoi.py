@@ -1,64 +1,155 @@
-"""The Voronoi graph of each room's free space (paper, III-D)."""
+"""The Voronoi graph of each room's free space, and the parts between its passages (paper, III-D)."""
 
 from __future__ import annotations
+
+import heapq
+from collections import defaultdict
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 from skimage.morphology import skeletonize
+from skimage.segmentation import watershed
 
-from rose2_logs.occupancy import BoolArray
+from rose2_logs.occupancy import BoolArray, FloatArray
+from rose2_logs.parameters import TopologyParameters
+
+SMOOTH_CELLS = 1.0
+"""Blur of the clearance, so that the steps of the raster are no summits of their own."""
 
 
-def clear_parts(
-    labels: NDArray[np.int32], walls: BoolArray, resolution_m: float, min_clearance_m: float
+def parts_between_passages(
+    labels: NDArray[np.int32], walls: BoolArray, resolution_m: float, parameters: TopologyParameters
 ) -> NDArray[np.int32]:
-    """Find the connected parts of each room's free space that keeps clear of walls.
+    """Find the parts of each room that only narrow passages connect.
 
-    They are the connected parts of the room's Voronoi graph as far as a robot of that half width can follow
-    it: thinning to the graph keeps what is connected.
+    A passage is a point of the Voronoi graph where the clearance, the distance from walls, is least between
+    two summits: a saddle. Two parts are one where the clearance of the passage is at least
+    `passage_min_ratio` of that of the less open part; what is too small or too narrow joins what it opens to
+    most.
 
     Parameters
     ----------
     labels : (H, W) int32
         The segmented map.
     walls : (H, W) bool
-        Cells of the clean map; clutter does not cut a room in two.
-    min_clearance_m : float
-        The graph keeps this far from walls.
+        Cells of walls; clutter makes no passage.
 
     Returns
     -------
     part : (H, W) int32
-        Parts 1.., 0 elsewhere; no part spans two rooms.
+        Parts 1.., 0 where there is no room; no part spans two rooms.
     """
-    return _parts_within_rooms(labels, _clear_space(labels, walls, resolution_m, min_clearance_m))
+    clear = clearance_m(walls, resolution_m)
+    basin, room = _basins(labels, clear, resolution_m, parameters.summit_reach_m)
+    count = len(room)
+    summit = np.zeros(count)
+    np.maximum.at(summit, basin.ravel(), clear.ravel())
+    area: FloatArray = np.bincount(basin.ravel(), minlength=count).astype(float) * resolution_m**2
+    root = _join_basins(_passages(basin, room, clear), summit, area, parameters)
+    part: NDArray[np.int32] = root[basin].astype(np.int32)
+    return part
 
 
 def voronoi_graph(
     labels: NDArray[np.int32], walls: BoolArray, resolution_m: float, min_clearance_m: float
 ) -> NDArray[np.int32]:
     """Row and column (K, 2) of the cells of the Voronoi graph: the skeleton of the clear free space."""
-    clear = _clear_space(labels, walls, resolution_m, min_clearance_m)
+    clear = (labels > 0) & (clearance_m(walls, resolution_m) >= min_clearance_m)
     skeleton = skeletonize(clear)  # type: ignore[no-untyped-call]
     return np.argwhere(skeleton).astype(np.int32)
 
 
-def _clear_space(
-    labels: NDArray[np.int32], walls: BoolArray, resolution_m: float, min_clearance_m: float
-) -> BoolArray:
+def clearance_m(walls: BoolArray, resolution_m: float) -> NDArray[np.float32]:
+    """Distance (H, W) from the nearest wall cell in metres, slightly blurred."""
     distance = cv2.distanceTransform((~walls).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
-    clear: BoolArray = (labels > 0) & (distance * resolution_m >= min_clearance_m)
-    return clear
+    blurred: NDArray[np.float32] = cv2.GaussianBlur(distance, (0, 0), SMOOTH_CELLS) * np.float32(resolution_m)
+    return blurred
 
 
-def _parts_within_rooms(labels: NDArray[np.int32], clear: BoolArray) -> NDArray[np.int32]:
-    """Connected parts of the clear cells of each room: parts that a passage joins stay apart by room."""
-    # Rooms are separated by cutting every cell whose lower or right neighbour lies in another room.
-    cut = clear.copy()
-    cut[:, :-1] &= (labels[:, :-1] == labels[:, 1:]) | ~clear[:, 1:]
-    cut[:-1] &= (labels[:-1] == labels[1:]) | ~clear[1:]
-    cut[:-1, :-1] &= (labels[:-1, :-1] == labels[1:, 1:]) | ~clear[1:, 1:]
-    cut[:-1, 1:] &= (labels[:-1, 1:] == labels[1:, :-1]) | ~clear[1:, :-1]
-    _, part = cv2.connectedComponents(cut.astype(np.uint8), connectivity=8, ltype=cv2.CV_32S)
-    return np.asarray(part, np.int32)
+def _basins(
+    labels: NDArray[np.int32], clear: NDArray[np.float32], resolution_m: float, reach_m: float
+) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Divide rooms at the valleys between the summits of the clearance.
+
+    Returns
+    -------
+    basin : (H, W) int32
+        Basins 1.., 0 outside rooms.
+    room : (B,) int32
+        Room of each basin; entry 0 stands for the outside.
+    """
+    inside = labels > 0
+    width = 2 * max(1, round(reach_m / resolution_m)) + 1
+    summits = inside & (clear == cv2.dilate(clear, np.ones((width, width), np.uint8)))
+    markers, _ = ndimage.label(summits, np.ones((3, 3)))
+    flooded = watershed(-clear, markers, mask=inside)  # type: ignore[no-untyped-call]
+    key = np.where(inside, flooded.astype(np.int64) * (int(labels.max(initial=0)) + 1) + labels, 0)
+    found, basin = np.unique(np.append(key.ravel(), 0), return_inverse=True)
+    room = found % (int(labels.max(initial=0)) + 1)
+    return basin[:-1].reshape(labels.shape).astype(np.int32), room.astype(np.int32)
+
+
+def _passages(
+    basin: NDArray[np.int32], room: NDArray[np.int32], clear: NDArray[np.float32]
+) -> dict[int, dict[int, float]]:
+    """Clearance in metres of the widest passage between neighbouring basins of one room."""
+    count = len(room)
+    keys, widths = [], []
+    for first, second in (
+        ((slice(None), slice(None, -1)), (slice(None), slice(1, None))),
+        ((slice(None, -1), slice(None)), (slice(1, None), slice(None))),
+    ):
+        a, b = basin[first].astype(np.int64), basin[second].astype(np.int64)
+        meet = (a != b) & (a > 0) & (b > 0) & (room[a] == room[b])
+        keys.append(np.minimum(a, b)[meet] * count + np.maximum(a, b)[meet])
+        widths.append(np.minimum(clear[first], clear[second])[meet])
+    pairs, index = np.unique(np.concatenate(keys), return_inverse=True)
+    widest = np.zeros(len(pairs))
+    np.maximum.at(widest, index, np.concatenate(widths))
+    passages: dict[int, dict[int, float]] = defaultdict(dict)
+    for pair, width in zip(pairs.tolist(), widest.tolist(), strict=True):
+        a, b = divmod(pair, count)
+        passages[a][b] = passages[b][a] = width
+    return passages
+
+
+def _join_basins(
+    passages: dict[int, dict[int, float]],
+    summit: FloatArray,
+    area: FloatArray,
+    parameters: TopologyParameters,
+) -> NDArray[np.intp]:
+    """Join the two basins with the widest passage, again and again; return the part of each basin."""
+    parent = np.arange(len(summit))
+
+    def openness(a: int, b: int) -> float:
+        """Width of the passage for the less open side; what is no part by itself comes first."""
+        ratio = passages[a][b] / max(min(summit[a], summit[b]), 1e-9)
+        is_part = (
+            min(area[a], area[b]) >= parameters.split_min_area_m2
+            and min(summit[a], summit[b]) >= parameters.split_min_clearance_m
+        )
+        return float(ratio if is_part else 1 + ratio)
+
+    heap = [(-openness(a, b), a, b) for a in passages for b in passages[a] if a < b]
+    heapq.heapify(heap)
+    while heap:
+        value, a, b = heapq.heappop(heap)
+        if b not in passages.get(a, {}) or value != -openness(a, b):
+            continue
+        if -value < parameters.passage_min_ratio:
+            break
+        parent[b] = a
+        summit[a] = max(summit[a], summit[b])
+        area[a] += area[b]
+        for c, width in passages.pop(b).items():
+            del passages[c][b]
+            if c != a:
+                passages[a][c] = passages[c][a] = max(passages[a].get(c, 0.0), width)
+        for c in passages[a]:
+            heapq.heappush(heap, (-openness(a, c), min(a, c), max(a, c)))
+    while not np.array_equal(parent, parent[parent]):
+        parent = parent[parent]
+    return parent

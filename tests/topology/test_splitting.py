@@ -1,10 +1,11 @@
 """Stage D: rooms whose free space falls apart are split."""
 
 import numpy as np
+import pytest
 
 from rose2_logs.parameters import TopologyParameters
 from rose2_logs.topology.splitting import split_rooms
-from rose2_logs.topology.voronoi import voronoi_graph
+from rose2_logs.topology.voronoi import parts_between_passages, voronoi_graph
 
 PARAMETERS = TopologyParameters()
 NO_LINES = np.zeros((0, 4))
@@ -48,3 +49,38 @@ def test_the_voronoi_graph_runs_in_the_middle_of_a_corridor():
     middle = graph[(graph[:, 1] > 30) & (graph[:, 1] < 170)]
     assert len(middle) > 100
     assert np.abs(middle[:, 0] - 19.5).max() <= 1
+
+
+def test_a_narrow_gap_divides_the_parts_of_a_room_and_a_wide_one_does_not():
+    labels, walls = dumbbell()
+    part = parts_between_passages(labels, walls, 0.05, PARAMETERS)
+    assert len(np.unique(part[part > 0])) == 2
+    assert ((part > 0) == (labels > 0)).all()
+    walls[20:80, 84:86] = False
+    labels = np.where(walls, 0, 1).astype(np.int32)
+    assert len(np.unique(parts_between_passages(labels, walls, 0.05, PARAMETERS)[labels > 0])) == 1
+
+
+def test_no_part_spans_two_rooms_and_a_niche_is_no_part():
+    labels = np.ones((100, 200), np.int32)
+    labels[:, 100:] = 2
+    walls = np.zeros(labels.shape, bool)
+    walls[:20] = True
+    walls[5:20, 40:60] = walls[20, 48:52] = False  # a niche of 1 x 0.75 m with a mouth of 0.2 m
+    walls[19, :48] = walls[19, 52:] = True
+    labels[walls] = 0
+    part = parts_between_passages(labels, walls, 0.05, PARAMETERS)
+    for number in np.unique(part[part > 0]):
+        assert len(np.unique(labels[part == number])) == 1
+    assert part[10, 50] == part[60, 50] != part[60, 150]
+
+
+@pytest.mark.parametrize("change", [np.fliplr, np.flipud, np.rot90])
+def test_the_parts_of_a_mirrored_or_turned_map_are_the_same(change):
+    labels, walls = dumbbell()
+    part = parts_between_passages(labels, walls, 0.05, PARAMETERS)
+    changed = parts_between_passages(
+        np.ascontiguousarray(change(labels)), np.ascontiguousarray(change(walls)), 0.05, PARAMETERS
+    )
+    pairs = np.unique(np.column_stack([change(part).ravel(), changed.ravel()]), axis=0)
+    assert len(pairs) == 3
