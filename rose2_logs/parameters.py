@@ -166,7 +166,7 @@ class TopologyParameters:
     passage_min_ratio: float = _number(
         0.3,
         "share",
-        "A passage joins when its clearance is this much of that beside it; doors have less.",
+        "A passage joins with this share of the clearance beside it; gaps in walls have less.",
         0,
         1,
     )

@@ -85,10 +85,12 @@ def _basins(
     summits = inside & (clear == cv2.dilate(clear, np.ones((width, width), np.uint8)))
     markers, _ = ndimage.label(summits, np.ones((3, 3)))
     flooded = watershed(-clear, markers, mask=inside)  # type: ignore[no-untyped-call]
-    key = np.where(inside, flooded.astype(np.int64) * (int(labels.max(initial=0)) + 1) + labels, 0)
-    found, basin = np.unique(np.append(key.ravel(), 0), return_inverse=True)
-    room = found % (int(labels.max(initial=0)) + 1)
-    return basin[:-1].reshape(labels.shape).astype(np.int32), room.astype(np.int32)
+    rooms = int(labels.max(initial=0)) + 1
+    key = np.where(inside, flooded.astype(np.int64) * rooms + labels, 0)
+    present = np.bincount(key.ravel()) > 0
+    present[0] = True
+    number = np.cumsum(present) - 1
+    return number[key].astype(np.int32), (np.flatnonzero(present) % rooms).astype(np.int32)
 
 
 def _passages(

@@ -140,7 +140,9 @@ def _straight_runs(
     lattice = np.floor(across / resolution_m).astype(np.int64)
     strip = np.concatenate([2 * (lattice // 2), 2 * ((lattice + 1) // 2) - 1])
     point = np.concatenate([np.arange(len(chosen))] * 2)
-    order = np.lexsort((along[point], strip))
+    # One number sorts by strip, then along it.
+    span = float(np.ptp(along)) + 1.0 if len(along) else 1.0
+    order = np.argsort(strip * span + (along[point] - along.min(initial=0.0)), kind="stable")
     strip, point = strip[order], point[order]
     position = along[point]
     gap = np.diff(position, prepend=-np.inf)
