@@ -164,11 +164,7 @@ class TopologyParameters:
         0.15, "m", "A summit of the clearance is the highest this far around: a wall's thickness.", 0.0
     )
     passage_min_ratio: float = _number(
-        0.3,
-        "share",
-        "A passage joins with this share of the clearance beside it; gaps in walls have less.",
-        0,
-        1,
+        0.2, "share", "A passage joins with this share of the clearance beside it; gaps have less.", 0, 1
     )
     split_min_clearance_m: float = _number(
         0.5, "m", "Parts narrower on both sides of their middle are niches.", 0.0
