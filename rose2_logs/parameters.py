@@ -55,7 +55,11 @@ class SpectrumParameters:
         math.radians(0.75), "rad", "Smoothing of the angular energy, three bins.", 0.0, 0.2
     )
     peak_min_prominence: float = _number(
-        0.2, "share of the range", "A direction's peak stands out by this much; the paper's value.", 0, 1
+        0.12,
+        "share of the range",
+        "A direction's peak stands out by this much: one wing of a building.",
+        0,
+        1,
     )
     direction_min_gap_rad: float = _number(
         math.radians(5.0), "rad", "Directions closer than this are one.", 0.0, 1.5
