@@ -8,6 +8,7 @@ Needs a Vulkan driver; Debian's ``mesa-vulkan-drivers`` draws in software.
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 import time
 from pathlib import Path
@@ -31,6 +32,8 @@ def screenshot(recording: Path, picture: Path, coverage: float = 1.0, port: int 
     RuntimeError
         If a view reports an error, or the recording does not load.
     """
+    # The viewer is looked for on the path, where an environment that is not activated does not stand.
+    os.environ["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', '')}"
     with ViewerClient.spawn(headless=True, port=port, detach_process=False) as viewer:
         viewer.open(str(recording.resolve()))
         _wait_until_loaded(viewer)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import logging
+import os
+import sys
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -79,7 +81,7 @@ class RerunRecording:
                 raise OutputError(f"{self._part.parent}: cannot be written: {error}") from error
             sinks.append(rr.FileSink(str(self._part)))
         if self._live:
-            self._recording.spawn(connect=False)
+            _open_viewer(self._recording)
             sinks.append(rr.GrpcSink())
         self._recording.set_sinks(*sinks)
         self._recording.set_log_time_enabled(False)
@@ -237,6 +239,27 @@ class RerunRecording:
         # Names come from a log: a bar would end a cell of the table.
         lines = [f"| {name} | {str(value).replace('|', '/')} |" for name, value in rows.items()]
         return "\n".join(["| run | |", "|---|---|", *lines])
+
+
+def _open_viewer(recording: rr.RecordingStream) -> None:
+    """Start a viewer if none is open; it is found beside this Python where that is not on the path.
+
+    Raises
+    ------
+    OutputError
+        If there is none and none can be started.
+    """
+    path = os.environ.get("PATH", "")
+    os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), path])
+    try:
+        recording.spawn(connect=False)
+    except RuntimeError as error:
+        first = str(error).splitlines()[0]
+        raise OutputError(
+            f"no Rerun viewer is open and none can be started ({first}); run `rerun`, or leave --live out"
+        ) from error
+    finally:
+        os.environ["PATH"] = path
 
 
 def event_text(event: RoomEvent) -> str:

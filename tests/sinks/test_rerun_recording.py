@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ import pyarrow.parquet as pq
 import pytest
 from saved_maps import save_run
 
+from rose2_logs.errors import OutputError
 from rose2_logs.readers import Selection
 from rose2_logs.run import RunOptions, analyse_log
 
@@ -75,10 +77,13 @@ def test_a_run_that_fails_leaves_no_recording(tmp_path):
     assert [file.name for file in tmp_path.iterdir()] == ["maps"]
 
 
-@pytest.mark.skipif(
+needs_vulkan = pytest.mark.skipif(
     not list(Path("/usr/share/vulkan/icd.d").glob("lvp_icd*")),
     reason="the headless viewer needs a Vulkan driver (mesa-vulkan-drivers)",
 )
+
+
+@needs_vulkan
 def test_the_viewer_draws_the_rooms_and_reports_no_error(recording, tmp_path):
     from PIL import Image
 
@@ -98,3 +103,29 @@ def test_the_viewer_draws_the_rooms_and_reports_no_error(recording, tmp_path):
     coloured = (view.max(-1) - view.min(-1)) > 40
     # The map fills a good part of its view and most of it is rooms.
     assert coloured.mean() > 0.15
+
+
+@needs_vulkan
+def test_a_run_is_shown_in_the_viewer_that_is_open_and_stored_too(tmp_path, monkeypatch):
+    from rerun.experimental import ViewerClient
+
+    monkeypatch.setenv("PATH", f"{BIN}:/usr/bin:/bin")
+    monkeypatch.setenv("HOME", str(tmp_path))
+    with ViewerClient.spawn(headless=True, port=9876, detach_process=False) as viewer:
+        options = RunOptions(selection=Selection(max_snapshots=3), annotated_log=False, live=True)
+        log = PROJECT / "sample_logs" / "office.mcap"
+        done = analyse_log(log, tmp_path / "out", options)
+        end = time.monotonic() + 60
+        while not viewer.get_state().views and time.monotonic() < end:
+            time.sleep(0.5)
+        assert viewer.get_state().views
+    assert (done.folder / "office.rrd").stat().st_size > 0
+
+
+def test_live_without_a_viewer_says_what_to_do(tmp_path, monkeypatch):
+    monkeypatch.setattr(sys, "executable", str(tmp_path / "python"))
+    monkeypatch.setenv("PATH", str(tmp_path))
+    options = RunOptions(selection=Selection(max_snapshots=1), annotated_log=False, live=True)
+    with pytest.raises(OutputError, match="no Rerun viewer is open"):
+        analyse_log(PROJECT / "sample_logs" / "office.mcap", tmp_path / "out", options)
+    assert not list((tmp_path / "out").glob("*.rrd"))
