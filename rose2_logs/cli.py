@@ -189,7 +189,9 @@ def view(
 
     if not recording.is_file():
         raise LogError(f"{recording}: there is no such file; rose2-logs analyze writes recordings")
-    command = [sys.executable, "-m", "rerun", str(recording), *(["--web-viewer"] if web else [])]
+    # Rerun's servers answer the whole network unless they are told otherwise.
+    command = [sys.executable, "-m", "rerun", "--bind", "127.0.0.1", str(recording)]
+    command += ["--web-viewer"] if web else []
     raise typer.Exit(subprocess.run(command, check=False).returncode)
 
 

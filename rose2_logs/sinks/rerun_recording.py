@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import logging
-import os
+import socket
+import subprocess
 import sys
+import time
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -33,6 +35,9 @@ OUTLINE_POINTS, WALL_POINTS, LINE_POINTS = 2.0, 1.5, 0.75
 """Widths of lines in points of the screen, which stay readable at any zoom."""
 TIMELINES = ("message_log_time", "ros2_timestamp", "snapshot", "coverage")
 FLUSH_TIMEOUT_S = 60.0
+VIEWER_PORT = 9876
+"""Where Rerun's viewer listens unless told otherwise."""
+VIEWER_START_S, VIEWER_SETTLE_S = 30.0, 1.0
 
 
 class RerunRecording:
@@ -81,7 +86,7 @@ class RerunRecording:
                 raise OutputError(f"{self._part.parent}: cannot be written: {error}") from error
             sinks.append(rr.FileSink(str(self._part)))
         if self._live:
-            _open_viewer(self._recording)
+            _open_viewer()
             sinks.append(rr.GrpcSink())
         self._recording.set_sinks(*sinks)
         self._recording.set_log_time_enabled(False)
@@ -110,7 +115,7 @@ class RerunRecording:
             # A live viewer shows the layout from the beginning; the file gets the final one.
             recording.send_blueprint(make_blueprint(self._low, self._high))
         self._frames += 1
-        recording.flush(timeout_sec=FLUSH_TIMEOUT_S)
+        self._flush()
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
@@ -122,7 +127,7 @@ class RerunRecording:
                 )
                 if self._frames:
                     self._recording.send_blueprint(make_blueprint(self._low, self._high))
-            self._recording.flush(timeout_sec=FLUSH_TIMEOUT_S)
+            self._flush()
             self._recording.disconnect()
             if kind is None and self._path is not None and self._part is not None:
                 try:
@@ -132,6 +137,15 @@ class RerunRecording:
         finally:
             if self._part is not None:
                 self._part.unlink(missing_ok=True)
+
+    def _flush(self) -> None:
+        """Write what was logged; a viewer that was closed along the way does not stop the run."""
+        try:
+            self._recording.flush(timeout_sec=FLUSH_TIMEOUT_S)
+        except RuntimeError as error:
+            if not self._live:
+                raise OutputError(f"{self._path}: cannot be written: {error}") from error
+            logger.warning("the Rerun viewer does not answer any more; the run goes on without it")
 
     def _log_map(self, frame: TrackedSnapshot) -> None:
         cells, geometry = frame.snapshot.cells, frame.analysis.geometry
@@ -241,25 +255,34 @@ class RerunRecording:
         return "\n".join(["| run | |", "|---|---|", *lines])
 
 
-def _open_viewer(recording: rr.RecordingStream) -> None:
-    """Start a viewer if none is open; it is found beside this Python where that is not on the path.
+def _open_viewer() -> None:
+    """Start a viewer, for this machine only, unless one is open.
 
     Raises
     ------
     OutputError
         If there is none and none can be started.
     """
-    path = os.environ.get("PATH", "")
-    os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), path])
-    try:
-        recording.spawn(connect=False)
-    except RuntimeError as error:
-        first = str(error).splitlines()[0]
-        raise OutputError(
-            f"no Rerun viewer is open and none can be started ({first}); run `rerun`, or leave --live out"
-        ) from error
-    finally:
-        os.environ["PATH"] = path
+    if _listens(VIEWER_PORT):
+        return
+    command = [sys.executable, "-m", "rerun", "--bind", "127.0.0.1", "--port", str(VIEWER_PORT)]
+    viewer = subprocess.Popen(
+        command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
+    )
+    end = time.monotonic() + VIEWER_START_S
+    while time.monotonic() < end and viewer.poll() is None:
+        if _listens(VIEWER_PORT):
+            # A viewer without a screen listens for a moment before it ends.
+            time.sleep(VIEWER_SETTLE_S)
+            if viewer.poll() is None:
+                return
+        time.sleep(0.1)
+    raise OutputError("no Rerun viewer is open and none can be started here; leave --live out")
+
+
+def _listens(port: int) -> bool:
+    with socket.socket() as probe:
+        return probe.connect_ex(("127.0.0.1", port)) == 0
 
 
 def event_text(event: RoomEvent) -> str:
