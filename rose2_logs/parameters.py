@@ -153,6 +153,9 @@ class FloorPlanParameters:
         2.0, "1", "How far from a passage its width is compared with the room's, in widths.", 0.0
     )
     passage_look_max_m: float = _number(3.0, "m", "The same at most: half a large room.", 0.0)
+    leak_max_width_m: float = _number(
+        0.5, "m", "Free space outside rooms that is narrower is rays; wider it is part of a room.", 0.0
+    )
     border_strip_m: float = _number(
         0.25, "m", "Strips of a room narrower than this, along a wall's other side, change room.", 0.0
     )

@@ -14,7 +14,13 @@ from rose2_logs.baselines.stage import BASELINES, room_outlines, segment_by_base
 from rose2_logs.errors import ParameterError
 from rose2_logs.floor_plan.doorways import find_doorways
 from rose2_logs.floor_plan.plan import FloorPlan
-from rose2_logs.floor_plan.rooms import number_rooms, outline, predicted_shapes, settle_borders
+from rose2_logs.floor_plan.rooms import (
+    adopt_left_out,
+    number_rooms,
+    outline,
+    predicted_shapes,
+    settle_borders,
+)
 from rose2_logs.floor_plan.stage import FloorPlanResult, make_floor_plan
 from rose2_logs.occupancy import (
     BoolArray,
@@ -149,6 +155,7 @@ def analyse(snapshot: OccupancySnapshot, parameters: Parameters, method: str = "
         parameters.topology,
     )
     watch.lap("topology")
+    labels = adopt_left_out(labels, free, resolution, parameters.floor_plan)
     settled = settle_borders(labels, resolution, parameters.floor_plan.border_strip_m)
     number = number_rooms(
         settled, int(labels.max(initial=0)), parameters.floor_plan.room_min_area_m2, resolution

@@ -10,6 +10,7 @@ from shapely.geometry.base import BaseGeometry
 
 from rose2_logs.floor_plan.faces import FaceGraph, rasterise
 from rose2_logs.occupancy import BoolArray, FloatArray, distinct_labels
+from rose2_logs.parameters import FloorPlanParameters
 
 
 def label_faces(graph: FaceGraph, shape: tuple[int, int], resolution_m: float) -> NDArray[np.int32]:
@@ -56,6 +57,38 @@ def number_rooms(
     number = np.zeros(len(size), np.int32)
     number[order] = np.arange(1, len(order) + 1)
     return number
+
+
+def adopt_left_out(
+    labels: NDArray[np.int32], free: BoolArray, resolution_m: float, parameters: FloorPlanParameters
+) -> NDArray[np.int32]:
+    """Give free space outside all rooms to the room that it opens to most, where it is wide.
+
+    A face of which little was seen is outside, for it holds rays through windows; what was seen of it
+    may yet be the corner of a room. Rays are narrower than `leak_max_width_m`.
+
+    Parameters
+    ----------
+    labels : (H, W) int32
+        Rooms of the free cells, 0 elsewhere.
+    free : (H, W) bool
+        Free cells.
+    """
+    width = 2 * round(parameters.leak_max_width_m / resolution_m / 2) + 1
+    wide = cv2.morphologyEx(free.astype(np.uint8), cv2.MORPH_OPEN, np.ones((width, width), np.uint8))
+    left_out = (wide > 0) & (labels == 0)
+    count, piece = cv2.connectedComponents(left_out.astype(np.uint8), connectivity=4)
+    rooms = int(labels.max(initial=0)) + 1
+    contacts = np.zeros(count * rooms, np.int64)
+    for one, other in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
+        for here, there in ((one, other), (other, one)):
+            meet = (piece[here] > 0) & (labels[there] > 0)
+            key = piece[here][meet].astype(np.int64) * rooms + labels[there][meet]
+            contacts += np.bincount(key, minlength=count * rooms)
+    contacts = contacts.reshape(count, rooms)
+    room = contacts.argmax(1).astype(np.int32)
+    room[contacts.max(1) * resolution_m < parameters.join_min_open_m] = 0
+    return np.where(left_out, room[piece], labels)
 
 
 def settle_borders(labels: NDArray[np.int32], resolution_m: float, strip_m: float) -> NDArray[np.int32]:

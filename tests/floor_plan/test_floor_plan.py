@@ -10,7 +10,7 @@ from rose2_logs.floor_plan.doorways import find_doorways
 from rose2_logs.floor_plan.evidence import EdgeEvidence, edge_evidence
 from rose2_logs.floor_plan.faces import build_faces, rasterise
 from rose2_logs.floor_plan.grouping import group_faces
-from rose2_logs.floor_plan.rooms import outline, settle_borders
+from rose2_logs.floor_plan.rooms import adopt_left_out, outline, settle_borders
 from rose2_logs.parameters import FloorPlanParameters
 
 PARAMETERS = FloorPlanParameters()
@@ -94,6 +94,20 @@ def test_a_strip_along_the_other_side_of_a_wall_changes_room():
     assert (settled[31, 15:45] == 2).all()
     assert (settled[:29] == 1).all()
     assert ((settled > 0) == (labels > 0)).all()
+
+
+def test_wide_space_outside_joins_the_room_that_it_opens_to_and_rays_do_not():
+    free, labels = np.ones((100, 160), bool), np.zeros((100, 160), np.int32)
+    labels[:, :60], labels[:40, 60:80] = 1, 2
+    free[:, 100:] = False
+    free[50:53, 100:150] = True  # a ray
+    free[80:, 130:] = True  # seen on its own, beside no room
+    adopted = adopt_left_out(labels, free, 0.05, PARAMETERS)
+    assert (adopted[:, :60] == 1).all()
+    assert (adopted[60:, 60:95] == 1).all()
+    assert (adopted[51, 105:145] == 0).all()
+    assert (adopted[80:, 130:] == 0).all()
+    assert (adopted[labels > 0] == labels[labels > 0]).all()
 
 
 def test_a_doorway_is_found_where_it_was_drawn():
