@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import shapely
@@ -110,23 +111,21 @@ def analyse(snapshot: OccupancySnapshot, parameters: Parameters, method: str = "
     watch.lap("prepare")
 
     free_m2 = float(np.count_nonzero(free)) * geometry.cell_area_m2
+    analysis = partial(
+        SnapshotAnalysis,
+        index=snapshot.index,
+        log_time_ns=snapshot.log_time_ns,
+        stamp_ns=snapshot.stamp_ns,
+        geometry=geometry,
+        free_area_m2=free_m2,
+        seconds=watch.seconds,
+    )
     if method in BASELINES:
         labels = segment_by_baseline(method, free, resolution, parameters)
         watch.lap(method)
         rooms = _room_map(labels, room_outlines(labels, resolution), explored, geometry, parameters)
         watch.lap("rooms")
-        return SnapshotAnalysis(
-            index=snapshot.index,
-            log_time_ns=snapshot.log_time_ns,
-            stamp_ns=snapshot.stamp_ns,
-            geometry=geometry,
-            free_area_m2=free_m2,
-            rooms=rooms,
-            structure=None,
-            walls=None,
-            floor_plan=None,
-            seconds=watch.seconds,
-        )
+        return analysis(rooms=rooms, structure=None, walls=None, floor_plan=None)
     structure = find_structure(
         occupied,
         free_m2,
@@ -165,17 +164,11 @@ def analyse(snapshot: OccupancySnapshot, parameters: Parameters, method: str = "
     labels = number[settled]
     rooms = _room_map(labels, shapes, explored, geometry, parameters)
     watch.lap("rooms")
-    return SnapshotAnalysis(
-        index=snapshot.index,
-        log_time_ns=snapshot.log_time_ns,
-        stamp_ns=snapshot.stamp_ns,
-        geometry=geometry,
-        free_area_m2=free_m2,
+    return analysis(
         rooms=rooms,
         structure=explored.structure(structure),
         walls=explored.walls(walls),
         floor_plan=explored.floor_plan(plan, room_of_face, parameters),
-        seconds=watch.seconds,
     )
 
 
