@@ -9,7 +9,7 @@ import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
@@ -214,12 +214,12 @@ def _image_path(path: Path, described: Mapping[str, Any]) -> Path:
     return path.parent / image
 
 
-def _is_number(value: object) -> bool:
+def _is_number(value: object) -> TypeGuard[float]:
     return isinstance(value, (int, float)) and not isinstance(value, bool)
 
 
 def _is_finite(value: object) -> bool:
-    return isinstance(value, (int, float)) and _is_number(value) and -math.inf < value < math.inf
+    return _is_number(value) and -math.inf < value < math.inf
 
 
 def _number(path: Path, described: Mapping[str, Any], name: str, default: float | None) -> float:

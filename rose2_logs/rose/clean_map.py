@@ -76,18 +76,19 @@ def clean_threshold(
     count_walls: Callable[[BoolArray], int],
     parameters: SpectrumParameters,
 ) -> float:
-    """Find the lowest threshold whose clean map has few enough line segments for its free space.
+    """Find the lowest threshold whose clean map has few enough walls for its free space.
 
-    A building has about so many walls per square metre; a map with more segments than that still holds
-    clutter. The paper asks for the segments per free cell to lie in an interval; area makes it independent
-    of the resolution. The number falls as the threshold rises, so the search halves the range.
+    A building has about so many walls per square metre; a map with more than that still holds clutter. The
+    paper asks for the line segments per free cell to lie in an interval; area makes it independent of the
+    resolution, and wall clusters of the walls' thickness. The number falls as the threshold rises, so the
+    search halves the range.
 
     Parameters
     ----------
     free_m2 : float
         Free area of the map.
     count_walls : callable
-        Number of line segments of a clean map.
+        Number of wall clusters of a clean map.
     """
     allowed = parameters.walls_max_per_m2 * free_m2
     step = parameters.threshold_step

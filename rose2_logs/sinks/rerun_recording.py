@@ -67,6 +67,7 @@ class RerunRecording:
         self._part = path.with_name(f".{path.name}.part") if path else None
         self._info = info
         self._live = live
+        self._viewer_answers = live
         self._shown: set[int] = set()
         self._low, self._high = np.full(2, np.inf), np.full(2, -np.inf)
         self._frames = 0
@@ -87,7 +88,7 @@ class RerunRecording:
             sinks.append(rr.FileSink(str(self._part)))
         if self._live:
             _open_viewer()
-            sinks.append(rr.GrpcSink())
+            sinks.append(rr.GrpcSink(f"rerun+http://127.0.0.1:{VIEWER_PORT}/proxy"))
         self._recording.set_sinks(*sinks)
         self._recording.set_log_time_enabled(False)
         self._recording.set_log_tick_enabled(False)
@@ -139,12 +140,15 @@ class RerunRecording:
                 self._part.unlink(missing_ok=True)
 
     def _flush(self) -> None:
-        """Write what was logged; a viewer that was closed along the way does not stop the run."""
+        """Write what was logged; a viewer that was closed along the way is not waited for again."""
+        if self._live and not self._viewer_answers:
+            return
         try:
             self._recording.flush(timeout_sec=FLUSH_TIMEOUT_S)
         except RuntimeError as error:
             if not self._live:
                 raise OutputError(f"{self._path}: cannot be written: {error}") from error
+            self._viewer_answers = False
             logger.warning("the Rerun viewer does not answer any more; the run goes on without it")
 
     def _log_map(self, frame: TrackedSnapshot) -> None:

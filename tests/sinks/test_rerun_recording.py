@@ -6,6 +6,7 @@ import socket
 import subprocess
 import sys
 import time
+from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
@@ -121,6 +122,32 @@ def test_a_run_is_shown_in_the_viewer_that_is_open_and_stored_too(tmp_path, monk
             time.sleep(0.5)
         assert viewer.get_state().views
     assert (done.folder / "office.rrd").stat().st_size > 0
+
+
+@needs_vulkan
+def test_a_viewer_that_is_closed_along_the_way_does_not_stop_the_run(tmp_path, monkeypatch):
+    from rerun.experimental import ViewerClient
+
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    monkeypatch.setattr("rose2_logs.sinks.rerun_recording.VIEWER_PORT", port)
+    monkeypatch.setenv("PATH", f"{BIN}:/usr/bin:/bin")
+    monkeypatch.setenv("HOME", str(tmp_path))
+    seen = []
+    with ExitStack() as stack:
+        stack.enter_context(ViewerClient.spawn(headless=True, port=port, detach_process=False))
+
+        def close_after_two(frame, share):
+            seen.append(frame.snapshot.index)
+            if len(seen) == 2:
+                stack.close()
+
+        options = RunOptions(selection=Selection(max_snapshots=4), annotated_log=False, live=True)
+        log = PROJECT / "sample_logs" / "office.mcap"
+        done = analyse_log(log, tmp_path / "out", options, close_after_two)
+    assert seen == [0, 1, 2, 3]
+    assert set(values(done.folder / "office.rrd", "/run/coverage")) == set(seen)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere the viewer opens its window all the same")
