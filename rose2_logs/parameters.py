@@ -37,6 +37,16 @@ class OccupancyParameters:
     free_max_percent: float = _number(
         19.6, "%", "Known cells below are free; map_server's default free_thresh.", 0, 100
     )
+    working_resolution_m: float = _number(
+        0.05, "m", "Finer maps are analysed in blocks up to this size: SLAM's usual cell.", 0.0
+    )
+    analysed_max_cells: int = _number(
+        20_000_000, "cells", "Explored parts with more are analysed in blocks; 220 m squared at 5 cm.", 10_000
+    )
+
+    def unblocked(self) -> OccupancyParameters:
+        """Return the same, for methods that take every map at its own resolution."""
+        return dataclasses.replace(self, working_resolution_m=0.0, analysed_max_cells=2**62)
 
 
 @dataclass(frozen=True)

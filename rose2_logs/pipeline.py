@@ -13,6 +13,7 @@ from shapely.geometry.base import BaseGeometry
 
 from rose2_logs.baselines.stage import BASELINES, room_outlines, segment_by_baseline
 from rose2_logs.errors import ParameterError
+from rose2_logs.explored import ExploredPart
 from rose2_logs.floor_plan.doorways import find_doorways
 from rose2_logs.floor_plan.plan import FloorPlan
 from rose2_logs.floor_plan.rooms import (
@@ -23,15 +24,7 @@ from rose2_logs.floor_plan.rooms import (
     settle_borders,
 )
 from rose2_logs.floor_plan.stage import FloorPlanResult, make_floor_plan
-from rose2_logs.occupancy import (
-    BoolArray,
-    FloatArray,
-    GridGeometry,
-    OccupancySnapshot,
-    classify,
-    distinct_labels,
-    known_window,
-)
+from rose2_logs.occupancy import GridGeometry, OccupancySnapshot, distinct_labels
 from rose2_logs.parameters import Parameters
 from rose2_logs.rooms import Doorway, RoomMap
 from rose2_logs.rose.stage import RoseResult, find_structure
@@ -56,6 +49,9 @@ class SnapshotAnalysis:
         Where the map lies in the world.
     free_area_m2 : float
         Area of the known free cells.
+    resolution_m : float
+        Side of the cells that the map was analysed in: its own, or of blocks where that is finer than needed
+        or the map is large.
     rooms : RoomMap
         The segmented map with the predicted shapes.
     structure, walls, floor_plan
@@ -69,6 +65,7 @@ class SnapshotAnalysis:
     stamp_ns: int
     geometry: GridGeometry
     free_area_m2: float
+    resolution_m: float
     rooms: RoomMap
     structure: Structure | None
     walls: Walls | None
@@ -100,17 +97,13 @@ def analyse(snapshot: OccupancySnapshot, parameters: Parameters, method: str = "
         raise ParameterError(f"no method {method!r}; there are: {', '.join(METHODS)}")
     watch = _StopWatch()
     geometry = snapshot.geometry
-    resolution = geometry.resolution_m
-    free, occupied = classify(
-        snapshot.cells,
-        occupied_min_percent=parameters.occupancy.occupied_min_percent,
-        free_max_percent=parameters.occupancy.free_max_percent,
-    )
-    explored = _Explored.of(free | occupied, geometry)
-    free, occupied = free[explored.window], occupied[explored.window]
+    # The baselines' parameters count cells, so they take the map as it is.
+    occupancy = parameters.occupancy if method == "rose2" else parameters.occupancy.unblocked()
+    explored = ExploredPart.of(snapshot.cells, geometry, occupancy)
+    resolution, free, occupied = explored.resolution_m, explored.free, explored.occupied
+    free_m2 = explored.free_area_m2
     watch.lap("prepare")
 
-    free_m2 = float(np.count_nonzero(free)) * geometry.cell_area_m2
     analysis = partial(
         SnapshotAnalysis,
         index=snapshot.index,
@@ -118,12 +111,13 @@ def analyse(snapshot: OccupancySnapshot, parameters: Parameters, method: str = "
         stamp_ns=snapshot.stamp_ns,
         geometry=geometry,
         free_area_m2=free_m2,
+        resolution_m=resolution,
         seconds=watch.seconds,
     )
     if method in BASELINES:
         labels = segment_by_baseline(method, free, resolution, parameters)
         watch.lap(method)
-        rooms = _room_map(labels, room_outlines(labels, resolution), explored, geometry, parameters)
+        rooms = _room_map(labels, room_outlines(labels, resolution), explored, parameters)
         watch.lap("rooms")
         return analysis(rooms=rooms, structure=None, walls=None, floor_plan=None)
     structure = find_structure(
@@ -162,13 +156,13 @@ def analyse(snapshot: OccupancySnapshot, parameters: Parameters, method: str = "
     # Which faces are a room's is told by the labels before their borders settled.
     room_of_face, shapes = _room_shapes(plan, number[labels], number[settled], resolution, parameters)
     labels = number[settled]
-    rooms = _room_map(labels, shapes, explored, geometry, parameters)
+    rooms = _room_map(labels, shapes, explored, parameters)
     watch.lap("rooms")
     return analysis(
         rooms=rooms,
-        structure=explored.structure(structure),
-        walls=explored.walls(walls),
-        floor_plan=explored.floor_plan(plan, room_of_face, parameters),
+        structure=_structure(structure, explored),
+        walls=_walls(walls, explored),
+        floor_plan=_floor_plan(plan, room_of_face, explored, parameters),
     )
 
 
@@ -213,82 +207,51 @@ def _room_shapes(
 
 
 def _room_map(
-    labels: NDArray[np.int32],
-    shapes: list[BaseGeometry],
-    explored: _Explored,
-    geometry: GridGeometry,
-    parameters: Parameters,
+    labels: NDArray[np.int32], shapes: list[BaseGeometry], explored: ExploredPart, parameters: Parameters
 ) -> RoomMap:
-    full = np.zeros(geometry.shape, np.int32)
-    full[explored.window] = labels
-    doorways = find_doorways(labels, geometry.resolution_m, parameters.topology.doorway_min_width_m)
+    full = explored.labels(labels)
+    doorways = find_doorways(labels, explored.resolution_m, parameters.topology.doorway_min_width_m)
     return RoomMap(
-        geometry=geometry,
+        geometry=explored.geometry,
         labels=full,
         polygons=tuple(explored.shape(shape) for shape in shapes),
-        areas_m2=np.bincount(labels.ravel(), minlength=len(shapes) + 1)[1:].astype(float)
-        * geometry.cell_area_m2,
+        areas_m2=np.bincount(full[explored.window].ravel(), minlength=len(shapes) + 1)[1:].astype(float)
+        * explored.geometry.cell_area_m2,
         doorways=tuple(Doorway(pair, explored.points(ends)) for pair, ends in doorways),
     )
 
 
-@dataclass(frozen=True)
-class _Explored:
-    """The part of the canvas that holds known cells, and the way from its frame back to canvas and world."""
+def _structure(found: RoseResult, explored: ExploredPart) -> Structure:
+    score = explored.cells(found.score, explored.known_occupied)
+    clean = explored.cells(found.clean, explored.known_occupied)
+    return Structure(
+        directions_rad=np.mod(found.directions_rad + explored.geometry.yaw_rad, np.pi),
+        strengths=found.strengths,
+        score=score.astype(np.float32, copy=False),
+        threshold=found.threshold,
+        clean=clean.astype(bool, copy=False),
+    )
 
-    window: tuple[slice, slice]
-    geometry: GridGeometry
 
-    @classmethod
-    def of(cls, known: BoolArray, geometry: GridGeometry) -> _Explored:
-        return cls(known_window(known), geometry)
+def _walls(found: WallResult, explored: ExploredPart) -> Walls:
+    return Walls(
+        segments_m=explored.segments(found.segments_m),
+        segment_direction=found.segment_direction,
+        segment_cluster=found.segment_line,
+        lines_m=explored.segments(found.lines.ends_m),
+        line_direction=found.lines.direction,
+        line_weight=found.lines.weight,
+    )
 
-    def points(self, xy_m: FloatArray) -> FloatArray:
-        """World positions of points (..., 2) of the window's frame."""
-        corner = np.array([self.window[1].start, self.window[0].start]) * self.geometry.resolution_m
-        return self.geometry.grid_to_world(xy_m + corner)
 
-    def segments(self, ends_m: FloatArray) -> FloatArray:
-        """World ends (N, 4) of segments of the window's frame."""
-        return self.points(ends_m.reshape(-1, 2, 2)).reshape(-1, 4)
-
-    def shape(self, geometry: BaseGeometry) -> BaseGeometry:
-        """Shapely geometry in the world."""
-        return shapely.transform(geometry, self.points)
-
-    def cells(self, values: NDArray[np.generic]) -> NDArray[np.generic]:
-        """Array over the whole canvas, zero outside the window."""
-        full = np.zeros(self.geometry.shape, values.dtype)
-        full[self.window] = values
-        return full
-
-    def structure(self, found: RoseResult) -> Structure:
-        return Structure(
-            directions_rad=np.mod(found.directions_rad + self.geometry.yaw_rad, np.pi),
-            strengths=found.strengths,
-            score=self.cells(found.score).astype(np.float32, copy=False),
-            threshold=found.threshold,
-            clean=self.cells(found.clean).astype(bool, copy=False),
-        )
-
-    def walls(self, found: WallResult) -> Walls:
-        return Walls(
-            segments_m=self.segments(found.segments_m),
-            segment_direction=found.segment_direction,
-            segment_cluster=found.segment_line,
-            lines_m=self.segments(found.lines.ends_m),
-            line_direction=found.lines.direction,
-            line_weight=found.lines.weight,
-        )
-
-    def floor_plan(
-        self, found: FloorPlanResult, room_of_face: NDArray[np.int32], parameters: Parameters
-    ) -> FloorPlan:
-        return FloorPlan(
-            edges_m=self.segments(found.graph.edges_m),
-            edge_weight=found.evidence.weight,
-            edge_faces=found.graph.edge_faces,
-            faces=tuple(shapely.transform(found.graph.polygons, self.points)),
-            face_inside=found.seen >= parameters.floor_plan.face_min_seen,
-            room_of_face=room_of_face,
-        )
+def _floor_plan(
+    found: FloorPlanResult, room_of_face: NDArray[np.int32], explored: ExploredPart, parameters: Parameters
+) -> FloorPlan:
+    return FloorPlan(
+        edges_m=explored.segments(found.graph.edges_m),
+        edge_weight=found.evidence.weight,
+        edge_faces=found.graph.edge_faces,
+        faces=tuple(shapely.transform(found.graph.polygons, explored.points)),
+        face_inside=found.seen >= parameters.floor_plan.face_min_seen,
+        room_of_face=room_of_face,
+    )

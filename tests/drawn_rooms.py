@@ -39,7 +39,7 @@ def drawn(
     rooms = RoomMap(geometry, labels, polygons, areas, doorways)
     free_m2 = float((cells == 0).sum()) * geometry.cell_area_m2
     return snapshot, SnapshotAnalysis(
-        index, time_ns, time_ns, geometry, free_m2, rooms, None, None, None, {"draw": 0.0}
+        index, time_ns, time_ns, geometry, free_m2, resolution_m, rooms, None, None, None, {"draw": 0.0}
     )
 
 

@@ -15,6 +15,7 @@ ORDER = (
     "workers",
     "parameters",
     "occupancy",
+    "explored",
     "rooms",
     "readers",
     "rose",
