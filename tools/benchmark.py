@@ -1,5 +1,8 @@
 #!/usr/bin/env python3
-"""Measure the project: `accuracy` writes every figure of every method into one report.
+"""Measure the project and write reports.
+
+`accuracy` gives every figure of every method; `sensitivity` how much the figures hang on each parameter, and
+what a choice made without a building gives there.
 
 Examples
 --------
@@ -10,6 +13,9 @@ Examples
     python tools/benchmark.py accuracy --cases SIMULATED/cases.json --sample 3 -o DIR
     # quickly: figures and pictures of one method
     python tools/benchmark.py accuracy --methods rose2 --skip ablations robustness -o DIR
+    # each parameter of the stages a step down and up, or only some of them
+    python tools/benchmark.py sensitivity -o DIR
+    python tools/benchmark.py sensitivity --parameters "walls.*" floor_plan.join_min_openness -o DIR
 
 DIR/report.md is the report, DIR/report.json holds all of it as numbers; DIR/pictures shows every map with its
 true rooms, the found ones, and what is wrong.
@@ -18,14 +24,24 @@ true rooms, the found ones, and what is wrong.
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 from pathlib import Path
 
-from benchmarking.accuracy import AccuracyOptions, measure_accuracy
+from benchmarking.accuracy import AccuracyOptions, load_all_cases, measure_accuracy
 from benchmarking.references import ABLATIONS_FILE, PUBLISHED_FILE
 from benchmarking.report import write_report
+from benchmarking.sensitivity import (
+    BUILDINGS_FILE,
+    buildings_of,
+    make_variants,
+    measure_sensitivity,
+    sensitivity_as_json,
+    sensitivity_report,
+)
 
 from rose2_logs.errors import Rose2LogsError
+from rose2_logs.parameters import load_parameters
 from rose2_logs.pipeline import METHODS
 
 SHARED_CASES = Path(__file__).parents[2] / "shared" / "benchmark" / "cases.json"
@@ -47,6 +63,14 @@ def main(arguments: list[str] | None = None) -> int:
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )
     )
+    _add_sensitivity(
+        commands.add_parser(
+            "sensitivity",
+            help="figures with each parameter changed, and with buildings left out",
+            description=__doc__,
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+    )
     options = parser.parse_args(arguments)
     try:
         code: int = options.run(options)
@@ -56,7 +80,7 @@ def main(arguments: list[str] | None = None) -> int:
     return code
 
 
-def _add_accuracy(parser: argparse.ArgumentParser) -> None:
+def _add_common(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("-o", "--output", type=Path, required=True, metavar="DIR", help="folder of the report")
     add(
@@ -68,6 +92,14 @@ def _add_accuracy(parser: argparse.ArgumentParser) -> None:
         help="maps with true rooms; by default the benchmark beside the project, others from "
         "tools/make_sample_logs.py --cases",
     )
+    add("--config", type=Path, metavar="FILE.toml", help="parameters, one table per stage")
+    add("--set", action="append", default=[], metavar="STAGE.NAME=VALUE", help="change one parameter")
+    add("--workers", type=int, default=1, help="processes (%(default)s)")
+
+
+def _add_accuracy(parser: argparse.ArgumentParser) -> None:
+    _add_common(parser)
+    add = parser.add_argument
     add("--methods", nargs="+", choices=METHODS, default=METHODS, help="by default: %(default)s")
     add("--skip", nargs="+", choices=PARTS, default=[], help="parts to leave out")
     add("--sample", type=int, metavar="N", help="robustness on N maps of each group; by default on all")
@@ -84,10 +116,21 @@ def _add_accuracy(parser: argparse.ArgumentParser) -> None:
         metavar="FILE.toml",
         help=f"figures by name of the group; by default {PUBLISHED_FILE.name} of the tool",
     )
-    add("--config", type=Path, metavar="FILE.toml", help="parameters, one table per stage")
-    add("--set", action="append", default=[], metavar="STAGE.NAME=VALUE", help="change one parameter")
-    add("--workers", type=int, default=1, help="processes (%(default)s)")
     parser.set_defaults(run=_accuracy)
+
+
+def _add_sensitivity(parser: argparse.ArgumentParser) -> None:
+    _add_common(parser)
+    add = parser.add_argument
+    add("--parameters", nargs="+", default=[], metavar="PATTERN", help='as "walls.*"; by default all')
+    add(
+        "--buildings",
+        type=Path,
+        default=BUILDINGS_FILE,
+        metavar="FILE.toml",
+        help=f"which maps show one building; by default {BUILDINGS_FILE.name} of the tool",
+    )
+    parser.set_defaults(run=_sensitivity)
 
 
 def _accuracy(options: argparse.Namespace) -> int:
@@ -107,6 +150,20 @@ def _accuracy(options: argparse.Namespace) -> int:
         )
     )
     print(write_report(accuracy, options.output))
+    return 0
+
+
+def _sensitivity(options: argparse.Namespace) -> int:
+    cases = load_all_cases(options.cases)
+    parameters = load_parameters(options.config, options.set)
+    variants = make_variants(parameters, options.parameters)
+    buildings = buildings_of(cases, options.buildings)
+    measured = measure_sensitivity(cases, METHODS[0], variants, buildings, options.workers, sys.stderr.write)
+    options.output.mkdir(parents=True, exist_ok=True)
+    (options.output / "report.json").write_text(json.dumps(sensitivity_as_json(measured), indent=1))
+    report = options.output / "report.md"
+    report.write_text(sensitivity_report(measured))
+    print(report)
     return 0
 
 
