@@ -44,8 +44,7 @@ def parts_between_passages(
     clear = clearance_m(walls, resolution_m)
     basin, room = _basins(labels, clear, resolution_m, parameters.summit_reach_m)
     count = len(room)
-    summit = np.zeros(count)
-    np.maximum.at(summit, basin.ravel(), clear.ravel())
+    summit = ndimage.maximum(clear, basin, np.arange(count)).astype(float)
     area: FloatArray = np.bincount(basin.ravel(), minlength=count).astype(float) * resolution_m**2
     root = _join_basins(_passages(basin, room, clear), summit, area, parameters)
     part: NDArray[np.int32] = root[basin].astype(np.int32)

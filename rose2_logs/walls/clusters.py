@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from sklearn.cluster import DBSCAN
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
 from rose2_logs.occupancy import FloatArray
 from rose2_logs.parameters import WallParameters
@@ -43,7 +44,9 @@ def cluster_segments(segments: Segments, parameters: WallParameters) -> WallClus
     """Join the segments of one direction that are close to each other by DBSCAN.
 
     Distance is lateral offset over `cluster_lateral_m` or gap along the wall over `cluster_gap_m`, the larger
-    of the two. Each cluster lies at the median offset of its segments, weighted by their length.
+    of the two. No segment is noise (min_samples of 1), which makes the clusters the connected components of
+    the segments nearer than 1 to each other. Each cluster lies at the median offset of its segments, weighted
+    by their length.
     """
     direction, offset, start, end = segments.direction, segments.offset, segments.start, segments.end
     of_segment = np.full(len(offset), -1, np.int32)
@@ -51,9 +54,11 @@ def cluster_segments(segments: Segments, parameters: WallParameters) -> WallClus
     for index in range(len(segments.directions_rad)):
         chosen = np.flatnonzero(direction == index)
         if len(chosen):
-            labels = _dbscan_intervals(offset[chosen], start[chosen], end[chosen], parameters)
+            pair = _near_intervals(offset[chosen], start[chosen], end[chosen], parameters)
+            near = coo_matrix((np.ones(len(pair[0]), bool), pair), shape=(len(chosen), len(chosen)))
+            more, labels = connected_components(near, directed=False)
             of_segment[chosen] = count + labels
-            count += int(labels.max()) + 1
+            count += more
     length = np.maximum(end - start, 1e-9)
     first = np.full(count, np.inf)
     last = np.full(count, -np.inf)
@@ -71,20 +76,22 @@ def cluster_segments(segments: Segments, parameters: WallParameters) -> WallClus
     )
 
 
-def _dbscan_intervals(
+def _near_intervals(
     offset: FloatArray, start: FloatArray, end: FloatArray, parameters: WallParameters
-) -> NDArray[np.int32]:
-    """Label intervals: DBSCAN over points set along them more densely than the gap that it bridges."""
-    gap = parameters.cluster_gap_m
-    pieces = np.maximum(np.ceil((end - start) / (gap / 2)).astype(np.int64), 1)
-    owner = np.repeat(np.arange(len(offset)), pieces + 1)
-    position = np.arange(len(owner)) - np.repeat(np.cumsum(pieces + 1) - (pieces + 1), pieces + 1)
-    along = start[owner] + (end - start)[owner] * position / pieces[owner]
-    points = np.column_stack([offset[owner] / parameters.cluster_lateral_m, along / gap])
-    labels = DBSCAN(eps=1.0, min_samples=1, metric="chebyshev").fit_predict(points)
-    first = np.cumsum(pieces + 1) - (pieces + 1)
-    of_interval: NDArray[np.int32] = labels[first].astype(np.int32)
-    return of_interval
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Pairs of intervals that are close enough both across and along, found among those sorted by offset."""
+    order = np.argsort(offset, kind="stable")
+    sorted_offset = offset[order]
+    here = np.arange(len(offset))
+    count = (
+        np.searchsorted(sorted_offset, sorted_offset + parameters.cluster_lateral_m, side="right") - here - 1
+    )
+    first = np.repeat(here, count)
+    second = first + 1 + np.arange(len(first)) - np.repeat(np.cumsum(count) - count, count)
+    one, other = order[first], order[second]
+    gap = np.maximum(start[one], start[other]) - np.minimum(end[one], end[other])
+    near = gap <= parameters.cluster_gap_m
+    return one[near], other[near]
 
 
 def weighted_median(

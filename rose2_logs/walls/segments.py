@@ -7,8 +7,10 @@ transform is read at these directions only, and every straight run of cells is f
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -84,37 +86,38 @@ def detect_segments(
     """
     row, column = np.nonzero(clean)
     points: FloatArray = np.column_stack([column, row]).astype(float) * resolution_m + resolution_m / 2
-    every = np.arange(len(points))
     members = np.zeros(clean.shape, bool)
     longest = np.zeros(len(points))
     best = np.zeros(len(points), np.int32)
     for number, angle in enumerate(directions_rad.tolist()):
-        runs = _straight_runs(points, every, angle, resolution_m, parameters)
-        length = np.where(runs.covered, runs.end - runs.start, 0.0)
         reached = np.zeros(len(points))
-        np.maximum.at(reached, runs.point, length[runs.run])
+        for runs in _straight_runs(points, angle, resolution_m, parameters):
+            length = np.where(runs.covered, runs.end - runs.start, 0.0)
+            reached[runs.point] = np.maximum(reached[runs.point], length[runs.run])
         better = reached > longest + resolution_m / 2
         best[better], longest[better] = number, reached[better]
-    found = []
+    found = [np.zeros((0, 4))]
     for number, angle in enumerate(directions_rad.tolist()):
         own = np.flatnonzero((best == number) & (longest >= min_length_m))
-        runs = _straight_runs(points, own, angle, resolution_m, parameters)
-        keep = runs.covered & (runs.end - runs.start >= min_length_m)
-        found.append(
-            np.column_stack(
-                [np.full(keep.sum(), number), runs.offset[keep], runs.start[keep], runs.end[keep]]
-            )
-        )
-        on_run = runs.point[keep[runs.run]]
-        members[row[on_run], column[on_run]] = True
-    direction, offset, start, end = np.concatenate([np.zeros((0, 4)), *found]).T
+        rows = [np.zeros((0, 4))]
+        for runs in _straight_runs(points[own], angle, resolution_m, parameters):
+            keep = runs.covered & (runs.end - runs.start >= min_length_m)
+            rows.append(np.column_stack([runs.strip, runs.offset, runs.start, runs.end])[keep])
+            on_run = own[runs.point[keep[runs.run]]]
+            members[row[on_run], column[on_run]] = True
+        of_strip = np.concatenate(rows)
+        of_strip = of_strip[np.lexsort((of_strip[:, 2], of_strip[:, 0]))]
+        of_strip[:, 0] = number
+        found.append(of_strip)
+    direction, offset, start, end = np.concatenate(found).T
     return Segments(directions_rad, direction.astype(np.int32), offset, start, end), members
 
 
 @dataclass(frozen=True, eq=False)
 class _Runs:
-    """Runs of points along one direction: line parameters (R,), and the run of each `point` (P,)."""
+    """Runs of points in the strips along one direction: values (R,), and the run of each `point` (P,)."""
 
+    strip: NDArray[np.intp]
     offset: FloatArray
     start: FloatArray
     end: FloatArray
@@ -124,44 +127,62 @@ class _Runs:
 
 
 def _straight_runs(
-    points: FloatArray,
-    chosen: NDArray[np.intp],
-    angle: float,
-    resolution_m: float,
-    parameters: WallParameters,
-) -> _Runs:
-    """Cut the chosen points, sorted into strips along a direction, where the gaps are too long.
+    points: FloatArray, angle: float, resolution_m: float, parameters: WallParameters
+) -> Iterator[_Runs]:
+    """Cut the points, sorted into strips along a direction, where the gaps are too long.
 
-    The strips are two cells wide and overlap by one, so that no wall falls between two of them.
+    The strips are two cells wide. They come in two sets, the second of which lies a cell further across, so
+    that no wall falls between two strips; each point is once in each set.
     """
+    if len(points) == 0:
+        return
     c, s = np.cos(angle), np.sin(angle)
-    x, y = points[chosen].T
+    x, y = points.T
     along, across = x * c + y * s, y * c - x * s
-    lattice = np.floor(across / resolution_m).astype(np.int64)
-    strip = np.concatenate([2 * (lattice // 2), 2 * ((lattice + 1) // 2) - 1])
-    point = np.concatenate([np.arange(len(chosen))] * 2)
-    # One number sorts by strip, then along it.
-    span = float(np.ptp(along)) + 1.0 if len(along) else 1.0
-    order = np.argsort(strip * span + (along[point] - along.min(initial=0.0)), kind="stable")
-    strip, point = strip[order], point[order]
-    position = along[point]
-    gap = np.diff(position, prepend=-np.inf)
-    new = gap > parameters.segment_max_gap_m + resolution_m
-    new[1:] |= strip[1:] != strip[:-1]
-    run = np.cumsum(new) - 1
-    first = np.flatnonzero(new)
-    count = len(first)
-    last = np.append(first[1:], len(point))[:count] - 1
-    covered = np.bincount(
-        run,
-        weights=np.where(new, resolution_m, np.minimum(np.abs(gap), COVER_CELLS * resolution_m)),
-        minlength=count,
-    )
-    start, end = position[first] - resolution_m / 2, position[last] + resolution_m / 2
-    offset = np.bincount(run, weights=across[point], minlength=count) / np.bincount(run, minlength=count)
-    return _Runs(
-        offset, start, end, covered >= parameters.segment_min_fill * (end - start), chosen[point], run
-    )
+    cell = np.floor(across / resolution_m).astype(np.int64)
+    by_place = np.argsort(along, kind="stable")
+    for shift in (0, 1):
+        strip = (cell + shift) // 2
+        # Small integers are sorted by radix.
+        rank = (strip - strip.min()).astype(np.uint16 if np.ptp(strip) < 2**16 else np.int64)
+        point = by_place[np.argsort(rank[by_place], kind="stable")]
+        position, strip = along[point], strip[point]
+        gap = position[1:] - position[:-1]
+        new = np.ones(len(point), bool)
+        new[1:] = (gap > parameters.segment_max_gap_m + resolution_m) | (strip[1:] != strip[:-1])
+        run = np.cumsum(new) - 1
+        first = np.flatnonzero(new)
+        last = np.append(first[1:], len(point)) - 1
+        cover = np.full(len(point), resolution_m)
+        np.minimum(np.abs(gap), COVER_CELLS * resolution_m, out=cover[1:], where=~new[1:])
+        covered = np.bincount(run, weights=cover)
+        start, end = position[first] - resolution_m / 2, position[last] + resolution_m / 2
+        yield _Runs(
+            2 * strip[first] - shift,
+            np.bincount(run, weights=across[point]) / (last - first + 1),
+            start,
+            end,
+            covered >= parameters.segment_min_fill * (end - start),
+            point,
+            run,
+        )
+
+
+def long_pieces(
+    occupied: BoolArray, resolution_m: float, min_length_m: float, parameters: WallParameters
+) -> BoolArray:
+    """Leave out pieces of cells (H, W) that no segment of `min_length_m` fits into.
+
+    A piece is what hangs together over gaps at least as wide as a segment bridges.
+    """
+    side = 2 * int(np.ceil((parameters.segment_max_gap_m / resolution_m + 1) / 2)) + 1
+    joined = cv2.dilate(occupied.astype(np.uint8), np.ones((side, side), np.uint8))
+    _, piece, stats, _ = cv2.connectedComponentsWithStats(joined, connectivity=8)
+    # The box of a dilated piece is wider than the piece, at whose cells' far sides a segment ends.
+    sides = stats[:, [cv2.CC_STAT_WIDTH, cv2.CC_STAT_HEIGHT]] * resolution_m
+    long = np.hypot(*sides.T) >= min_length_m
+    pieces: BoolArray = occupied & long[piece]
+    return pieces
 
 
 def local_directions(dominant_rad: FloatArray, parameters: WallParameters) -> FloatArray:

@@ -11,7 +11,7 @@ from rose2_logs.occupancy import BoolArray, FloatArray
 from rose2_logs.parameters import WallParameters
 from rose2_logs.walls.clusters import cluster_segments
 from rose2_logs.walls.lines import RepresentativeLines, representative_lines
-from rose2_logs.walls.segments import detect_segments, join_segments, local_directions
+from rose2_logs.walls.segments import detect_segments, join_segments, local_directions, long_pieces
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,11 +53,12 @@ def find_walls(
     """Segments, wall clusters and representative lines of a clean map (H, W) and what is attached to it."""
     along, _ = detect_segments(clean, dominant_rad, resolution_m, parameters.segment_min_length_m, parameters)
     # Off the dominant directions nothing but its length tells a wall from furniture.
+    length_m = parameters.local_segment_min_length_m
     local, local_walls = detect_segments(
-        occupied & ~clean,
+        long_pieces(occupied & ~clean, resolution_m, length_m, parameters),
         local_directions(dominant_rad, parameters),
         resolution_m,
-        parameters.local_segment_min_length_m,
+        length_m,
         parameters,
     )
     segments = join_segments(along, local)
