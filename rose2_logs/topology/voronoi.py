@@ -39,16 +39,71 @@ def parts_between_passages(
     Returns
     -------
     part : (H, W) int32
-        Parts 1.., 0 where there is no room; no part spans two rooms.
+        Parts 1.., 0 where there is no room or the room is one part; no part spans two rooms.
     """
     clear = clearance_m(walls, resolution_m)
-    basin, room = _basins(labels, clear, resolution_m, parameters.summit_reach_m)
-    count = len(room)
-    summit = ndimage.maximum(clear, basin, np.arange(count)).astype(float)
-    area: FloatArray = np.bincount(basin.ravel(), minlength=count).astype(float) * resolution_m**2
-    root = _join_basins(_passages(basin, room, clear), summit, area, parameters)
-    part: NDArray[np.int32] = root[basin].astype(np.int32)
+    several = _may_have_parts(labels, clear, parameters)
+    part = np.zeros(labels.shape, np.int32)
+    count = 0
+    for room, window in enumerate(ndimage.find_objects(labels), start=1):
+        if window is None or not several[room]:
+            continue
+        inside = labels[window] == room
+        found = _parts_of_room(inside, clear[window], resolution_m, parameters)
+        part[window][inside] = found[inside] + count
+        count += int(found.max())
     return part
+
+
+def _may_have_parts(
+    labels: NDArray[np.int32], clear: NDArray[np.float32], parameters: TopologyParameters
+) -> BoolArray:
+    """Tell of each room (R,) whether it may have two parts; entry 0 stands for the outside.
+
+    It has only one where the cells that are as clear as a part's summit must be hang together, and so do
+    those that are clearer than a narrow passage can be.
+    """
+    rooms = int(labels.max(initial=0)) + 1
+    flat, height = labels.ravel(), clear.ravel()
+    order = np.argsort(flat.astype(np.uint16) if rooms <= 2**16 else flat, kind="stable")
+    first = np.flatnonzero(np.diff(flat[order], prepend=-1))
+    widest = np.zeros(rooms, np.float32)
+    widest[flat[order[first]]] = np.maximum.reduceat(height[order], first)
+    several = _several_pieces(labels, clear >= parameters.split_min_clearance_m)
+    narrow = parameters.passage_min_ratio * widest
+    wide = narrow > parameters.split_min_clearance_m
+    if wide.any():
+        several |= _several_pieces(labels, wide[labels] & (clear >= narrow[labels]))
+    return several
+
+
+def _several_pieces(labels: NDArray[np.int32], high: BoolArray) -> BoolArray:
+    """Tell of each room (R,) whether its high cells (H, W) lie apart."""
+    # Rooms that touch are kept apart; a piece that this cuts only counts once more.
+    high = high & (labels > 0)
+    high[:, :-1] &= labels[:, :-1] == labels[:, 1:]
+    high[:-1] &= labels[:-1] == labels[1:]
+    high[:-1, :-1] &= labels[:-1, :-1] == labels[1:, 1:]
+    high[1:, :-1] &= labels[1:, :-1] == labels[:-1, 1:]
+    count, piece = cv2.connectedComponents(high.astype(np.uint8), connectivity=8)
+    room_of_piece = np.zeros(count, np.int64)
+    room_of_piece[piece[high]] = labels[high]
+    several: BoolArray = np.bincount(room_of_piece[1:], minlength=int(labels.max(initial=0)) + 1) > 1
+    return several
+
+
+def _parts_of_room(
+    inside: BoolArray, clear: NDArray[np.float32], resolution_m: float, parameters: TopologyParameters
+) -> NDArray[np.int32]:
+    """Parts 1.. of one room's cells (H, W)."""
+    basin = _basins(inside, clear, resolution_m, parameters.summit_reach_m)
+    count = int(basin.max()) + 1
+    summit = np.zeros(count)
+    np.maximum.at(summit, basin[inside], clear[inside])
+    area: FloatArray = np.bincount(basin[inside], minlength=count).astype(float) * resolution_m**2
+    root = _join_basins(_passages(basin, count, clear), summit, area, parameters)
+    part: NDArray[np.int32] = np.unique(root[1:], return_inverse=True)[1].astype(np.int32) + 1
+    return np.concatenate([np.zeros(1, np.int32), part])[basin]
 
 
 def voronoi_graph(
@@ -68,42 +123,28 @@ def clearance_m(walls: BoolArray, resolution_m: float) -> NDArray[np.float32]:
 
 
 def _basins(
-    labels: NDArray[np.int32], clear: NDArray[np.float32], resolution_m: float, reach_m: float
-) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """Divide rooms at the valleys between the summits of the clearance.
-
-    Returns
-    -------
-    basin : (H, W) int32
-        Basins 1.., 0 outside rooms.
-    room : (B,) int32
-        Room of each basin; entry 0 stands for the outside.
-    """
-    inside = labels > 0
+    inside: BoolArray, clear: NDArray[np.float32], resolution_m: float, reach_m: float
+) -> NDArray[np.int32]:
+    """Divide a room (H, W) at the valleys between the summits of its clearance; basins 1.., 0 outside."""
     width = 2 * max(1, round(reach_m / resolution_m)) + 1
-    summits = inside & (clear == cv2.dilate(clear, np.ones((width, width), np.uint8)))
+    height = np.where(inside, clear, -1)
+    summits = inside & (height == cv2.dilate(height, np.ones((width, width), np.uint8)))
     markers, _ = ndimage.label(summits, np.ones((3, 3)))
-    flooded = watershed(-clear, markers, mask=inside)  # type: ignore[no-untyped-call]
-    rooms = int(labels.max(initial=0)) + 1
-    key = np.where(inside, flooded.astype(np.int64) * rooms + labels, 0)
-    present = np.bincount(key.ravel()) > 0
-    present[0] = True
-    number = np.cumsum(present) - 1
-    return number[key].astype(np.int32), (np.flatnonzero(present) % rooms).astype(np.int32)
+    basin: NDArray[np.int32] = watershed(-clear, markers, mask=inside)  # type: ignore[no-untyped-call]
+    return basin
 
 
 def _passages(
-    basin: NDArray[np.int32], room: NDArray[np.int32], clear: NDArray[np.float32]
+    basin: NDArray[np.int32], count: int, clear: NDArray[np.float32]
 ) -> dict[int, dict[int, float]]:
-    """Clearance in metres of the widest passage between neighbouring basins of one room."""
-    count = len(room)
+    """Clearance in metres of the widest passage between neighbouring ones of some basins."""
     keys, widths = [], []
     for first, second in (
         ((slice(None), slice(None, -1)), (slice(None), slice(1, None))),
         ((slice(None, -1), slice(None)), (slice(1, None), slice(None))),
     ):
         a, b = basin[first].astype(np.int64), basin[second].astype(np.int64)
-        meet = (a != b) & (a > 0) & (b > 0) & (room[a] == room[b])
+        meet = (a != b) & (a > 0) & (b > 0)
         keys.append(np.minimum(a, b)[meet] * count + np.maximum(a, b)[meet])
         widths.append(np.minimum(clear[first], clear[second])[meet])
     pairs, index = np.unique(np.concatenate(keys), return_inverse=True)
