@@ -11,7 +11,7 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from rose2_logs.baselines.stage import BASELINES, room_outlines, segment_by_baseline
+from rose2_logs.baselines.stage import BASELINES, segment_by_baseline
 from rose2_logs.errors import ParameterError
 from rose2_logs.explored import ExploredPart
 from rose2_logs.floor_plan.doorways import find_doorways
@@ -19,8 +19,8 @@ from rose2_logs.floor_plan.plan import FloorPlan
 from rose2_logs.floor_plan.rooms import (
     adopt_left_out,
     number_rooms,
-    outline,
     predicted_shapes,
+    room_outlines,
     settle_borders,
 )
 from rose2_logs.floor_plan.stage import FloorPlanResult, make_floor_plan
@@ -200,9 +200,11 @@ def _room_shapes(
     room_of_face[plan.group == 0] = 0
     shown = np.where(plan.seen >= parameters.floor_plan.shape_min_seen, room_of_face, 0)
     shapes = list(predicted_shapes(plan.graph, shown, count))
-    for room, shape in enumerate(shapes, start=1):
-        if shape.is_empty:
-            shapes[room - 1] = outline(labels == room, resolution_m)
+    # Rooms that a split took from a face are as large as their cells.
+    without = np.array([False, *(shape.is_empty for shape in shapes)])
+    for room, shape in enumerate(room_outlines(np.where(without[labels], labels, 0), resolution_m)):
+        if not shape.is_empty:
+            shapes[room] = shape
     return room_of_face, shapes
 
 

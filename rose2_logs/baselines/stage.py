@@ -1,4 +1,4 @@
-"""The baselines by name, and the outlines of the rooms that they find."""
+"""The baselines by name."""
 
 from __future__ import annotations
 
@@ -6,14 +6,11 @@ from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import find_objects
-from shapely.affinity import translate
-from shapely.geometry.base import BaseGeometry
 
 from rose2_logs.baselines.distance import segment_distance
 from rose2_logs.baselines.morphological import segment_morphological
 from rose2_logs.baselines.voronoi import segment_voronoi
-from rose2_logs.floor_plan.rooms import number_rooms, outline
+from rose2_logs.floor_plan.rooms import number_rooms
 from rose2_logs.occupancy import BoolArray
 from rose2_logs.parameters import Parameters
 
@@ -46,12 +43,3 @@ def segment_by_baseline(
     """
     labels = BASELINES[method](free, resolution_m, parameters)
     return number_rooms(labels, int(labels.max(initial=0)), 0.0, resolution_m)[labels]
-
-
-def room_outlines(labels: NDArray[np.int32], resolution_m: float) -> list[BaseGeometry]:
-    """Outlines of the cells of rooms 1.. in the grid frame, metres."""
-    shapes = []
-    for room, (rows, columns) in enumerate(find_objects(labels), start=1):
-        shape = outline(labels[rows, columns] == room, resolution_m)
-        shapes.append(translate(shape, columns.start * resolution_m, rows.start * resolution_m))
-    return shapes

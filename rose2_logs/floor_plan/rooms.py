@@ -6,6 +6,8 @@ import cv2
 import numpy as np
 import shapely
 from numpy.typing import NDArray
+from scipy.ndimage import find_objects
+from shapely.affinity import translate
 from shapely.geometry.base import BaseGeometry
 
 from rose2_logs.floor_plan.faces import FaceGraph, rasterise
@@ -157,3 +159,16 @@ def outline(mask: BoolArray, resolution_m: float) -> BaseGeometry:
     _, end = np.nonzero(rows == -1)
     boxes = shapely.box(start, row - 1, end, row)
     return shapely.transform(shapely.union_all(boxes), lambda points: points * resolution_m)
+
+
+def room_outlines(labels: NDArray[np.int32], resolution_m: float) -> list[BaseGeometry]:
+    """Outlines of the cells of rooms 1.. in the grid frame, metres; empty for numbers without cells."""
+    shapes: list[BaseGeometry] = []
+    for room, window in enumerate(find_objects(labels), start=1):
+        if window is None:
+            shapes.append(shapely.Polygon())
+            continue
+        shape = outline(labels[window] == room, resolution_m)
+        corner = window[1].start * resolution_m, window[0].start * resolution_m
+        shapes.append(translate(shape, *corner))
+    return shapes

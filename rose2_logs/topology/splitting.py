@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import find_objects
+from shapely import STRtree, box, linestrings
 
-from rose2_logs.occupancy import BoolArray, FloatArray, distinct_labels
+from rose2_logs.occupancy import BoolArray, FloatArray
 from rose2_logs.parameters import TopologyParameters
-from rose2_logs.topology.voronoi import parts_between_passages
+from rose2_logs.topology.voronoi import clearance_m, parts_of_room
 
 
 def split_rooms(
@@ -20,7 +22,7 @@ def split_rooms(
 ) -> NDArray[np.int32]:
     """Split rooms until the Voronoi graph of each is connected by more than narrow passages.
 
-    Two large parts of a room are divided along the representative line that best keeps them apart;
+    Two large parts of a room are divided along the representative line near it that best keeps them apart;
     where none does, along the dominant direction that does, midway between the parts. A cut touches the cells
     of its own room only.
 
@@ -30,62 +32,62 @@ def split_rooms(
         With new numbers for the split off parts, above the old ones.
     """
     labels = labels.copy()
-    lines = _as_normals(lines_m)
-    for _ in range(parameters.max_rounds):
-        part = parts_between_passages(labels, walls, resolution_m, parameters)
-        size = np.bincount(part.ravel()) * resolution_m**2
-        size[0] = 0
-        large = np.flatnonzero(size >= parameters.split_min_area_m2)
-        if len(large) == 0:
-            break
-        present, first = distinct_labels(part)
-        room_of_part = labels.ravel()[first[np.searchsorted(present, large)]]
-        rooms, count = np.unique(room_of_part, return_counts=True)
-        divided = False
-        for room in rooms[count > 1]:
-            parts = large[room_of_part == room]
-            # The two largest parts are divided first; the rest follow in later rounds.
-            parts = parts[np.lexsort((parts, -size[parts]))][:2]
-            divided |= _split(labels, int(room), part, parts, lines, directions_rad, resolution_m, parameters)
-        if not divided:
-            break
+    clear = clearance_m(walls, resolution_m)
+    lines = STRtree(linestrings(lines_m.reshape(-1, 2, 2)))
+    normals, offsets = _as_normals(lines_m)
+    number = int(labels.max(initial=0))
+    pending = [
+        (room, window, 0) for room, window in enumerate(find_objects(labels), start=1) if window is not None
+    ]
+    while pending:
+        room, window, rounds = pending.pop()
+        inside = labels[window] == room
+        part = parts_of_room(inside, clear[window], resolution_m, parameters)
+        size = np.bincount(part.ravel())[1:] * resolution_m**2
+        # The two largest parts are divided first; the rest follow in later rounds.
+        largest = np.argsort(-size, kind="stable")[:2]
+        if len(largest) < 2 or size[largest[1]] < parameters.split_min_area_m2:
+            continue
+        corner = np.array([window[1].start, window[0].start])
+        row, column = np.nonzero(inside)
+        points = (np.column_stack([column, row]) + corner + 0.5) * resolution_m
+        of_cell = part[row, column]
+        one, two = points[of_cell == largest[0] + 1], points[of_cell == largest[1] + 1]
+        near = np.sort(lines.query(box(*points.min(0), *points.max(0)), predicate="intersects"))
+        candidates = [(normals[near], offsets[near]), _between(one, two, directions_rad)]
+        beyond = _cut(points, one, two, candidates, parameters.split_min_purity)
+        if beyond is None:
+            continue
+        number += 1
+        labels[window][row[beyond], column[beyond]] = number
+        if rounds + 1 < parameters.max_rounds:
+            pending += [(room, window, rounds + 1), (number, window, rounds + 1)]
     return labels
 
 
-def _split(
-    labels: NDArray[np.int32],
-    room: int,
-    part: NDArray[np.int32],
-    parts: NDArray[np.intp],
-    lines: tuple[FloatArray, FloatArray],
-    directions_rad: FloatArray,
-    resolution_m: float,
-    parameters: TopologyParameters,
-) -> bool:
-    """Cut one room between two parts of its graph; tell whether it was cut."""
-    cells = np.argwhere(labels == room)
-    points = (cells[:, ::-1] + 0.5) * resolution_m
-    of_cell = part[cells[:, 0], cells[:, 1]]
-    one, two = points[of_cell == parts[0]], points[of_cell == parts[1]]
-    candidates = [lines, _between(one, two, directions_rad)]
+def _cut(
+    points: FloatArray,
+    one: FloatArray,
+    two: FloatArray,
+    candidates: list[tuple[FloatArray, FloatArray]],
+    min_purity: float,
+) -> BoolArray | None:
+    """Tell which points (P,) lie on the second part's side of the best line of the first set that divides."""
     for normals, offsets in candidates:
-        if len(offsets) == 0:
-            continue
-        purity = np.array([_purity(one, two, n, d) for n, d in zip(normals, offsets, strict=True)])
-        best = int(purity.argmax())
-        if purity[best] >= parameters.split_min_purity:
+        purity = _purity(one @ normals.T > offsets, two @ normals.T > offsets)
+        best = int(purity.argmax()) if len(purity) else -1
+        if best >= 0 and purity[best] >= min_purity:
             above = points @ normals[best] > offsets[best]
-            second_above = (two @ normals[best] > offsets[best]).mean() > 0.5
-            chosen = cells[above == second_above]
-            labels[chosen[:, 0], chosen[:, 1]] = labels.max() + 1
-            return True
-    return False
+            beyond: BoolArray = above == ((two @ normals[best] > offsets[best]).mean() > 0.5)
+            return beyond
+    return None
 
 
-def _purity(one: FloatArray, two: FloatArray, normal: FloatArray, offset: float) -> float:
-    """Share of the worse part that lies on its own side of a line."""
-    a, b = (one @ normal > offset).mean(), (two @ normal > offset).mean()
-    return float(max(min(a, 1 - b), min(1 - a, b)))
+def _purity(one_above: BoolArray, two_above: BoolArray) -> FloatArray:
+    """Share (L,) of the worse part that lies on its own side of each line."""
+    a, b = one_above.mean(0), two_above.mean(0)
+    purity: FloatArray = np.maximum(np.minimum(a, 1 - b), np.minimum(1 - a, b))
+    return purity
 
 
 def _as_normals(lines_m: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -19,10 +19,10 @@ SMOOTH_CELLS = 1.0
 """Blur of the clearance, so that the steps of the raster are no summits of their own."""
 
 
-def parts_between_passages(
-    labels: NDArray[np.int32], walls: BoolArray, resolution_m: float, parameters: TopologyParameters
+def parts_of_room(
+    inside: BoolArray, clear: NDArray[np.float32], resolution_m: float, parameters: TopologyParameters
 ) -> NDArray[np.int32]:
-    """Find the parts of each room that only narrow passages connect.
+    """Find the parts of a room that only narrow passages connect.
 
     A passage is a point of the Voronoi graph where the clearance, the distance from walls, is least between
     two summits: a saddle. Two parts are one where the clearance of the passage is at least
@@ -31,79 +31,42 @@ def parts_between_passages(
 
     Parameters
     ----------
-    labels : (H, W) int32
-        The segmented map.
-    walls : (H, W) bool
-        Cells of walls; clutter makes no passage.
+    inside : (H, W) bool
+        The cells of the room.
+    clear : (H, W) float32
+        Distance from walls in metres, see `clearance_m`; clutter makes no passage.
 
     Returns
     -------
     part : (H, W) int32
-        Parts 1.., 0 where there is no room or the room is one part; no part spans two rooms.
+        Parts 1.., 0 outside the room.
     """
-    clear = clearance_m(walls, resolution_m)
-    several = _may_have_parts(labels, clear, parameters)
-    part = np.zeros(labels.shape, np.int32)
-    count = 0
-    for room, window in enumerate(ndimage.find_objects(labels), start=1):
-        if window is None or not several[room]:
-            continue
-        inside = labels[window] == room
-        found = _parts_of_room(inside, clear[window], resolution_m, parameters)
-        part[window][inside] = found[inside] + count
-        count += int(found.max())
-    return part
-
-
-def _may_have_parts(
-    labels: NDArray[np.int32], clear: NDArray[np.float32], parameters: TopologyParameters
-) -> BoolArray:
-    """Tell of each room (R,) whether it may have two parts; entry 0 stands for the outside.
-
-    It has only one where the cells that are as clear as a part's summit must be hang together, and so do
-    those that are clearer than a narrow passage can be.
-    """
-    rooms = int(labels.max(initial=0)) + 1
-    flat, height = labels.ravel(), clear.ravel()
-    order = np.argsort(flat.astype(np.uint16) if rooms <= 2**16 else flat, kind="stable")
-    first = np.flatnonzero(np.diff(flat[order], prepend=-1))
-    widest = np.zeros(rooms, np.float32)
-    widest[flat[order[first]]] = np.maximum.reduceat(height[order], first)
-    several = _several_pieces(labels, clear >= parameters.split_min_clearance_m)
-    narrow = parameters.passage_min_ratio * widest
-    wide = narrow > parameters.split_min_clearance_m
-    if wide.any():
-        several |= _several_pieces(labels, wide[labels] & (clear >= narrow[labels]))
-    return several
-
-
-def _several_pieces(labels: NDArray[np.int32], high: BoolArray) -> BoolArray:
-    """Tell of each room (R,) whether its high cells (H, W) lie apart."""
-    # Rooms that touch are kept apart; a piece that this cuts only counts once more.
-    high = high & (labels > 0)
-    high[:, :-1] &= labels[:, :-1] == labels[:, 1:]
-    high[:-1] &= labels[:-1] == labels[1:]
-    high[:-1, :-1] &= labels[:-1, :-1] == labels[1:, 1:]
-    high[1:, :-1] &= labels[1:, :-1] == labels[:-1, 1:]
-    count, piece = cv2.connectedComponents(high.astype(np.uint8), connectivity=8)
-    room_of_piece = np.zeros(count, np.int64)
-    room_of_piece[piece[high]] = labels[high]
-    several: BoolArray = np.bincount(room_of_piece[1:], minlength=int(labels.max(initial=0)) + 1) > 1
-    return several
-
-
-def _parts_of_room(
-    inside: BoolArray, clear: NDArray[np.float32], resolution_m: float, parameters: TopologyParameters
-) -> NDArray[np.int32]:
-    """Parts 1.. of one room's cells (H, W)."""
+    if _is_one_part(inside, clear, parameters):
+        return inside.astype(np.int32)
     basin = _basins(inside, clear, resolution_m, parameters.summit_reach_m)
     count = int(basin.max()) + 1
     summit = np.zeros(count)
     np.maximum.at(summit, basin[inside], clear[inside])
     area: FloatArray = np.bincount(basin[inside], minlength=count).astype(float) * resolution_m**2
     root = _join_basins(_passages(basin, count, clear), summit, area, parameters)
-    part: NDArray[np.int32] = np.unique(root[1:], return_inverse=True)[1].astype(np.int32) + 1
-    return np.concatenate([np.zeros(1, np.int32), part])[basin]
+    number = np.zeros(count, np.int32)
+    number[1:] = np.unique(root[1:], return_inverse=True)[1] + 1
+    return number[basin]
+
+
+def _is_one_part(inside: BoolArray, clear: NDArray[np.float32], parameters: TopologyParameters) -> bool:
+    """Tell quickly that a room has one part; most have.
+
+    The summits of two parts lie in its cells that are as clear as a part must be. Where these hang together,
+    and those that are clearer than a narrow passage can be do too, some way between the two is no passage.
+    """
+    least = parameters.split_min_clearance_m
+    widest = float(clear[inside].max(initial=0.0))
+    for level in {least, max(least, parameters.passage_min_ratio * widest)}:
+        pieces, _ = cv2.connectedComponents((inside & (clear >= level)).astype(np.uint8), connectivity=8)
+        if pieces > 2:
+            return False
+    return True
 
 
 def voronoi_graph(

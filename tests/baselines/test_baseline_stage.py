@@ -6,7 +6,8 @@ import shapely
 from drawn_maps import agreement, office, snapshot
 from free_masks import RESOLUTION_M, overlap_with_room, ring, two_rooms
 
-from rose2_logs.baselines.stage import BASELINES, room_outlines, segment_by_baseline
+from rose2_logs.baselines.stage import BASELINES, segment_by_baseline
+from rose2_logs.floor_plan.rooms import room_outlines
 from rose2_logs.parameters import Parameters
 from rose2_logs.pipeline import METHODS, analyse
 

@@ -5,7 +5,7 @@ import pytest
 
 from rose2_logs.parameters import TopologyParameters
 from rose2_logs.topology.splitting import split_rooms
-from rose2_logs.topology.voronoi import parts_between_passages, voronoi_graph
+from rose2_logs.topology.voronoi import clearance_m, parts_of_room, voronoi_graph
 
 PARAMETERS = TopologyParameters()
 NO_LINES = np.zeros((0, 4))
@@ -51,36 +51,63 @@ def test_the_voronoi_graph_runs_in_the_middle_of_a_corridor():
     assert np.abs(middle[:, 0] - 19.5).max() <= 1
 
 
+def parts(walls):
+    """Parts of all cells that are no wall, as one room."""
+    return parts_of_room(~walls, clearance_m(walls, 0.05), 0.05, PARAMETERS)
+
+
 def test_a_narrow_gap_divides_the_parts_of_a_room_and_a_wide_one_does_not():
-    labels, walls = dumbbell()
-    part = parts_between_passages(labels, walls, 0.05, PARAMETERS)
-    assert len(np.unique(part[part > 0])) == 2
-    assert ((part > 0) == (labels > 0)).all()
+    _, walls = dumbbell()
+    part = parts(walls)
+    assert sorted(np.unique(part)) == [0, 1, 2]
+    assert ((part > 0) == ~walls).all()
     walls[20:80, 84:86] = False
-    labels = np.where(walls, 0, 1).astype(np.int32)
-    assert len(np.unique(parts_between_passages(labels, walls, 0.05, PARAMETERS)[labels > 0])) == 1
+    assert (parts(walls) == ~walls).all()
 
 
-def test_no_part_spans_two_rooms_and_a_niche_is_no_part():
-    labels = np.ones((100, 200), np.int32)
-    labels[:, 100:] = 2
-    walls = np.zeros(labels.shape, bool)
+def test_a_niche_is_no_part():
+    walls = np.zeros((100, 200), bool)
     walls[:20] = True
     walls[5:20, 40:60] = walls[20, 48:52] = False  # a niche of 1 x 0.75 m with a mouth of 0.2 m
     walls[19, :48] = walls[19, 52:] = True
-    labels[walls] = 0
-    part = parts_between_passages(labels, walls, 0.05, PARAMETERS)
-    for number in np.unique(part[part > 0]):
-        assert len(np.unique(labels[part == number])) == 1
-    assert part[10, 50] == part[60, 50] != part[60, 150]
+    assert (parts(walls) == ~walls).all()
+
+
+def test_pieces_of_a_room_that_do_not_touch_are_parts():
+    """Two pieces of one room, side by side in the open, with a strip of another room between them."""
+    inside = np.ones((60, 130), bool)
+    inside[:, 60:70] = False
+    clear = np.full(inside.shape, 2.0, np.float32)
+    part = parts_of_room(inside, clear, 0.05, PARAMETERS)
+    assert np.unique(part[:, :60]).tolist() != np.unique(part[:, 70:]).tolist()
+    assert ((part > 0) == inside).all()
+
+
+def test_a_room_of_three_parts_is_split_twice_and_its_neighbour_not_at_all():
+    walls = np.zeros((100, 300), bool)
+    walls[:, 84:86] = walls[:, 184:186] = walls[:, 270] = True
+    walls[47:53, 84:86] = walls[47:53, 184:186] = False
+    labels = np.where(walls, 0, 1).astype(np.int32)
+    labels[:, 271:] = 2
+    split = split_rooms(labels, walls, NO_LINES, AXES, 0.05, PARAMETERS)
+    assert len({int(split[20, column]) for column in (40, 130, 230)}) == 3
+    assert (split[:, 271:] == 2).all()
+    assert len(np.unique(split[split > 0])) == 4
+
+
+def test_a_line_that_ends_before_a_room_does_not_divide_it():
+    labels, walls = dumbbell()
+    beside, away = (4.3, 0.0, 4.3, 5.0), (4.35, 20.0, 4.35, 30.0)
+    for lines in ([beside], [beside, away]):
+        split = split_rooms(labels, walls, np.array(lines), AXES, 0.05, PARAMETERS)
+        assert np.flatnonzero(split[50, :-1] != split[50, 1:]).tolist() == [85]
+    alone = split_rooms(labels, walls, np.array([away]), AXES, 0.05, PARAMETERS)
+    assert (alone == split_rooms(labels, walls, NO_LINES, AXES, 0.05, PARAMETERS)).all()
 
 
 @pytest.mark.parametrize("change", [np.fliplr, np.flipud, np.rot90])
 def test_the_parts_of_a_mirrored_or_turned_map_are_the_same(change):
-    labels, walls = dumbbell()
-    part = parts_between_passages(labels, walls, 0.05, PARAMETERS)
-    changed = parts_between_passages(
-        np.ascontiguousarray(change(labels)), np.ascontiguousarray(change(walls)), 0.05, PARAMETERS
-    )
+    _, walls = dumbbell()
+    part, changed = parts(walls), parts(np.ascontiguousarray(change(walls)))
     pairs = np.unique(np.column_stack([change(part).ravel(), changed.ravel()]), axis=0)
     assert len(pairs) == 3
