@@ -12,6 +12,8 @@ from rose2_logs.errors import InvalidMapError
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 UNKNOWN = -1
+COUNTED_AT_ONCE = 2**16
+"""Cells whose labels are counted at once."""
 
 
 @dataclass(frozen=True)
@@ -179,3 +181,14 @@ def distinct_labels(labels: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDA
     starts = np.flatnonzero(np.concatenate([[True], flat[1:] != flat[:-1]]))
     values, index = np.unique(flat[starts], return_index=True)
     return values.astype(np.int64), starts[index]
+
+
+def label_sizes(labels: NDArray[np.integer], count: int) -> NDArray[np.int64]:
+    """Number of cells (count + 1,) of each label 0..count of an image.
+
+    The same as ``numpy.bincount``, which would make a copy of the image in its own type.
+    """
+    sizes = np.zeros(count + 1, np.int64)
+    for rows in np.array_split(labels, max(1, labels.size // COUNTED_AT_ONCE)):
+        sizes += np.bincount(rows.ravel(), minlength=count + 1)
+    return sizes

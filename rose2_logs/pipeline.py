@@ -24,7 +24,7 @@ from rose2_logs.floor_plan.rooms import (
     settle_borders,
 )
 from rose2_logs.floor_plan.stage import FloorPlanResult, make_floor_plan
-from rose2_logs.occupancy import GridGeometry, OccupancySnapshot, distinct_labels
+from rose2_logs.occupancy import GridGeometry, OccupancySnapshot, distinct_labels, label_sizes
 from rose2_logs.parameters import Parameters
 from rose2_logs.rooms import Doorway, RoomMap
 from rose2_logs.rose.stage import RoseResult, find_structure
@@ -148,15 +148,7 @@ def analyse(snapshot: OccupancySnapshot, parameters: Parameters, method: str = "
         parameters.topology,
     )
     watch.lap("topology")
-    labels = adopt_left_out(labels, free, resolution, parameters.floor_plan)
-    settled = settle_borders(labels, resolution, parameters.floor_plan.border_strip_m)
-    number = number_rooms(
-        settled, int(labels.max(initial=0)), parameters.floor_plan.room_min_area_m2, resolution
-    )
-    # Which faces are a room's is told by the labels before their borders settled.
-    room_of_face, shapes = _room_shapes(plan, number[labels], number[settled], resolution, parameters)
-    labels = number[settled]
-    rooms = _room_map(labels, shapes, explored, parameters)
+    rooms, room_of_face = _finished_rooms(labels, plan, explored, parameters)
     watch.lap("rooms")
     return analysis(
         rooms=rooms,
@@ -179,6 +171,22 @@ class _StopWatch:
         self._last = now
 
 
+def _finished_rooms(
+    labels: NDArray[np.int32], plan: FloorPlanResult, explored: ExploredPart, parameters: Parameters
+) -> tuple[RoomMap, NDArray[np.int32]]:
+    """Rooms with what was left out, straight borders and shapes; and the room of each face."""
+    resolution = explored.resolution_m
+    unsettled = adopt_left_out(labels, explored.free, resolution, parameters.floor_plan)
+    labels = settle_borders(unsettled, resolution, parameters.floor_plan.border_strip_m)
+    number = number_rooms(
+        labels, int(unsettled.max(initial=0)), parameters.floor_plan.room_min_area_m2, resolution
+    )
+    labels = number[labels]
+    # Which faces are a room's is told by the labels before their borders settled.
+    room_of_face, shapes = _room_shapes(plan, number[unsettled], labels, resolution, parameters)
+    return _room_map(labels, shapes, explored, parameters), room_of_face
+
+
 def _room_shapes(
     plan: FloorPlanResult,
     unsettled: NDArray[np.int32],
@@ -188,11 +196,15 @@ def _room_shapes(
 ) -> tuple[NDArray[np.int32], list[BaseGeometry]]:
     """Room of each face, and predicted shapes: a room's faces, or its cells where a split cut faces."""
     count = int(labels.max(initial=0))
-    pairs, _ = distinct_labels(unsettled * np.int64(plan.group.max(initial=0) + 1) + plan.labels)
-    rooms, groups = np.divmod(pairs, int(plan.group.max(initial=0)) + 1)
+    group_count = int(plan.group.max(initial=0)) + 1
+    fits = (count + 1) * group_count < 2**31
+    pairs, _ = distinct_labels(
+        unsettled * (np.int32(group_count) if fits else np.int64(group_count)) + plan.labels
+    )
+    rooms, groups = np.divmod(pairs, group_count)
     # A group that was split, or lost cells to a split, has no faces of its own any more.
     rooms, groups = rooms[rooms > 0], groups[rooms > 0]
-    rooms_in_group = np.bincount(groups, minlength=int(plan.group.max(initial=0)) + 1)
+    rooms_in_group = np.bincount(groups, minlength=group_count)
     room_of_group = np.zeros(len(rooms_in_group), np.int32)
     whole = rooms_in_group[groups] == 1
     room_of_group[groups[whole]] = rooms[whole]
@@ -217,7 +229,7 @@ def _room_map(
         geometry=explored.geometry,
         labels=full,
         polygons=tuple(explored.shape(shape) for shape in shapes),
-        areas_m2=np.bincount(full[explored.window].ravel(), minlength=len(shapes) + 1)[1:].astype(float)
+        areas_m2=label_sizes(full[explored.window], len(shapes))[1:].astype(float)
         * explored.geometry.cell_area_m2,
         doorways=tuple(Doorway(pair, explored.points(ends)) for pair, ends in doorways),
     )

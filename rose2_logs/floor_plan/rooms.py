@@ -11,7 +11,7 @@ from shapely.affinity import translate
 from shapely.geometry.base import BaseGeometry
 
 from rose2_logs.floor_plan.faces import FaceGraph, rasterise
-from rose2_logs.occupancy import BoolArray, FloatArray, distinct_labels
+from rose2_logs.occupancy import BoolArray, FloatArray, distinct_labels, label_sizes
 from rose2_logs.parameters import FloorPlanParameters
 
 
@@ -50,7 +50,7 @@ def number_rooms(
     number : (N,) int32
         Number of each label: ``number[labels]`` is the renumbered image.
     """
-    size = np.bincount(labels.ravel(), minlength=highest + 1)
+    size = label_sizes(labels, highest)
     keep = size * resolution_m**2 >= minimum_m2
     keep[0] = False
     present, first = distinct_labels(labels)
@@ -107,16 +107,18 @@ def settle_borders(labels: NDArray[np.int32], resolution_m: float, strip_m: floa
     """
     radius = max(1, round(strip_m / resolution_m / 2))
     kernel = np.ones((2 * radius + 1, 2 * radius + 1), np.uint8)
-    values = labels.astype(np.float32)
-    core = (cv2.erode(values, kernel) == values) & (cv2.dilate(values, kernel) == values)
-    grown = np.where(core, values, 0)
+    grown = labels.astype(np.float32)
+    core = cv2.erode(grown, kernel) == grown
+    core &= cv2.dilate(grown, kernel) == grown
+    grown[~core] = 0
     open_cells = labels > 0
     cross = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
     # Every step reaches a cell further; twice the strip brings back what lies in corners.
     for _ in range(4 * radius):
-        wider = cv2.dilate(grown, cross)
-        grown = np.where((grown == 0) & open_cells, wider, grown)
-    return np.where(grown > 0, grown, values).astype(np.int32)
+        np.copyto(grown, cv2.dilate(grown, cross), where=(grown == 0) & open_cells)
+    settled = labels.copy()
+    np.copyto(settled, grown, where=grown > 0, casting="unsafe")
+    return settled
 
 
 def predicted_shapes(

@@ -48,9 +48,12 @@ def split_rooms(
         largest = np.argsort(-size, kind="stable")[:2]
         if len(largest) < 2 or size[largest[1]] < parameters.split_min_area_m2:
             continue
-        corner = np.array([window[1].start, window[0].start])
+        corner = np.array([window[1].start, window[0].start], np.float32)
         row, column = np.nonzero(inside)
-        points = (np.column_stack([column, row]) + corner + 0.5) * resolution_m
+        points = np.empty((len(row), 2), np.float32)
+        points[:, 0], points[:, 1] = column, row
+        points += corner + 0.5
+        points *= resolution_m
         of_cell = part[row, column]
         one, two = points[of_cell == largest[0] + 1], points[of_cell == largest[1] + 1]
         near = np.sort(lines.query(box(*points.min(0), *points.max(0)), predicate="intersects"))
@@ -66,15 +69,15 @@ def split_rooms(
 
 
 def _cut(
-    points: FloatArray,
-    one: FloatArray,
-    two: FloatArray,
+    points: NDArray[np.float32],
+    one: NDArray[np.float32],
+    two: NDArray[np.float32],
     candidates: list[tuple[FloatArray, FloatArray]],
     min_purity: float,
 ) -> BoolArray | None:
     """Tell which points (P,) lie on the second part's side of the best line of the first set that divides."""
     for normals, offsets in candidates:
-        purity = _purity(one @ normals.T > offsets, two @ normals.T > offsets)
+        purity = np.array([_purity(one, two, n, d) for n, d in zip(normals, offsets, strict=True)])
         best = int(purity.argmax()) if len(purity) else -1
         if best >= 0 and purity[best] >= min_purity:
             above = points @ normals[best] > offsets[best]
@@ -83,11 +86,10 @@ def _cut(
     return None
 
 
-def _purity(one_above: BoolArray, two_above: BoolArray) -> FloatArray:
-    """Share (L,) of the worse part that lies on its own side of each line."""
-    a, b = one_above.mean(0), two_above.mean(0)
-    purity: FloatArray = np.maximum(np.minimum(a, 1 - b), np.minimum(1 - a, b))
-    return purity
+def _purity(one: NDArray[np.float32], two: NDArray[np.float32], normal: FloatArray, offset: float) -> float:
+    """Share of the worse part that lies on its own side of a line."""
+    a, b = (one @ normal > offset).mean(), (two @ normal > offset).mean()
+    return float(max(min(a, 1 - b), min(1 - a, b)))
 
 
 def _as_normals(lines_m: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -98,7 +100,9 @@ def _as_normals(lines_m: FloatArray) -> tuple[FloatArray, FloatArray]:
     return normal, np.einsum("ij,ij->i", normal, lines_m[:, :2])
 
 
-def _between(one: FloatArray, two: FloatArray, directions_rad: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _between(
+    one: NDArray[np.float32], two: NDArray[np.float32], directions_rad: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """Lines along the dominant directions, each at the offset that best divides two sets of points."""
     normals = np.column_stack([-np.sin(directions_rad), np.cos(directions_rad)])
     offsets = np.zeros(len(normals))

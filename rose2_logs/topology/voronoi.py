@@ -80,9 +80,10 @@ def voronoi_graph(
 
 def clearance_m(walls: BoolArray, resolution_m: float) -> NDArray[np.float32]:
     """Distance (H, W) from the nearest wall cell in metres, slightly blurred."""
-    distance = cv2.distanceTransform((~walls).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
-    blurred: NDArray[np.float32] = cv2.GaussianBlur(distance, (0, 0), SMOOTH_CELLS) * np.float32(resolution_m)
-    return blurred
+    distance = cv2.distanceTransform((~walls).view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
+    clear: NDArray[np.float32] = np.asarray(cv2.GaussianBlur(distance, (0, 0), SMOOTH_CELLS), np.float32)
+    clear *= np.float32(resolution_m)
+    return clear
 
 
 def _basins(
