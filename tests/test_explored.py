@@ -92,3 +92,17 @@ def test_finer_cells_give_the_same_rooms(side: int):
     np.testing.assert_allclose(coarse.walls.lines_m, fine.walls.lines_m, atol=1e-9)
     for one, other in zip(coarse.rooms.polygons, fine.rooms.polygons, strict=True):
         assert one.symmetric_difference(other).area < 1e-6
+
+
+def test_a_large_map_is_analysed_coarser_and_labelled_at_its_own_resolution():
+    image = np.flipud(two_rooms(240))
+    cells = np.select([image == 254, image == 0], [FREE, OCCUPIED], UNKNOWN).astype(np.int8)
+    geometry = GridGeometry(0.05, (0.0, 0.0), 0.0, "map", cells.shape)
+    snapshot = OccupancySnapshot(0, 0, 0, "/map", cells, geometry)
+    whole = analyse(snapshot, Parameters())
+    blocks = analyse(snapshot, Parameters().replaced({"occupancy": {"analysed_max_cells": 20_000}}))
+    assert (whole.resolution_m, blocks.resolution_m) == (0.05, 0.1)
+    assert len(whole.rooms) == len(blocks.rooms) == 2
+    assert blocks.rooms.labels.shape == cells.shape
+    assert ((blocks.rooms.labels > 0) <= (cells == FREE)).all()
+    assert (blocks.rooms.labels == whole.rooms.labels)[whole.rooms.labels > 0].mean() > 0.97
