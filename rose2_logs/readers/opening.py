@@ -10,6 +10,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from rose2_logs.errors import LogError
+from rose2_logs.readers.discovery import IMAGE_ENDINGS, MAP_ENDINGS, STORAGE_ENDINGS
 from rose2_logs.readers.log import LogReader
 from rose2_logs.readers.selection import Selection
 from rose2_logs.readers.source import LogInfo, MessageSource
@@ -17,9 +18,6 @@ from rose2_logs.readers.source import LogInfo, MessageSource
 LogPath = str | Path | Sequence[str | Path]
 
 EVERYTHING = Selection()
-_YAML = (".yaml", ".yml")
-_IMAGES = (".pgm", ".png", ".bmp")
-_STORAGES = (".mcap", ".db3", ".bag")
 _FORMATS = (
     "an .mcap file, a ROS 1 .bag, a ROS 2 bag directory or .db3, a map_server .yaml or a folder of those"
 )
@@ -132,18 +130,18 @@ def _kind(file: Path) -> str:
     suffix = file.suffix.lower()
     if begin in _MAGIC:
         return _MAGIC[begin]
-    if suffix in _YAML:
+    if suffix in MAP_ENDINGS:
         return ".yaml"
-    if suffix in _IMAGES:
+    if suffix in IMAGE_ENDINGS:
         return "image"
-    if suffix in _STORAGES:
+    if suffix in STORAGE_ENDINGS:
         what = "is empty" if not begin else f"does not begin as {suffix} files do"
         raise LogError(f"{file}: {what}; was it copied whole?")
     raise LogError(f"{file}: is not a kind of log that can be read; give {_FORMATS}")
 
 
 def _yaml_beside(image: Path) -> Path:
-    for suffix in _YAML:
+    for suffix in MAP_ENDINGS:
         if (beside := image.with_suffix(suffix)).exists():
             return beside
     raise LogError(
@@ -158,10 +156,10 @@ def _open_directory(log: Path) -> MessageSource:
     if (log / "metadata.yaml").exists():
         return _open_rosbag2(log)
     inside = sorted(each for each in log.iterdir() if each.is_file())
-    for suffix in _STORAGES:
+    for suffix in STORAGE_ENDINGS:
         if files := [each for each in inside if each.suffix == suffix]:
             return _open_files(log, files, in_natural_order=True)
-    if maps := [each for each in inside if each.suffix.lower() in _YAML and is_map_file(each)]:
+    if maps := [each for each in inside if each.suffix.lower() in MAP_ENDINGS and is_map_file(each)]:
         return _open_files(log, maps, in_natural_order=True)
     raise LogError(f"{log}: holds neither a bag (metadata.yaml) nor saved maps; give {_FORMATS}")
 

@@ -1,0 +1,83 @@
+"""Which of a folder's files make up logs: told by their names alone, so that a listing is enough."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
+from pathlib import PurePosixPath
+
+MAP_ENDINGS = (".yaml", ".yml")
+IMAGE_ENDINGS = (".pgm", ".png", ".bmp")
+STORAGE_ENDINGS = (".mcap", ".db3", ".bag")
+COMPRESSED_ENDING = ".zstd"
+"""Of the files of a ROS 2 bag that was compressed file by file."""
+ANNOTATED_ENDING = ".rose2.mcap"
+"""Of our own annotated logs, which are results and no new logs."""
+BAG_DESCRIPTION = "metadata.yaml"
+
+
+def logs_among(files: Iterable[str], folder_name: str) -> list[str]:
+    """Find the logs in a folder by the names of its files.
+
+    A folder is one log if it is a ROS 2 bag, see `is_bag`, or if it holds saved maps and no bags: those are
+    the maps of one run. Each other MCAP file, bag or database is a log. Hidden files and annotated logs are
+    left out.
+
+    Parameters
+    ----------
+    files : iterable of str
+        Paths relative to the folder, with ``/`` between their parts; from any depth.
+    folder_name : str
+        The folder's own name.
+
+    Returns
+    -------
+    list of str
+        Paths of the logs relative to the folder, sorted; ``""`` is the folder itself.
+    """
+    names_in: dict[str, list[str]] = defaultdict(list)
+    for file in files:
+        path = PurePosixPath(file)
+        if not any(part.startswith(".") for part in path.parts):
+            names_in[_text(path.parent)].append(path.name)
+    found: list[str] = []
+    bags: list[str] = []
+    for folder in sorted(names_in):
+        if any(folder == bag or folder.startswith(f"{bag}/") or bag == "" for bag in bags):
+            continue
+        names = sorted(names_in[folder])
+        if is_bag(names, PurePosixPath(folder).name or folder_name):
+            bags.append(folder)
+            found.append(folder)
+        elif stored := [name for name in names if is_storage(name)]:
+            found += [f"{folder}/{name}" if folder else name for name in stored]
+        elif _holds_maps(names):
+            found.append(folder)
+    return sorted(found)
+
+
+def is_bag(names: Sequence[str], folder_name: str) -> bool:
+    """Whether the files of a folder make up a ROS 2 bag.
+
+    It holds ``metadata.yaml`` beside its storage files, or, of a recording that was not closed, storage files
+    ``FOLDER_0``, ``FOLDER_1`` .. and no others.
+    """
+    stored = [name for name in names if is_storage(name.removesuffix(COMPRESSED_ENDING))]
+    if not stored or BAG_DESCRIPTION in names:
+        return bool(stored)
+    parts = {f"{folder_name}_{number}" for number in range(len(stored))}
+    return {PurePosixPath(name).stem for name in stored} == parts
+
+
+def is_storage(name: str) -> bool:
+    """Whether a name is that of an MCAP file, bag or database, and not of an annotated log."""
+    return name.lower().endswith(STORAGE_ENDINGS) and not name.endswith(ANNOTATED_ENDING)
+
+
+def _text(folder: PurePosixPath) -> str:
+    return "" if folder == PurePosixPath(".") else folder.as_posix()
+
+
+def _holds_maps(names: Sequence[str]) -> bool:
+    stems = {PurePosixPath(name).stem for name in names if name.lower().endswith(IMAGE_ENDINGS)}
+    return any(name.lower().endswith(MAP_ENDINGS) and PurePosixPath(name).stem in stems for name in names)
