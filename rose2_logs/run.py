@@ -52,6 +52,8 @@ class RunOptions:
         Also send the recording to an open Rerun viewer.
     overwrite : bool
         Whether results of an earlier run may be replaced.
+    origin : str, optional
+        What the summary names as the log; by default its path. For a log that was copied to be read.
     """
 
     topic: str | None = None
@@ -63,6 +65,7 @@ class RunOptions:
     annotated_log: bool = True
     live: bool = False
     overwrite: bool = False
+    origin: str | None = None
 
 
 @dataclass(frozen=True)
@@ -214,7 +217,10 @@ def _analyse_or_refuse(
 
 def _run_info(path: Path, reader: LogReader, options: RunOptions) -> RunInfo:
     provenance = {"format": reader.info.format, **fingerprint(path)}
-    return RunInfo(path, reader.topic, options.method, options.parameters, software_versions(), provenance)
+    versions = software_versions()
+    return RunInfo(
+        path, reader.topic, options.method, options.parameters, versions, provenance, options.origin
+    )
 
 
 def _planned_files(folder: Path, stem: str, options: RunOptions) -> dict[str, Path]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
 import signal
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
@@ -18,6 +19,8 @@ Result = TypeVar("Result")
 
 LOOK_AHEAD_PER_WORKER = 2
 """Items handed out and not yet taken back, for each worker: one in work and one waiting."""
+THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "RAYON_NUM_THREADS")
+"""Where OpenMP, the linear algebra libraries and Rerun look for the number of threads when loaded."""
 
 
 class WorkerError(Rose2LogsError):
@@ -95,3 +98,18 @@ def _one_thread() -> Iterator[None]:
             yield
     finally:
         cv2.setNumThreads(threads)
+
+
+def limit_process_to_one_thread() -> None:
+    """Hold the numeric libraries of this process to one thread from now on, also those not loaded yet.
+
+    For worker processes that each do a whole log: several share the processors as it is.
+    """
+    os.environ.update(dict.fromkeys(THREAD_VARIABLES, "1"))
+    import cv2
+    import pyarrow as pa
+    from threadpoolctl import threadpool_limits
+
+    cv2.setNumThreads(1)
+    pa.set_cpu_count(1)
+    threadpool_limits(1)

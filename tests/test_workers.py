@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 import time
 
 import pytest
@@ -78,3 +80,16 @@ def test_a_killed_worker_is_one_clear_line():
     """A process that dies is told with what to do, and nothing hangs."""
     with pytest.raises(WorkerError, match="fewer --workers"):
         list(ordered_map(die_at_three, range(8), 2))
+
+
+def test_a_process_is_held_to_one_thread_also_by_libraries_loaded_later():
+    """Several processes share the processors, each with a whole log."""
+    program = (
+        "from rose2_logs.workers import limit_process_to_one_thread\n"
+        "limit_process_to_one_thread()\n"
+        "import cv2, numpy, scipy.linalg, sklearn.cluster\n"
+        "from threadpoolctl import threadpool_info\n"
+        "print({cv2.getNumThreads(), *(pool['num_threads'] for pool in threadpool_info())})"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout == "{1}\n"

@@ -29,6 +29,8 @@ class RunInfo:
         Versions of the tool and of the packages that results depend on.
     provenance : dict
         What is known of the input: format, size in bytes, SHA-256 fingerprint; JSON values only.
+    origin : str, optional
+        Where the log comes from if `log_path` is but a copy.
     """
 
     log_path: Path
@@ -37,6 +39,7 @@ class RunInfo:
     parameters: Parameters
     versions: dict[str, str]
     provenance: dict[str, Any]
+    origin: str | None = None
 
 
 class Sink(Protocol):

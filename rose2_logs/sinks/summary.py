@@ -101,7 +101,7 @@ def write_summary(
         If the file cannot be written.
     """
     summary = {
-        "log": str(info.log_path),
+        "log": info.origin or str(info.log_path),
         "topic": info.topic,
         "method": info.method,
         "input": info.provenance,
