@@ -1,0 +1,158 @@
+"""Workers of a Dask cluster: its scheduler gives the log of one that is lost to another."""
+
+from __future__ import annotations
+
+import logging
+import queue
+import time
+import uuid
+from collections.abc import Iterator
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from rose2_logs.batch.remote import EXTRA
+from rose2_logs.batch.task import LogOutcome, LogTask, Progress, analyse_task
+from rose2_logs.errors import ParameterError
+from rose2_logs.workers import WorkerError
+
+logger = logging.getLogger(__name__)
+
+CONNECT_TIMEOUT_S = 10.0
+"""For the scheduler to answer at all."""
+LOOK_EVERY_S = 2.0
+"""Between two looks at whether the scheduler is still there and has workers."""
+
+
+class DaskWorkers:
+    """The workers of a Dask cluster; a context manager that cancels what is left and lets the cluster go.
+
+    Parameters
+    ----------
+    address : str
+        Of the scheduler, ``tcp://HOST:8786`` or ``HOST:8786``, or the path of its scheduler file.
+
+    Raises
+    ------
+    ParameterError
+        If Dask is not installed, or no scheduler answers.
+    """
+
+    def __init__(self, address: str) -> None:
+        try:
+            import distributed
+        except ImportError as error:
+            raise ParameterError(f"--scheduler needs Dask: {EXTRA}") from error
+        # What its client logs about a lost scheduler, traceback and all, is told here in one line.
+        for name in ("distributed", "distributed.client", "distributed.core"):
+            logging.getLogger(name).setLevel(logging.CRITICAL)
+        self._address = address
+        self._topic = f"rose2-logs-{uuid.uuid4().hex}"
+        self._told: queue.Queue[Progress | Any] = queue.Queue()
+        self._tasks: dict[Any, LogTask] = {}
+        self._looked = False
+        where: dict[str, Any] = (
+            {"scheduler_file": address} if Path(address).is_file() else {"address": address}
+        )
+        try:
+            connect: Any = distributed.Client
+            self._client: Any = connect(
+                **where, timeout=CONNECT_TIMEOUT_S, set_as_default=False, name="rose2-logs"
+            )
+        except (OSError, ValueError) as error:
+            raise ParameterError(
+                f"--scheduler {address}: no Dask scheduler answers; `dask scheduler` prints its address"
+            ) from error
+        self._killed_worker = distributed.KilledWorker
+        self._client.subscribe_topic(self._topic, lambda event: self._told.put(Progress(*event[1])))
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        if self._tasks and self._client.status == "running":
+            self._client.cancel(list(self._tasks))
+        self._client.close(timeout=CONNECT_TIMEOUT_S)
+
+    def submit(self, task: LogTask) -> None:
+        """Take a task."""
+        key = f"rose2-logs-{task.name}-{uuid.uuid4().hex}"
+        future = self._client.submit(analyse_on_worker, task, self._topic, key=key, pure=False)
+        self._tasks[future] = task
+        future.add_done_callback(self._told.put)
+
+    def events(self) -> Iterator[Progress | LogOutcome]:
+        """Yield what the workers tell until no task is left; tasks may be submitted meanwhile.
+
+        Raises
+        ------
+        WorkerError
+            If the scheduler is lost.
+        """
+        looked = 0.0
+        while self._tasks:
+            if time.monotonic() - looked >= LOOK_EVERY_S:
+                self._look()
+                looked = time.monotonic()
+            try:
+                told = self._told.get(timeout=LOOK_EVERY_S)
+            except queue.Empty:
+                continue
+            if isinstance(told, Progress):
+                yield told
+            elif told in self._tasks:
+                yield self._outcome(told, self._tasks.pop(told))
+
+    def _look(self) -> None:
+        """Find out what would make the wait endless."""
+        lost = any(future.status in ("lost", "cancelled") for future in self._tasks)
+        if lost or self._client.status in ("closing", "closed"):
+            raise self._is_gone()
+        if self._looked or self._client.status != "running":
+            return
+        self._looked = True
+        threads = self._client.nthreads()
+        if not threads:
+            logger.warning(
+                "no worker has joined the scheduler yet: `dask worker %s` starts one", self._address
+            )
+        if any(count > 1 for count in threads.values()):
+            logger.warning("workers with several threads share one Python: start them with --nthreads 1")
+
+    def _is_gone(self) -> WorkerError:
+        return WorkerError(
+            f"the Dask scheduler at {self._address} is gone; the same command again goes on with the rest"
+        )
+
+    def _outcome(self, future: Any, task: LogTask) -> LogOutcome:
+        if future.status in ("lost", "cancelled"):
+            raise self._is_gone()
+        error = future.exception() if future.status == "error" else None
+        if error is None:
+            outcome: LogOutcome = future.result()
+            return outcome
+        if isinstance(error, self._killed_worker):
+            # The scheduler counts also losses of workers where the log only waited behind the one to blame.
+            begun = len(list((task.work / task.name).glob("*")))
+            return LogOutcome(
+                task.name,
+                "failed",
+                reason="the workers that tried it were lost one after the other, likely for lack of memory",
+                is_transient=True,
+                tries=max(begun, 1),
+                details=str(error),
+            )
+        reason = (
+            f"the worker could not run it ({type(error).__name__}: {error}); is rose2-logs installed there?"
+        )
+        return LogOutcome(task.name, "failed", reason=reason, details=str(error))
+
+
+def analyse_on_worker(task: LogTask, topic: str) -> LogOutcome:
+    """Do a task in a Dask worker, with its progress told through the scheduler."""
+    from distributed import get_worker
+
+    worker = get_worker()
+    return analyse_task(task, lambda told: worker.log_event(topic, [told.name, told.share]))

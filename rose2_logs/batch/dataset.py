@@ -1,0 +1,178 @@
+"""The tables of all logs as one data set, partitioned by log, and a table that sums up the logs."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import shutil
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+
+from rose2_logs.errors import OutputError
+from rose2_logs.run import SUMMARY, TABLES
+
+TABLES_FOLDER = "tables"
+PARTITION = "log"
+SUMMARY_NAME = "summary"
+
+SUMMARY_COLUMNS: dict[str, tuple[pa.DataType, str]] = {
+    "log": (pa.string(), "name of the log: its folder under logs/, its partition under tables/"),
+    "status": (pa.string(), "done or failed"),
+    "reason": (pa.string(), "why it failed"),
+    "source": (pa.string(), "where the log lies"),
+    "size_bytes": (pa.int64(), "size of the log"),
+    "sha256": (pa.string(), "fingerprint of the log"),
+    "method": (pa.string(), "segmentation method"),
+    "version": (pa.string(), "version of rose2-logs"),
+    "snapshots": (pa.int32(), "maps that were analysed"),
+    "invalid_maps": (pa.int32(), "maps that could not be analysed"),
+    "first_log_time_ns": (pa.int64(), "of the first map, nanoseconds since the epoch"),
+    "last_log_time_ns": (pa.int64(), "of the last map, nanoseconds since the epoch"),
+    "coverage_first": (
+        pa.float64(),
+        "known free area of the first map over that of the last, share in [0, 1]",
+    ),
+    "rooms_last": (pa.int32(), "rooms of the last map"),
+    "tracks": (pa.int32(), "rooms over the run"),
+    "splits": (pa.int32(), "rooms that split"),
+    "merges": (pa.int32(), "rooms that merged"),
+    "run_s": (pa.float64(), "wall-clock time of the analysis, seconds"),
+}
+"""Name, type and meaning of the columns of ``summary.parquet`` and ``summary.csv``."""
+
+Row = dict[str, Any]
+
+
+def publish_tables(out: Path, name: str) -> None:
+    """Make the tables of a finished log part of the data set: ``tables/TABLE/log=NAME/TABLE.parquet``.
+
+    They share the bytes on the disk with those in the log's folder where the file system can.
+
+    Raises
+    ------
+    OutputError
+        If they cannot be written.
+    """
+    for table in TABLES:
+        source = out / "logs" / name / f"{table}.parquet"
+        target = out / TABLES_FOLDER / table / f"{PARTITION}={name}" / f"{table}.parquet"
+        with _writing(target):
+            if _is_same(source, target):
+                continue
+            target.parent.mkdir(parents=True, exist_ok=True)
+            part = target.with_name(f".{target.name}.part")
+            part.unlink(missing_ok=True)
+            try:
+                os.link(source, part)
+            except OSError:
+                shutil.copy2(source, part)
+            part.replace(target)
+
+
+def withdraw_tables(out: Path, names: Sequence[str]) -> None:
+    """Take out of the data set what belongs to none of the finished logs.
+
+    Raises
+    ------
+    OutputError
+        If something cannot be removed.
+    """
+    wanted = {f"{PARTITION}={name}" for name in names}
+    for partition in (out / TABLES_FOLDER).glob(f"*/{PARTITION}=*"):
+        if partition.name not in wanted:
+            with _writing(partition):
+                shutil.rmtree(partition)
+
+
+def summary_row(out: Path, name: str) -> Row:
+    """Sum up the results of a finished log; one whose summary somebody damaged counts as failed."""
+    path = out / "logs" / name / SUMMARY
+    try:
+        kept = json.loads(path.read_text(encoding="utf-8"))
+        results = kept["results"]
+        return {
+            "log": name,
+            "status": "done",
+            "reason": "",
+            "source": kept["log"],
+            "size_bytes": kept["input"]["size_bytes"],
+            "sha256": kept["input"]["sha256"],
+            "method": kept["method"],
+            "version": kept["versions"]["rose2-logs"],
+            "snapshots": results["snapshots"],
+            "invalid_maps": results["invalid_maps"],
+            "first_log_time_ns": results["first_log_time_ns"],
+            "last_log_time_ns": results["last_log_time_ns"],
+            "coverage_first": results["coverage_first"],
+            "rooms_last": results["rooms_last"],
+            "tracks": results["tracks"],
+            "splits": results["events"].get("split", 0),
+            "merges": results["events"].get("merged", 0),
+            "run_s": kept["seconds"]["run"],
+        }
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        return failed_row(name, "", f"{path}: cannot be read ({error}); remove its folder and run again")
+
+
+def failed_row(name: str, source: str, reason: str) -> Row:
+    """Sum up a log that failed."""
+    known = {"log": name, "status": "failed", "source": source, "reason": " ".join(reason.split())}
+    return dict.fromkeys(SUMMARY_COLUMNS) | known
+
+
+def write_summary_tables(out: Path, rows: Sequence[Mapping[str, Any]]) -> tuple[Path, Path]:
+    """Write ``summary.parquet`` and ``summary.csv``, sorted by log.
+
+    Raises
+    ------
+    OutputError
+        If they cannot be written.
+    """
+    import pyarrow.parquet as pq
+
+    rows = sorted(rows, key=lambda row: str(row["log"]))
+    fields = [
+        pa.field(column, kind, metadata={"description": meaning})
+        for column, (kind, meaning) in SUMMARY_COLUMNS.items()
+    ]
+    table = pa.Table.from_pylist([dict(row) for row in rows], pa.schema(fields))
+    paths = (out / f"{SUMMARY_NAME}.parquet", out / f"{SUMMARY_NAME}.csv")
+    with _replacing(paths[0]) as part:
+        pq.write_table(table, part, compression="zstd")
+    with _replacing(paths[1]) as part, part.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, list(SUMMARY_COLUMNS), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+    return paths
+
+
+def _is_same(source: Path, target: Path) -> bool:
+    with suppress(FileNotFoundError):
+        one, other = source.stat(), target.stat()
+        return (one.st_size, one.st_mtime_ns) == (other.st_size, other.st_mtime_ns)
+    return False
+
+
+@contextmanager
+def _replacing(path: Path) -> Iterator[Path]:
+    """Give a path to write to, which takes the place of another when it is whole."""
+    part = path.with_name(f".{path.name}.part")
+    with _writing(path):
+        try:
+            yield part
+            part.replace(path)
+        finally:
+            part.unlink(missing_ok=True)
+
+
+@contextmanager
+def _writing(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise OutputError(f"{path}: cannot be written: {error}") from error

@@ -1,0 +1,333 @@
+"""A batch from beginning to end: planned, worked off, put in place; stopped, it leaves whole results only."""
+
+from __future__ import annotations
+
+import dataclasses
+import logging
+import os
+import re
+import shutil
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+from rose2_logs.batch import dataset
+from rose2_logs.batch.folders import LOGS_FOLDER, locked, put_in_place, work_folder
+from rose2_logs.batch.local_workers import LocalWorkers
+from rose2_logs.batch.location import Location, find_logs
+from rose2_logs.batch.names import assign_names
+from rose2_logs.batch.record import BatchSettings, Record, Signature, local_signature, read_record
+from rose2_logs.batch.task import LogOutcome, LogTask, Progress
+from rose2_logs.errors import LogError, OutputError, ParameterError
+from rose2_logs.run import SUMMARY, TABLES
+
+logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class BatchOptions:
+    """How to go about a batch.
+
+    Attributes
+    ----------
+    settings : BatchSettings
+        What to take from each log and what to do with it.
+    workers : int, optional
+        Logs at a time on this machine; by default one for each processor.
+    scheduler : str, optional
+        Address of a Dask scheduler; its workers do the work.
+    retries : int
+        More tries for a log whose worker was lost or whose storage failed.
+    overwrite : bool
+        Whether results of other settings, or of a log that has changed, may be replaced.
+    rerun : bool
+        Whether to analyse also what is up to date; implies `overwrite`.
+    """
+
+    settings: BatchSettings = dataclasses.field(default_factory=BatchSettings)
+    workers: int | None = None
+    scheduler: str | None = None
+    retries: int = 2
+    overwrite: bool = False
+    rerun: bool = False
+
+
+@dataclass(frozen=True)
+class LogState:
+    """What became of one log of a batch.
+
+    Attributes
+    ----------
+    name : str
+        Of its folder and partition.
+    status : str
+        ``done``, ``up to date`` or ``failed``.
+    row : dict
+        As in the summary table.
+    outcome : LogOutcome, optional
+        What its worker told; none if none had to look at it.
+    """
+
+    name: str
+    status: str
+    row: dataset.Row
+    outcome: LogOutcome | None = None
+
+
+@dataclass(frozen=True)
+class BatchResult:
+    """What became of a batch: its logs by name, and the files of the summary, which tells of all logs."""
+
+    out: Path
+    states: tuple[LogState, ...]
+    files: tuple[Path, ...]
+
+    @property
+    def failed(self) -> tuple[LogState, ...]:
+        """The logs that failed."""
+        return tuple(state for state in self.states if state.status == "failed")
+
+
+class Listener(Protocol):
+    """Told of a batch's progress."""
+
+    def begin(self, logs: int, up_to_date: int) -> None:
+        """Hear of how many logs it is about, and how many of these there is nothing to do for."""
+        ...
+
+    def progress(self, told: Progress) -> None:
+        """Hear how far a log is."""
+        ...
+
+    def retry(self, name: str, reason: str) -> None:
+        """Hear that a log is tried again, and why."""
+        ...
+
+    def finished(self, state: LogState) -> None:
+        """Hear what became of a log."""
+        ...
+
+
+class Workers(AbstractContextManager["Workers"], Protocol):
+    """Does tasks somewhere else."""
+
+    def submit(self, task: LogTask) -> None:
+        """Take a task."""
+        ...
+
+    def events(self) -> Iterator[Progress | LogOutcome]:
+        """Yield what the workers tell until no task is left; tasks may be submitted meanwhile."""
+        ...
+
+
+def run_batch(arguments: Sequence[str], out: Path, options: BatchOptions, listener: Listener) -> BatchResult:
+    """Analyse many logs into one folder.
+
+    Each log's results go to ``out/logs/NAME``, as `analyse_log` writes them; the tables of all logs to
+    ``out/tables``, partitioned by log; one line a log to ``out/summary.parquet`` and ``out/summary.csv``.
+    Logs whose results are there already, of the same content and settings, are left as they are. A log that
+    fails does not stop the others, and leaves what was there before.
+
+    Parameters
+    ----------
+    arguments : sequence of str
+        Logs, folders, patterns, URLs; see `find_logs`.
+    out : path
+        Where to; it is made. Workers on other machines must see it at the same path.
+    options : BatchOptions
+        How.
+    listener : Listener
+        To show progress.
+
+    Raises
+    ------
+    LogError
+        If there are no logs.
+    ParameterError
+        If the scheduler does not answer.
+    OutputError
+        If the folder cannot be used, another batch is writing to it, or holds results of other settings that
+        may not be replaced.
+    WorkerError
+        If the scheduler is lost along the way.
+    """
+    # A path holds one of the two slashes of a URL.
+    if re.match(r"[a-z][a-z0-9+.-]+:/", str(out)):
+        raise ParameterError(f"-o {out}: results go to a folder, not to a URL")
+    if options.scheduler is not None and options.workers is not None:
+        raise ParameterError(
+            "--workers is for this machine; a cluster has the workers that joined its scheduler"
+        )
+    out = Path(os.path.abspath(out))  # noqa: PTH100 (as in find_logs)
+    logs = find_logs(arguments, out)
+    with locked(out), work_folder(out) as work:
+        batch = _Batch(out, work, options, listener)
+        tasks = batch.plan(logs)
+        try:
+            batch.work_off(tasks)
+        finally:
+            files = batch.sum_up()
+    return BatchResult(out, tuple(sorted(batch.states, key=lambda state: state.name)), files)
+
+
+class _Batch:
+    """The state of a batch that runs: what stands, what is under way, what became of the logs so far."""
+
+    def __init__(self, out: Path, work: Path, options: BatchOptions, listener: Listener) -> None:
+        self.states: list[LogState] = []
+        self._out = out
+        self._work = work
+        self._options = options
+        self._listener = listener
+        self._settings = options.settings.determining()
+        self._may_replace = options.overwrite or options.rerun
+        folders = sorted(folder for folder in (out / LOGS_FOLDER).glob("*") if folder.is_dir())
+        self._records = {folder.name: read_record(folder) for folder in folders}
+
+    def plan(self, logs: Sequence[Location]) -> list[LogTask]:
+        """Name the logs, and find out for which there is something to do."""
+        by_address = {record.address: name for name, record in self._records.items() if record is not None}
+        looks = {log: _look_at(log) for log in logs}
+        names = assign_names(logs, by_address, self._records)
+        moved = self._moved(looks, by_address)
+        self._check_settings({*names.values(), *moved.values()})
+        tasks: list[tuple[int, LogTask]] = []
+        for log, name in names.items():
+            look, known_name = looks[log], moved.get(log, name)
+            known = self._standing(known_name)
+            task = LogTask(log, name, self._work, self._options.settings, known, known_name)
+            task = dataclasses.replace(
+                task, is_whole=self._is_whole(known_name), may_replace=self._may_replace
+            )
+            if task.stands_by(look):
+                self.states.append(LogState(name, "up to date", dataset.summary_row(self._out, name)))
+            else:
+                tasks.append((look.size_bytes if look else 0, task))
+        self._listener.begin(len(logs), len(self.states))
+        # Large logs first, so that none is left alone at the end.
+        return [task for _, task in sorted(tasks, key=lambda each: -each[0])]
+
+    def work_off(self, tasks: Sequence[LogTask]) -> None:
+        """Have the tasks done, and put in place what comes out."""
+        if not tasks:
+            return
+        under_way = {task.name: task for task in tasks}
+        tries = Counter[str]()
+        with self._workers() as workers:
+            for task in tasks:
+                workers.submit(task)
+            for told in workers.events():
+                if isinstance(told, Progress):
+                    self._listener.progress(told)
+                    continue
+                task = under_way[told.name]
+                tries[told.name] += told.tries
+                if told.is_transient and tries[told.name] <= self._options.retries:
+                    self._listener.retry(told.name, told.reason)
+                    shutil.rmtree(self._work / told.name, ignore_errors=True)
+                    under_way[told.name] = dataclasses.replace(task, attempt=task.attempt + 1)
+                    workers.submit(under_way[told.name])
+                else:
+                    self._take(task, told)
+
+    def sum_up(self) -> tuple[Path, ...]:
+        """Bring data set and summary up to date with the finished logs and the failures of this batch."""
+        finished = [name for name, record in self._records.items() if record is not None]
+        failed = {state.name: state.row for state in self.states if state.status == "failed"}
+        for name in finished:
+            dataset.publish_tables(self._out, name)
+        dataset.withdraw_tables(self._out, finished)
+        rows = [dataset.summary_row(self._out, name) for name in finished if name not in failed]
+        return dataset.write_summary_tables(self._out, [*rows, *failed.values()])
+
+    def _moved(self, looks: dict[Location, Signature | None], known: dict[str, str]) -> dict[Location, str]:
+        """Earlier results of logs that seem to lie elsewhere now, by name and size; the workers make sure."""
+        here = {log.address for log in looks}
+        gone = {
+            (Location(record.address).parts[-1], record.signature.size_bytes): name
+            for name, record in self._records.items()
+            if record is not None and record.address not in here
+        }
+        return {
+            log: gone.pop((log.parts[-1], look.size_bytes))
+            for log, look in looks.items()
+            if look and log.address not in known and (log.parts[-1], look.size_bytes) in gone
+        }
+
+    def _standing(self, name: str) -> Record | None:
+        """Record of results that stand and are of the same settings."""
+        record = self._records.get(name)
+        if record is None or self._options.rerun or record.difference(self._settings):
+            return None
+        return record
+
+    def _is_whole(self, name: str) -> bool:
+        """Whether results that stand have all the files that are wanted now."""
+        wanted = [SUMMARY, *(f"{table}.parquet" for table in TABLES)]
+        wanted += ["*.rrd"] if self._options.settings.recording else []
+        wanted += ["*.rose2.mcap"] if self._options.settings.annotated_log else []
+        folder = self._out / LOGS_FOLDER / name
+        return all(next(folder.glob(each), None) for each in wanted)
+
+    def _check_settings(self, names: set[str]) -> None:
+        """A data set is of one kind: results of other settings are replaced, or nothing is done."""
+        others = {
+            name: difference
+            for name, record in self._records.items()
+            if record is not None and (difference := record.difference(self._settings))
+        }
+        if others and not self._may_replace:
+            name, difference = next(iter(others.items()))
+            raise OutputError(
+                f"{self._out}: holds results of other settings ({len(others)} logs; {name}: {difference}); "
+                "choose another folder, or pass --overwrite to analyze the logs given now again"
+            )
+        if left := sorted(set(others) - names):
+            logger.warning(
+                "%d logs that are not among those given now keep results of other settings (%s: %s)",
+                len(left),
+                left[0],
+                others[left[0]],
+            )
+
+    def _workers(self) -> Workers:
+        if self._options.scheduler is None:
+            return LocalWorkers(self._options.workers or os.cpu_count() or 1)
+        from rose2_logs.batch.dask_workers import DaskWorkers
+
+        return DaskWorkers(self._options.scheduler)
+
+    def _take(self, task: LogTask, outcome: LogOutcome) -> None:
+        """Put what came out of a task in its place."""
+        name = task.known_name if outcome.status == "unchanged" else task.name
+        folder = self._out / LOGS_FOLDER / name
+        try:
+            if outcome.results is not None:
+                put_in_place(outcome.results, self._out, name)
+            elif outcome.record is not None:
+                outcome.record.write(folder)
+            if outcome.status != "failed":
+                self._records[name] = read_record(folder)
+                dataset.publish_tables(self._out, name)
+        except (OSError, OutputError) as error:
+            outcome = dataclasses.replace(outcome, status="failed", reason=f"{folder}: {error}")
+        if outcome.status == "failed":
+            row = dataset.failed_row(name, task.log.address, outcome.reason)
+        else:
+            row = dataset.summary_row(self._out, name)
+        status = "up to date" if outcome.status == "unchanged" else outcome.status
+        self.states.append(LogState(name, status, row, outcome))
+        self._listener.finished(self.states[-1])
+
+
+def _look_at(log: Location) -> Signature | None:
+    """Signature of a log on this machine. What is elsewhere, or cannot be read, is the workers' business."""
+    if log.is_remote:
+        return None
+    try:
+        return local_signature(Path(log.target))
+    except LogError:
+        return None

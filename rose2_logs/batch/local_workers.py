@@ -1,0 +1,133 @@
+"""Worker processes on this machine: each does log after log; one that dies takes only its own with it."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import threading
+from collections import deque
+from collections.abc import Iterator
+from contextlib import suppress
+from multiprocessing.connection import Connection, wait
+from multiprocessing.context import SpawnProcess
+from types import TracebackType
+from typing import Self
+
+from rose2_logs.batch.task import LogOutcome, LogTask, Progress, analyse_task
+from rose2_logs.workers import limit_process_to_one_thread
+
+DEATH_TIMEOUT_S = 5.0
+"""For a process that has closed its pipe to be gone, so that its exit code can be told."""
+
+
+class LocalWorkers:
+    """A pool of worker processes, started as they are needed; a context manager that ends them.
+
+    Parameters
+    ----------
+    count : int
+        Most processes at a time.
+    """
+
+    def __init__(self, count: int) -> None:
+        self._count = count
+        self._waiting: deque[LogTask] = deque()
+        self._idle: list[_Worker] = []
+        self._busy: list[_Worker] = []
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        for worker in (*self._idle, *self._busy):
+            worker.end()
+
+    def submit(self, task: LogTask) -> None:
+        """Take a task; it is begun when those before it are."""
+        self._waiting.append(task)
+
+    def events(self) -> Iterator[Progress | LogOutcome]:
+        """Yield what the workers tell until no task is left; tasks may be submitted meanwhile."""
+        while self._waiting or self._busy:
+            while self._waiting and len(self._busy) < self._count:
+                worker = self._idle.pop() if self._idle else _Worker()
+                self._busy.append(worker)
+                worker.begin(self._waiting.popleft())
+            ready = wait([worker.connection for worker in self._busy])
+            for worker in [each for each in self._busy if each.connection in ready]:
+                told = worker.told()
+                if isinstance(told, LogOutcome):
+                    self._busy.remove(worker)
+                    if worker.is_alive:
+                        self._idle.append(worker)
+                yield told
+
+
+class _Worker:
+    """One process, and the pipe to it."""
+
+    def __init__(self) -> None:
+        self.connection, theirs = multiprocessing.Pipe()
+        # A forked process would share threads and locks of Arrow and Rerun that do not survive it.
+        self._process: SpawnProcess = multiprocessing.get_context("spawn").Process(
+            target=_serve, args=(theirs,), daemon=True
+        )
+        self._process.start()
+        theirs.close()
+        self._task: LogTask | None = None
+        self.is_alive = True
+
+    def begin(self, task: LogTask) -> None:
+        self._task = task
+        # To a process that has just died nothing can be sent; `told` finds out.
+        with suppress(OSError):
+            self.connection.send(task)
+
+    def told(self) -> Progress | LogOutcome:
+        """Receive what the process tells; of one that died, the outcome of its task."""
+        try:
+            told: Progress | LogOutcome = self.connection.recv()
+        except (EOFError, OSError):
+            self._process.join(DEATH_TIMEOUT_S)
+            self.end()
+            assert self._task is not None
+            return LogOutcome(self._task.name, "failed", reason=self._cause_of_death(), is_transient=True)
+        return told
+
+    def end(self) -> None:
+        self._process.kill()
+        self._process.join()
+        self.connection.close()
+        self.is_alive = False
+
+    def _cause_of_death(self) -> str:
+        code = self._process.exitcode or 0
+        if code >= 0:
+            return f"its worker process ended with exit code {code}"
+        name = signal.Signals(-code).name
+        return f"its worker process was killed ({name}), likely for lack of memory; use fewer --workers"
+
+
+def _serve(connection: Connection) -> None:
+    """Do the tasks that come through a pipe, one by one, until it is closed."""
+    # Ctrl-C reaches the whole group of processes; the parent ends its workers itself.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    limit_process_to_one_thread()
+    while True:
+        try:
+            task = connection.recv()
+        except EOFError:
+            return
+        connection.send(analyse_task(task, connection.send))
+
+
+def _end_with_parent() -> None:
+    """End this process as soon as the one that started it is gone, however that ended."""
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    wait([parent.sentinel])
+    os._exit(1)

@@ -1,0 +1,192 @@
+"""What is kept beside a log's results so that a batch can go on: which log, how it looked, the settings."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rose2_logs import __version__
+from rose2_logs.batch.location import Location
+from rose2_logs.errors import LogError
+from rose2_logs.parameters import Parameters
+from rose2_logs.provenance import log_files
+from rose2_logs.sinks.summary import write_json
+
+RECORD = ".batch.json"
+"""Beside the results of a log; no other command looks at it."""
+SETTLED_S = 2.0
+"""A file may change again within this time and keep its time stamp: FAT's stamps are even seconds."""
+
+
+@dataclass(frozen=True)
+class BatchSettings:
+    """What to take from each log and what to do with it.
+
+    Attributes
+    ----------
+    topic : str, optional
+        The map topic; by default ``/map``, else the only one.
+    start_s, end_s : float, optional
+        Seconds into the log.
+    every_s, min_change_m2, max_snapshots
+        As for `Selection`.
+    parameters : Parameters
+        Of all stages.
+    method : str
+        The segmentation method.
+    recording, annotated_log : bool
+        Whether to write the Rerun recording and the annotated MCAP.
+    """
+
+    topic: str | None = None
+    start_s: float | None = None
+    end_s: float | None = None
+    every_s: float | None = None
+    min_change_m2: float | None = None
+    max_snapshots: int | None = None
+    parameters: Parameters = dataclasses.field(default_factory=Parameters)
+    method: str = "rose2"
+    recording: bool = True
+    annotated_log: bool = True
+
+    def determining(self) -> dict[str, Any]:
+        """Everything that the tables depend on beside the log, as flat JSON values; the version too."""
+        flat = {
+            f"{block}.{name}": value
+            for block, values in self.parameters.resolved().items()
+            for name, value in values.items()
+        }
+        names = ("topic", "start_s", "end_s", "every_s", "min_change_m2", "max_snapshots", "method")
+        return {"rose2-logs": __version__} | {name: getattr(self, name) for name in names} | flat
+
+
+@dataclass(frozen=True)
+class Signature:
+    """How the files of a log look from outside: what can be told without reading them.
+
+    The log's fingerprint is the SHA-256 of all its bytes (`provenance.fingerprint`), which a run computes
+    anyway. It need not be computed again as long as the signature is the same. Of local files the signature
+    holds name, size and the times of the last change of content and of metadata, in nanoseconds: to change a
+    file and keep all of them takes setting back the clock. Of files behind URLs it holds name, size and
+    whatever the server tells of their version (ETag, checksum, generation, time of change).
+
+    Attributes
+    ----------
+    files : tuple
+        For each file its name, size and version.
+    is_sound : bool
+        Whether the same signature means the same content: not where a file had changed within `SETTLED_S`
+        before, or its server tells nothing of its version.
+    """
+
+    files: tuple[tuple[str, int | None, tuple[str, ...]], ...]
+    is_sound: bool
+
+    @property
+    def size_bytes(self) -> int:
+        """Of all files, as far as known."""
+        return sum(size or 0 for _, size, _ in self.files)
+
+    def proves_unchanged_since(self, earlier: Signature) -> bool:
+        """Whether the log is certainly the same as when `earlier` was taken."""
+        return earlier.is_sound and earlier.files == self.files
+
+
+def local_signature(log: Path) -> Signature:
+    """Take the signature of a log on this machine.
+
+    Raises
+    ------
+    LogError
+        If it is not there.
+    """
+    now_ns = time.time_ns()
+    base = log if log.is_dir() else log.parent
+    files, newest_ns = [], 0
+    try:
+        for file in log_files(log):
+            about = file.stat()
+            name = file.relative_to(base).as_posix() if file.is_relative_to(base) else str(file)
+            files.append((name, about.st_size, (str(about.st_mtime_ns), str(about.st_ctime_ns))))
+            newest_ns = max(newest_ns, about.st_mtime_ns, about.st_ctime_ns)
+    except OSError as error:
+        raise LogError(f"{log}: cannot be read: {error.strerror}") from error
+    if not files:
+        raise LogError(f"{log}: there is no such file or directory, or it is empty")
+    return Signature(tuple(files), newest_ns + round(SETTLED_S * 1e9) <= now_ns)
+
+
+@dataclass(frozen=True)
+class Record:
+    """Of one log's results.
+
+    Attributes
+    ----------
+    address : str
+        Where the log lay.
+    signature : Signature
+        How it looked.
+    sha256 : str
+        Its fingerprint.
+    settings : dict
+        `BatchSettings.determining`.
+    """
+
+    address: str
+    signature: Signature
+    sha256: str
+    settings: dict[str, Any]
+
+    def write(self, folder: Path) -> None:
+        """Write it beside the results in a folder.
+
+        Raises
+        ------
+        OutputError
+            If it cannot be written.
+        """
+        write_json(folder / RECORD, dataclasses.asdict(self))
+
+    def difference(self, settings: dict[str, Any]) -> str:
+        """Tell the first of the settings that are not those of the record, or nothing."""
+        for name in (*settings, *self.settings):
+            before, now = self.settings.get(name), settings.get(name)
+            if before != now:
+                return (
+                    f"{name} {'unset' if before is None else before}, now {'unset' if now is None else now}"
+                )
+        return ""
+
+
+def read_record(folder: Path) -> Record | None:
+    """Read what is kept beside a log's results; None if there is nothing that can be used."""
+    try:
+        kept = json.loads((folder / RECORD).read_text(encoding="utf-8"))
+        files = tuple((name, size, tuple(version)) for name, size, version in kept["signature"]["files"])
+        signature = Signature(files, bool(kept["signature"]["is_sound"]))
+        return Record(str(kept["address"]), signature, str(kept["sha256"]), dict(kept["settings"]))
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+
+
+def signature_of(log: Location) -> Signature:
+    """Take the signature of a log wherever it lies.
+
+    Raises
+    ------
+    LogError
+        If it is not there, or its server does not answer.
+    """
+    if not log.is_remote:
+        return local_signature(Path(log.target))
+    from rose2_logs.batch.remote import describe
+
+    files = describe(log.target)
+    return Signature(
+        tuple((file.name, file.size_bytes, file.version) for file in files),
+        all(file.version for file in files),
+    )

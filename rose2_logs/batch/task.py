@@ -1,0 +1,317 @@
+"""One log as one task: what a worker is told, what it does, what it tells back."""
+
+from __future__ import annotations
+
+import dataclasses
+import errno
+import json
+import logging
+import os
+import platform
+import shutil
+import tempfile
+import threading
+import time
+import traceback
+import uuid
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+from rose2_logs import __version__
+from rose2_logs.batch.location import Location
+from rose2_logs.batch.record import BatchSettings, Record, Signature, signature_of
+from rose2_logs.errors import LogError, OutputError, Rose2LogsError
+
+RETRY_PAUSE_S = 2.0
+"""Before the second try after a fault of storage or network; doubled for each further one."""
+REPORT_EVERY_S = 0.5
+"""Least time between two reports of a log's progress: what an eye can follow."""
+MOST_WARNINGS = 5
+"""Warnings that are told of one log; the rest are counted."""
+RUNNING = "running"
+TRANSIENT = frozenset(
+    {
+        errno.EIO,
+        errno.EAGAIN,
+        errno.EINTR,
+        errno.EBUSY,
+        errno.ESTALE,
+        errno.ETIMEDOUT,
+        errno.EPIPE,
+        errno.ENOTCONN,
+        errno.ECONNRESET,
+        errno.ECONNABORTED,
+        errno.ECONNREFUSED,
+        errno.ENETDOWN,
+        errno.ENETUNREACH,
+        errno.ENETRESET,
+        errno.EHOSTDOWN,
+        errno.EHOSTUNREACH,
+    }
+)
+"""Faults of storage and network that may pass; a missing file, no permission or a full disk will not."""
+
+
+@dataclass(frozen=True)
+class LogTask:
+    """What a worker is told: plain values only, so that it reaches another process or machine.
+
+    Attributes
+    ----------
+    log : Location
+        The log.
+    name : str
+        Of its results' folder.
+    work : path
+        Folder of this batch's unfinished results. Its file `RUNNING` is there as long as the batch.
+    settings : BatchSettings
+        What to take and do.
+    known : Record, optional
+        Of results that stand: nothing is done if they are of this very log.
+    known_name : str
+        Of those results' folder. If it is another than `name`, the log may have moved since, or be a new one.
+    is_whole : bool
+        Whether those results have all the files that are wanted now.
+    may_replace : bool
+        Whether results that stand may be replaced if the log is not the same any more.
+    attempt : int
+        Number of the try, from 1.
+    version : str
+        Of the package that made the task.
+    """
+
+    log: Location
+    name: str
+    work: Path
+    settings: BatchSettings
+    known: Record | None = None
+    known_name: str = ""
+    is_whole: bool = False
+    may_replace: bool = False
+    attempt: int = 1
+    version: str = __version__
+
+    def stands_by(self, signature: Signature | None) -> bool:
+        """Whether the signature of the log is enough to know that its results stand as they are."""
+        if self.known is None or signature is None or not self.is_whole or self.known_name != self.name:
+            return False
+        return signature.proves_unchanged_since(self.known.signature)
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a log is: the share of its time, in [0, 1], that is done."""
+
+    name: str
+    share: float
+
+
+@dataclass(frozen=True)
+class LogOutcome:
+    """What became of a log.
+
+    Attributes
+    ----------
+    name : str
+        Of the log.
+    status : str
+        ``done``: results lie in `results`; ``unchanged``: those that stand are of this very log; ``failed``.
+    results : path, optional
+        Folder with the whole results, to be put in its place.
+    record : Record, optional
+        To be kept from now on, of an unchanged log.
+    reason : str
+        Why it failed, in one line.
+    is_transient : bool
+        Whether another try may succeed.
+    tries : int
+        How often the log was begun for this outcome.
+    details : str
+        The traceback of a failure.
+    warnings : tuple of str
+        What was told along the way.
+    host : str
+        Name of the machine that did the work.
+    """
+
+    name: str
+    status: Literal["done", "unchanged", "failed"]
+    results: Path | None = None
+    record: Record | None = None
+    reason: str = ""
+    is_transient: bool = False
+    tries: int = 1
+    details: str = ""
+    warnings: tuple[str, ...] = ()
+    host: str = field(default_factory=platform.node)
+
+
+class BatchOverError(Rose2LogsError):
+    """The batch that this work was for has ended."""
+
+
+Report = Callable[[Progress], None]
+
+
+def analyse_task(task: LogTask, report: Report) -> LogOutcome:
+    """Do a task; whatever goes wrong becomes part of the outcome.
+
+    Parameters
+    ----------
+    task : LogTask
+        The log and what to do with it.
+    report : callable
+        Told of the progress.
+    """
+    with _collected_warnings() as warnings:
+        try:
+            outcome = _analyse(task, report)
+        except Exception as error:
+            known = isinstance(error, Rose2LogsError)
+            outcome = LogOutcome(
+                task.name,
+                "failed",
+                reason=str(error) if known else f"{type(error).__name__}: {error} (a fault of rose2-logs)",
+                is_transient=is_transient(error),
+                details=traceback.format_exc(),
+            )
+    told = warnings[:MOST_WARNINGS]
+    if len(warnings) > MOST_WARNINGS:
+        told.append(f"{len(warnings) - MOST_WARNINGS} more warnings")
+    return dataclasses.replace(outcome, warnings=tuple(told))
+
+
+def is_transient(error: BaseException | None) -> bool:
+    """Whether an error, or what caused it, is a fault of storage, network or memory that may pass."""
+    from rose2_logs.batch.remote import TransferError
+
+    while error is not None:
+        if isinstance(error, TransferError | ConnectionError | TimeoutError | MemoryError):
+            return True
+        if isinstance(error, OSError) and error.errno in TRANSIENT:
+            return True
+        error = error.__cause__ or error.__context__
+    return False
+
+
+def _analyse(task: LogTask, report: Report) -> LogOutcome:
+    if task.version != __version__:
+        raise Rose2LogsError(f"the worker runs rose2-logs {__version__}, the batch {task.version}")
+    if task.attempt > 1:
+        time.sleep(RETRY_PAUSE_S * 2 ** (task.attempt - 2))
+    signature = signature_of(task.log)
+    if task.known is not None and task.stands_by(signature):
+        return LogOutcome(task.name, "unchanged", record=_record(task, signature, task.known.sha256))
+    with _local_copy(task.log) as path:
+        try:
+            return _analyse_local(task, path, signature, report)
+        except Rose2LogsError as error:
+            # A copy's place would tell nothing.
+            if task.log.is_remote and str(path) in str(error):
+                raise type(error)(str(error).replace(str(path), task.log.address)) from error
+            raise
+
+
+def _analyse_local(task: LogTask, path: Path, signature: Signature, report: Report) -> LogOutcome:
+    from rose2_logs.provenance import fingerprint
+    from rose2_logs.readers import Selection
+    from rose2_logs.run import SUMMARY, RunOptions, analyse_log, seconds_into_log
+
+    if task.known is not None:
+        is_same = fingerprint(path)["sha256"] == task.known.sha256
+        if is_same and task.is_whole:
+            return LogOutcome(task.name, "unchanged", record=_record(task, signature, task.known.sha256))
+        if not is_same and task.known_name == task.name and not task.may_replace:
+            raise OutputError(f"{task.log.address}: has changed since its results; --overwrite replaces them")
+    asked = task.settings
+    with _attempt_folder(task) as folder:
+        start_ns, end_ns = seconds_into_log(path, asked.start_s, asked.end_s)
+        options = RunOptions(
+            topic=asked.topic,
+            selection=Selection(start_ns, end_ns, asked.every_s, asked.min_change_m2, asked.max_snapshots),
+            parameters=asked.parameters,
+            method=asked.method,
+            recording=asked.recording,
+            annotated_log=asked.annotated_log,
+            origin=task.log.address,
+        )
+        reported = 0.0
+
+        def on_snapshot(_: object, share: float) -> None:
+            nonlocal reported
+            if time.monotonic() - reported >= REPORT_EVERY_S:
+                if not (task.work / RUNNING).exists():
+                    raise BatchOverError("the batch has ended")
+                reported = time.monotonic()
+                report(Progress(task.name, share))
+
+        report(Progress(task.name, 0.0))
+        analyse_log(path, folder, options, on_snapshot)
+        if not task.log.is_remote and signature_of(task.log).files != signature.files:
+            raise LogError(f"{task.log.address}: changed while it was read; run again when it is whole")
+        summary = json.loads((folder / SUMMARY).read_text(encoding="utf-8"))
+        _record(task, signature, summary["input"]["sha256"]).write(folder)
+        return LogOutcome(task.name, "done", results=folder)
+
+
+def _record(task: LogTask, signature: Signature, sha256: str) -> Record:
+    return Record(task.log.address, signature, sha256, task.settings.determining())
+
+
+@contextmanager
+def _local_copy(log: Location) -> Iterator[Path]:
+    """Path of a log on this machine: of one behind a URL that of a copy, which goes afterwards."""
+    if not log.is_remote:
+        yield Path(log.target)
+        return
+    from rose2_logs.batch.remote import describe, fetch
+
+    with tempfile.TemporaryDirectory(prefix="rose2_logs_", ignore_cleanup_errors=True) as scratch:
+        yield fetch(log.target, describe(log.target), Path(scratch))
+
+
+@contextmanager
+def _attempt_folder(task: LogTask) -> Iterator[Path]:
+    """Make a folder for this try alone; it goes if the try fails.
+
+    Its name tells machine and process, for a person who looks.
+    """
+    if not (task.work / RUNNING).exists():
+        raise OutputError(
+            f"{task.work.parents[2]}: not seen from {platform.node()}; workers must share that folder"
+        )
+    folder = task.work / task.name / f"{platform.node()}-{os.getpid()}-{uuid.uuid4().hex[:8]}"
+    try:
+        folder.parent.mkdir(exist_ok=True)
+        folder.mkdir()
+    except OSError as error:
+        raise OutputError(f"{folder}: cannot be made: {error.strerror}") from error
+    try:
+        yield folder
+    except BaseException:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise
+
+
+@contextmanager
+def _collected_warnings() -> Iterator[list[str]]:
+    """Gather the warnings of this thread, which would be lost on another machine."""
+    told: list[str] = []
+    thread = threading.get_ident()
+
+    class Gather(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            if record.thread == thread:
+                told.append(record.getMessage())
+
+    logger, handler = logging.getLogger("rose2_logs"), Gather(logging.WARNING)
+    logger.addHandler(handler)
+    before, logger.propagate = logger.propagate, False
+    try:
+        yield told
+    finally:
+        logger.removeHandler(handler)
+        logger.propagate = before

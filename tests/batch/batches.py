@@ -1,0 +1,139 @@
+"""Running the real command line, and looking into a batch while it runs."""
+
+from __future__ import annotations
+
+import csv
+import subprocess
+import sys
+import time
+from collections import deque
+from collections.abc import Callable, Collection, Iterator
+from pathlib import Path
+from typing import Self, TypeVar
+
+from saved_maps import save_run
+
+from rose2_logs.batch.driver import LogState
+from rose2_logs.batch.task import LogOutcome, LogTask, Progress, analyse_task
+from rose2_logs.run import TABLES
+
+TIMEOUT_S = 90.0
+SLOW = tuple(range(116, 222, 8))
+"""Of how many columns the maps of a log know, that takes long enough to be caught while it is analysed."""
+
+Found = TypeVar("Found")
+
+
+def make_logs(folder: Path) -> Path:
+    """Write a slow log and two quick ones, of one name in two folders."""
+    save_run(folder / "slow", SLOW)
+    save_run(folder / "one" / "run")
+    save_run(folder / "two" / "run", (150, 240))
+    return folder
+
+
+def start_batch(*arguments: object) -> subprocess.Popen[str]:
+    """Start ``rose2-logs batch`` as a process group of its own."""
+    command = [sys.executable, "-m", "rose2_logs", "batch", *map(str, arguments), "--no-mcap", "--no-rrd"]
+    return subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
+
+
+def finish(process: subprocess.Popen[str]) -> tuple[int, str, str]:
+    """Wait for it; return exit code, stdout and stderr."""
+    out, err = process.communicate(timeout=TIMEOUT_S)
+    return process.returncode, out, err
+
+
+def run_batch(*arguments: object) -> tuple[int, str, str]:
+    """Run ``rose2-logs batch``."""
+    return finish(start_batch(*arguments))
+
+
+class Heard:
+    """Keeps what a listener hears."""
+
+    def __init__(self) -> None:
+        self.begun = (0, 0)
+        self.shares: dict[str, list[float]] = {}
+        self.retries: list[tuple[str, str]] = []
+        self.ended: list[str] = []
+
+    def begin(self, logs: int, up_to_date: int) -> None:
+        self.begun = (logs, up_to_date)
+
+    def progress(self, told: Progress) -> None:
+        self.shares.setdefault(told.name, []).append(told.share)
+
+    def retry(self, name: str, reason: str) -> None:
+        self.retries.append((name, reason))
+
+    def finished(self, state: LogState) -> None:
+        self.ended.append(state.name)
+
+
+class WorkersHere:
+    """Does the tasks in this process, which starts at once."""
+
+    def __init__(self, count: int) -> None:
+        self._waiting: deque[LogTask] = deque()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+    def submit(self, task: LogTask) -> None:
+        self._waiting.append(task)
+
+    def events(self) -> Iterator[Progress | LogOutcome]:
+        while self._waiting:
+            told: list[Progress] = []
+            outcome = analyse_task(self._waiting.popleft(), told.append)
+            yield from told
+            yield outcome
+
+
+def wait_for(look: Callable[[], Found | None]) -> Found:
+    """Wait until there is something to be seen."""
+    end = time.monotonic() + TIMEOUT_S
+    while time.monotonic() < end:
+        if found := look():
+            return found
+        time.sleep(0.02)
+    raise AssertionError("it never came")
+
+
+def worker_of(out: Path, name: str, but_not: Collection[int] = ()) -> int | None:
+    """Process id of the worker that has a log in work, from the name of the folder for its results."""
+    for folder in out.glob(f".batch/unfinished/*/{name}/*"):
+        if (pid := int(folder.name.split("-")[-2])) not in but_not:
+            return pid
+    return None
+
+
+def is_running(pid: int) -> bool:
+    """Whether there is a process that has not ended."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def summary(out: Path) -> dict[str, dict[str, str]]:
+    """Rows of the summary by log."""
+    with (out / "summary.csv").open(encoding="utf-8", newline="") as file:
+        return {row["log"]: row for row in csv.DictReader(file)}
+
+
+def table_bytes(folder: Path) -> list[bytes]:
+    """Return the bytes of a log's tables."""
+    return [(folder / f"{name}.parquet").read_bytes() for name in TABLES]
+
+
+def tree(out: Path) -> set[str]:
+    """Files below a folder but for the lock."""
+    files = {path.relative_to(out).as_posix() for path in out.rglob("*") if path.is_file()}
+    return files - {".batch/lock"}

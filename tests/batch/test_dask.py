@@ -1,0 +1,147 @@
+"""A batch on a real Dask cluster: a scheduler and workers, each a process of its own."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from batches import (
+    TIMEOUT_S,
+    Heard,
+    WorkersHere,
+    finish,
+    make_logs,
+    start_batch,
+    summary,
+    table_bytes,
+    tree,
+    wait_for,
+    worker_of,
+)
+from saved_maps import save_run
+
+from rose2_logs.batch import dask_workers, driver
+from rose2_logs.batch.dask_workers import DaskWorkers
+from rose2_logs.batch.driver import BatchOptions, run_batch
+from rose2_logs.batch.record import BatchSettings
+from rose2_logs.batch.task import Progress
+from rose2_logs.errors import ParameterError
+
+DASK = Path(sys.executable).with_name("dask")
+QUIET = BatchSettings(recording=False, annotated_log=False)
+
+
+@contextmanager
+def running(*arguments: object):
+    """A process of Dask, which is ended whatever happens."""
+    # The scheduler gives a log up at its second loss instead of its fourth.
+    settings = {"DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "1"}
+    process = subprocess.Popen(
+        [DASK, *map(str, arguments), "--no-dashboard"],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        env=os.environ | settings,
+    )
+    try:
+        yield process
+    finally:
+        process.terminate()
+        process.wait(TIMEOUT_S)
+
+
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
+    """A scheduler, as its file and its process, with two workers, which are started again when they die."""
+    file = tmp_path_factory.mktemp("dask") / "scheduler.json"
+    starting = ("scheduler", "--host", "127.0.0.1", "--port", 0, "--scheduler-file", file)
+    with running(*starting) as scheduler:
+        wait_for(file.exists)
+        with running("worker", "--scheduler-file", file, "--nworkers", 2, "--nthreads", 1):
+            yield str(file), scheduler
+
+
+class Killer(Heard):
+    """Kills the workers of some logs as soon as they begin, each as often as it says."""
+
+    def __init__(self, out: Path, times: dict[str, int]) -> None:
+        super().__init__()
+        self._out, self._times = out, times
+        self.killed: set[int] = set()
+
+    def progress(self, told: Progress) -> None:
+        super().progress(told)
+        pid = worker_of(self._out, told.name, self.killed)
+        if pid and self._times.get(told.name, 0):
+            self._times[told.name] -= 1
+            self.killed.add(pid)
+            os.kill(pid, signal.SIGKILL)
+
+
+def test_a_log_whose_worker_is_killed_is_done_by_another(cluster, tmp_path, monkeypatch):
+    """In the end everything is as local workers make it; a bad log fails alone, and its warnings arrive."""
+    logs, out = make_logs(tmp_path / "logs"), tmp_path / "out"
+    (logs / "bad.mcap").write_bytes(b"\x89MCAP0\r\n")
+    heard = Killer(out, {"slow": 1})
+    result = run_batch([str(logs)], out, BatchOptions(QUIET, scheduler=cluster[0]), heard)
+    assert len(heard.killed) == 1
+    status = {state.name: state.status for state in result.states}
+    assert status == dict.fromkeys(("one_run", "slow", "two_run"), "done") | {"bad": "failed"}
+    assert "no topic holds occupancy grids" in summary(out)["bad"]["reason"]
+    (warning,) = result.failed[0].outcome.warnings
+    assert "cut off or damaged" in warning
+    assert not [path for path in tree(out) if path.startswith(".batch")]
+
+    monkeypatch.setattr(driver, "LocalWorkers", WorkersHere)
+    run_batch([str(logs / "slow")], tmp_path / "here", BatchOptions(QUIET), Heard())
+    assert table_bytes(out / "logs" / "slow") == table_bytes(tmp_path / "here" / "logs" / "slow")
+
+
+def test_a_log_that_kills_every_worker_fails_alone(cluster, tmp_path):
+    """Those that only waited behind it are done, though the scheduler blames them as well."""
+    logs, out = tmp_path / "logs", tmp_path / "out"
+    save_run(logs / "doomed")
+    save_run(logs / "good", (150, 240))
+    heard = Killer(out, {"doomed": 99})
+    result = run_batch([str(logs)], out, BatchOptions(QUIET, scheduler=cluster[0], retries=1), heard)
+    assert len(heard.killed) >= 2
+    assert {state.name: state.status for state in result.states} == {"doomed": "failed", "good": "done"}
+    assert "were lost one after the other" in summary(out)["doomed"]["reason"]
+
+
+def test_no_scheduler_is_one_line(monkeypatch):
+    """With the command that starts one."""
+    monkeypatch.setattr(dask_workers, "CONNECT_TIMEOUT_S", 1.0)
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        address = f"127.0.0.1:{probe.getsockname()[1]}"
+    with pytest.raises(ParameterError, match=f"--scheduler {address}: no Dask scheduler answers; `dask sch"):
+        DaskWorkers(address)
+
+
+def test_without_the_extra_the_option_says_what_to_install(monkeypatch):
+    """In one line."""
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(ParameterError, match=r"pip install 'rose2-logs\[batch\]'"):
+        DaskWorkers("127.0.0.1:8786")
+
+
+def test_a_scheduler_that_is_lost_ends_the_batch_in_one_line(cluster, tmp_path):
+    """What was finished stands. This test comes last, for it takes the cluster with it."""
+    file, scheduler = cluster
+    logs, out = make_logs(tmp_path / "logs"), tmp_path / "out"
+    process = start_batch(logs, "-o", out, "--scheduler", file)
+    wait_for(lambda: worker_of(out, "slow"))
+    scheduler.kill()
+    code, told, err = finish(process)
+    assert (code, told) == (2, "")
+    assert "Traceback" not in err
+    assert err.splitlines()[-1].startswith("error: the Dask scheduler at")
+    assert err.splitlines()[-1].endswith("is gone; the same command again goes on with the rest")
+    assert set(summary(out)) == {path.name for path in out.glob("logs/*")} < {"slow", "one_run", "two_run"}

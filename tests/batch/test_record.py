@@ -1,0 +1,114 @@
+"""What is kept beside results, and when it proves that a log is the same."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import time
+from pathlib import Path
+
+import pytest
+
+from rose2_logs.batch.record import (
+    RECORD,
+    SETTLED_S,
+    BatchSettings,
+    Record,
+    Signature,
+    local_signature,
+    read_record,
+)
+from rose2_logs.errors import LogError
+from rose2_logs.parameters import Parameters
+
+
+@pytest.fixture
+def log(tmp_path: Path) -> Path:
+    path = tmp_path / "run.mcap"
+    path.write_bytes(b"one")
+    return path
+
+
+def settled(log: Path) -> Signature:
+    """Signature as it would be taken once the file is old enough."""
+    return dataclasses.replace(local_signature(log), is_sound=True)
+
+
+def test_a_log_that_is_left_alone_is_proven_unchanged(log: Path):
+    """Without reading it."""
+    assert local_signature(log).proves_unchanged_since(settled(log))
+
+
+def test_a_signature_of_a_file_that_has_just_changed_proves_nothing(log: Path):
+    """It could change once more within the grain of its time stamp; later it does."""
+    fresh = local_signature(log)
+    assert not fresh.is_sound
+    assert not local_signature(log).proves_unchanged_since(fresh)
+    time.sleep(SETTLED_S)
+    assert local_signature(log).is_sound
+
+
+def test_a_change_that_keeps_size_and_time_stamp_is_noticed(log: Path):
+    """The time of the last change of metadata cannot be set back."""
+    before, stat = settled(log), log.stat()
+    time.sleep(0.02)
+    log.write_bytes(b"two")
+    os.utime(log, ns=(stat.st_atime_ns, stat.st_mtime_ns))
+    assert log.stat().st_mtime_ns == stat.st_mtime_ns
+    assert not local_signature(log).proves_unchanged_since(before)
+
+
+def test_a_folder_is_the_sum_of_its_files(tmp_path: Path):
+    """One more file is another log."""
+    (tmp_path / "bag").mkdir()
+    (tmp_path / "bag" / "metadata.yaml").write_text("a")
+    before = settled(tmp_path / "bag")
+    (tmp_path / "bag" / "bag_0.mcap").write_text("bb")
+    after = local_signature(tmp_path / "bag")
+    assert not after.proves_unchanged_since(before)
+    assert (before.size_bytes, after.size_bytes) == (1, 3)
+
+
+def test_a_log_that_is_not_there_has_no_signature(tmp_path: Path):
+    """One line says so."""
+    with pytest.raises(LogError, match="there is no such file"):
+        local_signature(tmp_path / "nowhere.mcap")
+
+
+def test_a_record_comes_back_as_it_was_written(log: Path, tmp_path: Path):
+    """Settings and all; what is not a record is none."""
+    settings = BatchSettings(max_snapshots=3).determining()
+    record = Record("/data/run.mcap", local_signature(log), "abc", settings)
+    record.write(tmp_path)
+    kept = read_record(tmp_path)
+    assert kept == record
+    assert kept is not None
+    assert kept.difference(settings) == ""
+    (tmp_path / RECORD).write_text("{}")
+    assert read_record(tmp_path) is None
+    assert read_record(tmp_path / "nowhere") is None
+
+
+@pytest.mark.parametrize(
+    ("now", "told"),
+    [
+        (BatchSettings(method="distance"), "method rose2, now distance"),
+        (BatchSettings(max_snapshots=5), "max_snapshots unset, now 5"),
+        (
+            BatchSettings(parameters=Parameters().replaced({"tracking": {"match_min_iou": 0.3}})),
+            "tracking.match_min_iou 0.2, now 0.3",
+        ),
+        (BatchSettings(recording=False), ""),
+    ],
+)
+def test_a_difference_is_told_by_name_and_values(now: BatchSettings, told: str):
+    """Of what the tables depend on; which files are written beside them is another matter."""
+    record = Record("", Signature((), True), "", BatchSettings().determining())
+    assert record.difference(now.determining()) == told
+
+
+def test_the_version_counts(monkeypatch):
+    """Results of another version are other results."""
+    record = Record("", Signature((), True), "", BatchSettings().determining())
+    monkeypatch.setattr("rose2_logs.batch.record.__version__", "99.0")
+    assert record.difference(BatchSettings().determining()) == "rose2-logs 0.1.0, now 99.0"
