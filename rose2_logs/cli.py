@@ -9,17 +9,32 @@ from __future__ import annotations
 import logging
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from rose2_logs import __version__
+from rose2_logs import __version__, cli_batch
+from rose2_logs.cli_options import (
+    EXIT_FAULT,
+    EXIT_INTERRUPTED,
+    EXIT_KNOWN,
+    Config,
+    Debug,
+    End,
+    Every,
+    MaxSnapshots,
+    Method,
+    MinChange,
+    NoAnnotatedLog,
+    NoRecording,
+    Settings,
+    Start,
+    Topic,
+    Workers,
+    resolve_parameters,
+    state,
+)
 from rose2_logs.errors import LogError, ParameterError, Rose2LogsError
-
-if TYPE_CHECKING:
-    from rose2_logs.parameters import Parameters
-
-EXIT_FAULT, EXIT_KNOWN, EXIT_INTERRUPTED = 1, 2, 130
 
 app = typer.Typer(
     name="rose2-logs",
@@ -30,7 +45,6 @@ app = typer.Typer(
     rich_markup_mode="rich",
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-_state = {"debug": False}
 
 
 def main() -> None:
@@ -40,41 +54,24 @@ def main() -> None:
     try:
         app()
     except Rose2LogsError as error:
-        reporting.error(str(error), debug=_state["debug"])
+        reporting.error(str(error), debug=state["debug"])
         sys.exit(EXIT_KNOWN)
-    except KeyboardInterrupt:
-        reporting.error("interrupted; unfinished results were removed", debug=_state["debug"])
-        sys.exit(EXIT_INTERRUPTED)
+    except SystemExit as ended:
+        # Typer ends so, without a word, upon Ctrl-C.
+        if ended.code == EXIT_INTERRUPTED:
+            reporting.error("interrupted; unfinished results were removed")
+        raise
     except Exception as error:
-        if _state["debug"]:
+        if state["debug"]:
             raise
         reporting.error(f"{type(error).__name__}: {error} (a fault of rose2-logs: --debug shows where)")
         sys.exit(EXIT_FAULT)
-
-
-def _set_debug(value: bool) -> None:
-    _state["debug"] = value or _state["debug"]
 
 
 def _show_version(value: bool) -> None:
     if value:
         typer.echo(f"rose2-logs {__version__}")
         raise typer.Exit
-
-
-Debug = Annotated[
-    bool, typer.Option("--debug", help="Show the traceback of errors.", callback=_set_debug, is_eager=True)
-]
-Workers = Annotated[int, typer.Option(min=1, help="Processes; results do not depend on their number.")]
-Method = Annotated[str, typer.Option(help="Segmentation: rose2, morphological, distance or voronoi.")]
-Config = Annotated[
-    Path | None,
-    typer.Option(metavar="FILE.toml", help="Parameters, one table per stage.", show_default=False),
-]
-Settings = Annotated[
-    list[str] | None,
-    typer.Option("--set", metavar="STAGE.NAME=VALUE", help="Change one parameter.", show_default=False),
-]
 
 
 @app.callback()
@@ -110,26 +107,12 @@ def info(
 def analyze(
     logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="One or several logs.")],
     out: Annotated[Path, typer.Option("--out", "-o", help="Results go to OUT/<name of the log>/.")],
-    topic: Annotated[
-        str | None, typer.Option(help="Map topic; by default /map, else the only one.", show_default=False)
-    ] = None,
-    start: Annotated[
-        float | None, typer.Option(metavar="S", help="Skip this many seconds of the log.", show_default=False)
-    ] = None,
-    end: Annotated[
-        float | None,
-        typer.Option(metavar="S", help="Stop this many seconds into the log.", show_default=False),
-    ] = None,
-    every: Annotated[
-        float | None, typer.Option(metavar="S", help="Least seconds between maps.", show_default=False)
-    ] = None,
-    min_change: Annotated[
-        float | None,
-        typer.Option(metavar="M2", help="Least newly known area between maps.", show_default=False),
-    ] = None,
-    max_snapshots: Annotated[
-        int | None, typer.Option(metavar="N", help="Most maps, spread evenly.", show_default=False)
-    ] = None,
+    topic: Topic = None,
+    start: Start = None,
+    end: End = None,
+    every: Every = None,
+    min_change: MinChange = None,
+    max_snapshots: MaxSnapshots = None,
     workers: Workers = 1,
     method: Method = "rose2",
     config: Config = None,
@@ -138,8 +121,8 @@ def analyze(
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace results of an earlier run.")
     ] = False,
-    no_rrd: Annotated[bool, typer.Option("--no-rrd", help="Write no Rerun recording.")] = False,
-    no_mcap: Annotated[bool, typer.Option("--no-mcap", help="Write no annotated MCAP.")] = False,
+    no_rrd: NoRecording = False,
+    no_mcap: NoAnnotatedLog = False,
     debug: Debug = False,
 ) -> None:
     """Find and follow the rooms in all maps of a log; write recording, annotated MCAP and tables."""
@@ -147,7 +130,7 @@ def analyze(
     from rose2_logs.readers import Selection
     from rose2_logs.run import RunOptions, analyse_log, log_stem, seconds_into_log
 
-    parameters = _parameters(config, settings, method)
+    parameters = resolve_parameters(config, settings, method)
     names = [log_stem(log) for log in logs]
     if twice := {name for name in names if names.count(name) > 1}:
         raise ParameterError(f"several logs are named {min(twice)}: analyze them to different folders")
@@ -173,26 +156,37 @@ def analyze(
             if len(logs) == 1:
                 raise
             failed = True
-            reporting.error(str(error), debug=_state["debug"])
+            reporting.error(str(error), debug=state["debug"])
     if failed:
         raise typer.Exit(EXIT_KNOWN)
 
 
+app.command(epilog=cli_batch.BATCH_EXAMPLE)(cli_batch.batch)
+
+
 @app.command(epilog="Example: [bold]rose2-logs view results/run/run.rrd[/bold]")
 def view(
-    recording: Annotated[Path, typer.Argument(metavar="FILE.rrd", help="Recording that analyze wrote.")],
+    recording: Annotated[
+        str,
+        typer.Argument(
+            metavar="FILE.rrd", help="Recording that analyze wrote, or address that serve printed."
+        ),
+    ],
     web: Annotated[bool, typer.Option("--web", help="In the browser.")] = False,
     debug: Debug = False,
 ) -> None:
     """Open a recording in the Rerun viewer."""
     import subprocess
 
-    if not recording.is_file():
+    if "://" not in recording and not Path(recording).is_file():
         raise LogError(f"{recording}: there is no such file; rose2-logs analyze writes recordings")
     # Rerun's servers answer the whole network unless they are told otherwise.
-    command = [sys.executable, "-m", "rerun", "--bind", "127.0.0.1", str(recording)]
+    command = [sys.executable, "-m", "rerun", "--bind", "127.0.0.1", recording]
     command += ["--web-viewer"] if web else []
     raise typer.Exit(subprocess.run(command, check=False).returncode)
+
+
+app.command(epilog=cli_batch.SERVE_EXAMPLE)(cli_batch.serve)
 
 
 @app.command(epilog="Example: [bold]rose2-logs segment map.png --resolution 0.05 -o rooms[/bold]")
@@ -213,7 +207,7 @@ def segment(
     from rose2_logs import reporting
     from rose2_logs.static_map import segment_map
 
-    parameters = _parameters(config, settings, method)
+    parameters = resolve_parameters(config, settings, method)
     result = segment_map(map_file, out, parameters, method, resolution_m=resolution, overwrite=overwrite)
     reporting.print_static_map(result)
 
@@ -267,7 +261,7 @@ def evaluate(
     from rose2_logs.sinks.label_image import write_image, write_label_image
     from rose2_logs.sinks.summary import write_json
 
-    parameters = _parameters(config, settings, method)
+    parameters = resolve_parameters(config, settings, method)
     chosen = load_cases(cases, group)
     results = []
     drawn = CasePictures(pictures) if pictures is not None else nullcontext()
@@ -290,12 +284,3 @@ def evaluate(
         reporting.print_along(runs)
     else:
         reporting.print_figures(results)
-
-
-def _parameters(config: Path | None, settings: list[str] | None, method: str) -> Parameters:
-    from rose2_logs.parameters import load_parameters
-    from rose2_logs.pipeline import METHODS
-
-    if method not in METHODS:
-        raise ParameterError(f"no method {method!r}; there are: {', '.join(METHODS)}")
-    return load_parameters(config, settings or ())

@@ -15,6 +15,7 @@ from rich.markup import escape
 
 if TYPE_CHECKING:
     from rich.progress import Progress
+    from rich.table import Table
 
     from rose2_logs.evaluation.along import RunPoint
     from rose2_logs.evaluation.benchmark import CaseResult
@@ -38,12 +39,27 @@ def error(message: str, debug: bool = False) -> None:
     _err.print(f"[bold red]error:[/] {escape(' '.join(message.split()))}", soft_wrap=True)
 
 
+def warning(message: str) -> None:
+    """Print one line about what is not as it should be."""
+    _err.print(f"[yellow]warning:[/] {escape(message)}", soft_wrap=True)
+
+
+def print_line(markup: str, to_error: bool = False) -> None:
+    """Print a line with markup, beside the progress bar if it goes to stderr."""
+    (_err if to_error else _out).print(markup, soft_wrap=True)
+
+
+def print_table(table: Table) -> None:
+    """Print a table."""
+    _out.print(table)
+
+
 class _WarningHandler(logging.Handler):
     """Shows warnings through the console of the progress bar, so that they do not break it."""
 
     def emit(self, record: logging.LogRecord) -> None:
         """Print one line."""
-        _err.print(f"[yellow]warning:[/] {escape(record.getMessage())}", soft_wrap=True)
+        warning(record.getMessage())
 
 
 def show_warnings(logger: logging.Logger) -> None:
@@ -96,7 +112,7 @@ def _map_line(facts: MapFacts) -> str:
 @contextmanager
 def run_progress(name: str) -> Iterator[OnSnapshot]:
     """Show a bar over the time of a log, with the rate, the time left and the rooms so far."""
-    with _progress("{task.fields[note]}") as progress:
+    with progress_bar("{task.fields[note]}") as progress:
         task = progress.add_task(name, total=1.0, note="opening")
         seen = 0
 
@@ -114,12 +130,13 @@ def run_progress(name: str) -> Iterator[OnSnapshot]:
 @contextmanager
 def case_progress(count: int) -> Iterator[Callable[[str], None]]:
     """Show a bar over a number of cases."""
-    with _progress("{task.completed:.0f}/{task.total:.0f} {task.fields[note]}") as progress:
+    with progress_bar("{task.completed:.0f}/{task.total:.0f} {task.fields[note]}") as progress:
         task = progress.add_task("evaluate", total=count, note="")
         yield lambda name: progress.update(task, advance=1, note=name)
 
 
-def _progress(text: str) -> Progress:
+def progress_bar(text: str) -> Progress:
+    """Make a bar on stderr whose tasks end with a text; none is drawn into a file or a pipe."""
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
     return Progress(

@@ -33,6 +33,9 @@ ORDER = (
     "run",
     "batch",
     "reporting",
+    "reporting_batch",
+    "cli_options",
+    "cli_batch",
     "cli",
     "__main__",
 )
@@ -43,8 +46,10 @@ ONLY_IN = {
     "rosbags": ("readers/", "sinks/annotated_mcap", "sinks/mcap", "sinks/ros"),
     "mcap": ("readers/", "sinks/annotated_mcap", "sinks/mcap", "sinks/ros"),
     "rerun": ("sinks/rerun",),
-    "typer": ("cli.py",),
-    "rich": ("reporting.py",),
+    "typer": ("cli",),
+    "rich": ("reporting",),
+    "distributed": ("batch/dask_workers",),
+    "fsspec": ("batch/remote",),
 }
 """Libraries of formats and surfaces, and the beginnings of the files that may import them."""
 

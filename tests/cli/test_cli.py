@@ -17,7 +17,7 @@ from rose2_logs import __version__
 from rose2_logs.cli import main
 from rose2_logs.sinks.label_image import write_label_image
 
-VERBS = ("info", "analyze", "view", "segment", "evaluate")
+VERBS = ("info", "analyze", "batch", "view", "serve", "segment", "evaluate")
 
 
 @pytest.fixture
@@ -118,7 +118,11 @@ def test_time_options_are_seconds_into_the_log(cli, maps: Path, tmp_path: Path):
         (["analyze", "x.bag", "-o", "out", "--set", "walls.nothing=1"], "walls.nothing"),
         (["analyze", "x.bag", "-o", "out", "--method", "magic"], "no method 'magic'"),
         (["analyze", "a/x.bag", "b/x.mcap", "-o", "out"], "several logs are named x"),
+        (["batch", "nowhere*.mcap", "-o", "out"], "nowhere*.mcap: no log there"),
+        (["batch", "x.bag", "-o", "s3://bucket/out"], "not to a URL"),
+        (["batch", "x.bag", "-o", "out", "--scheduler", "a:1", "--workers", "2"], "--workers is for this"),
         (["view", "nowhere.rrd"], "nowhere.rrd"),
+        (["serve", "nowhere"], "nowhere: holds no recording"),
         (["evaluate", "nowhere.json"], "nowhere.json"),
         (["segment", "nowhere.png", "-o", "out"], "nowhere.png"),
     ],

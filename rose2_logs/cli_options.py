@@ -1,0 +1,74 @@
+"""What several commands share: options, exit codes, parameters from the options."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from rose2_logs.errors import ParameterError
+
+if TYPE_CHECKING:
+    from rose2_logs.parameters import Parameters
+
+EXIT_FAULT, EXIT_KNOWN, EXIT_INTERRUPTED = 1, 2, 130
+
+state = {"debug": False}
+"""What the options that every command takes have set."""
+
+
+def _set_debug(value: bool) -> None:
+    state["debug"] = value or state["debug"]
+
+
+Debug = Annotated[
+    bool, typer.Option("--debug", help="Show the traceback of errors.", callback=_set_debug, is_eager=True)
+]
+Workers = Annotated[int, typer.Option(min=1, help="Processes; results do not depend on their number.")]
+Topic = Annotated[
+    str | None, typer.Option(help="Map topic; by default /map, else the only one.", show_default=False)
+]
+Start = Annotated[
+    float | None, typer.Option(metavar="S", help="Skip this many seconds of the log.", show_default=False)
+]
+End = Annotated[
+    float | None, typer.Option(metavar="S", help="Stop this many seconds into the log.", show_default=False)
+]
+Every = Annotated[
+    float | None, typer.Option(metavar="S", help="Least seconds between maps.", show_default=False)
+]
+MinChange = Annotated[
+    float | None,
+    typer.Option(metavar="M2", help="Least newly known area between maps.", show_default=False),
+]
+MaxSnapshots = Annotated[
+    int | None, typer.Option(metavar="N", help="Most maps, spread evenly.", show_default=False)
+]
+NoRecording = Annotated[bool, typer.Option("--no-rrd", help="Write no Rerun recording.")]
+NoAnnotatedLog = Annotated[bool, typer.Option("--no-mcap", help="Write no annotated MCAP.")]
+Method = Annotated[str, typer.Option(help="Segmentation: rose2, morphological, distance or voronoi.")]
+Config = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE.toml", help="Parameters, one table per stage.", show_default=False),
+]
+Settings = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="STAGE.NAME=VALUE", help="Change one parameter.", show_default=False),
+]
+
+
+def resolve_parameters(config: Path | None, settings: list[str] | None, method: str) -> Parameters:
+    """Read the parameters and check the method that were asked for.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such method or parameter, or a value cannot be used.
+    """
+    from rose2_logs.parameters import load_parameters
+    from rose2_logs.pipeline import METHODS
+
+    if method not in METHODS:
+        raise ParameterError(f"no method {method!r}; there are: {', '.join(METHODS)}")
+    return load_parameters(config, settings or ())
