@@ -163,6 +163,11 @@ class FloorPlanParameters:
         2.0, "1", "How far from a passage its width is compared with the room's, in widths.", 0.0
     )
     passage_look_max_m: float = _number(3.0, "m", "The same at most: half a large room.", 0.0)
+    doorway_max_width_m: float = _number(
+        2.0, "m", "A gap in a wall up to this width is a doorway: a double door.", 0.0
+    )
+    jamb_length_m: float = _number(0.5, "m", "Wall beside a gap that makes it one: a jamb.", 0.01)
+    jamb_min_fill: float = _number(0.6, "share", "Least share of a jamb that walls cover.", 0, 1)
     leak_max_width_m: float = _number(
         0.5, "m", "Free space outside rooms that is narrower is rays; wider it is part of a room.", 0.0
     )

@@ -35,7 +35,7 @@ class EdgeEvidence:
         All of the edge.
     passage_share : (E,) float
         Width of the best passage through the edge (a stretch of its line without a wall) over the width of
-        the room on both sides: about 1 across a corridor, less in a doorway, 0 where the edge is not open.
+        the room beside it: about 1 across a corridor, less in a doorway, 0 where the edge is not open.
     """
 
     wall_m: FloatArray
@@ -114,7 +114,9 @@ def _passages(
 
     From three points of a stretch one looks straight ahead and back, as far as the stretch is wide (times
     `passage_look_widths`) or to the next wall. The greatest distance from walls met on a side is half the
-    width of the room there; the stretch is held against the narrower side.
+    width of the room there. The stretch is held against the narrower side, so that a line across a corridor
+    is as wide as the corridor; but a gap in a wall, between two jambs on its line, against the wider
+    side, so that the mouth of a narrow corridor is the doorway of a hall.
 
     Returns
     -------
@@ -144,8 +146,29 @@ def _passages(
             met = np.where(np.minimum.accumulate(met, axis=1) > 0, met, 0)
             np.maximum(widest, met.max(1), out=widest)
         sides.append(widest * resolution_m)
-    room = 2 * np.maximum(np.minimum(*sides), resolution_m / 2)
+    gap = _between_jambs(begins, ends, line, is_wall, step_m, parameters)
+    gap &= length <= parameters.doorway_max_width_m
+    room = 2 * np.maximum(np.where(gap, np.maximum(*sides), np.minimum(*sides)), resolution_m / 2)
     return np.where(is_wall, 0.0, (length / room)[run])
+
+
+def _between_jambs(
+    begins: NDArray[np.intp],
+    ends: NDArray[np.intp],
+    line: NDArray[np.intp],
+    is_wall: BoolArray,
+    step_m: FloatArray,
+    parameters: FloorPlanParameters,
+) -> BoolArray:
+    """Tell which stretches (R,) of samples have wall on their line before and after them."""
+    of_run = line[begins]
+    count = np.maximum(1, np.round(parameters.jamb_length_m / step_m[of_run]).astype(np.intp))
+    before = np.maximum(begins - count, np.searchsorted(line, of_run))
+    after = np.minimum(ends + count, np.searchsorted(line, of_run, side="right"))
+    total = np.concatenate([[0], np.cumsum(is_wall)])
+    walled = np.minimum(total[begins] - total[before], total[after] - total[ends])
+    between: BoolArray = walled >= parameters.jamb_min_fill * count
+    return between
 
 
 def _read_lines(

@@ -61,6 +61,32 @@ def test_wall_and_gap_of_an_edge_are_measured_and_a_doorway_is_narrow():
     assert evidence.weight[0] == pytest.approx(5 / 6, abs=0.03)
 
 
+def mouth_of_corridor(jamb_cells=40, corridor_cells=24):
+    """Passage share of the line along the wall of a hall of 5 m where a corridor of 1.2 m leaves it."""
+    walls = np.zeros((200, 160), bool)
+    walls[:, :2] = walls[100:] = True
+    first = 2 + jamb_cells
+    walls[100:, first : first + corridor_cells] = False
+    line = np.array([(0.0, 5.1, 8.0, 5.1)])
+    return edge_evidence(line, line, walls, ~walls, 0.05, PARAMETERS).passage_share[0]
+
+
+def test_the_mouth_of_a_narrow_corridor_is_a_doorway_of_the_hall():
+    assert mouth_of_corridor() < PARAMETERS.join_min_passage
+    # Without a jamb on one side it is no gap in a wall, and too wide it is no doorway.
+    assert mouth_of_corridor(jamb_cells=0) > PARAMETERS.join_min_passage
+    assert mouth_of_corridor(corridor_cells=48) > PARAMETERS.join_min_passage
+
+
+def test_a_line_across_a_narrow_corridor_is_no_doorway_though_walls_go_on_at_both_sides():
+    walls = np.zeros((160, 160), bool)
+    walls[:, 60:62] = walls[:, 86:88] = True  # the corridor
+    walls[79:81, :60] = walls[79:81, 88:] = True  # walls between the offices beside it
+    line = np.array([(0.0, 4.0, 8.0, 4.0)])
+    share = edge_evidence(line, line, walls, ~walls, 0.05, PARAMETERS).passage_share[0]
+    assert share > PARAMETERS.join_min_passage
+
+
 def make_evidence(wall, is_open, passage):
     wall, is_open = np.array(wall, float), np.array(is_open, float)
     return EdgeEvidence(wall, is_open, wall + is_open, np.array(passage, float))
