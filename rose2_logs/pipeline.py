@@ -137,7 +137,14 @@ def analyse(snapshot: OccupancySnapshot, parameters: Parameters, method: str = "
         parameters.walls,
     )
     watch.lap("walls")
-    plan = make_floor_plan(walls.lines.ends_m, walls.walls, free, resolution, parameters.floor_plan)
+    plan = make_floor_plan(
+        walls.lines.ends_m,
+        walls.walls,
+        free,
+        float(structure.directions_rad[0]) if len(structure.directions_rad) else 0.0,
+        resolution,
+        parameters.floor_plan,
+    )
     watch.lap("floor_plan")
     labels = split_rooms(
         plan.labels,

@@ -35,17 +35,16 @@ class FaceGraph:
     edge_faces: NDArray[np.int32]
 
 
-def build_faces(lines_m: FloatArray, frame_m: tuple[float, float, float, float]) -> FaceGraph:
-    """Cut a rectangle by lines.
+def build_faces(lines_m: FloatArray, frame: shapely.Polygon) -> FaceGraph:
+    """Cut a convex part of the plane by lines.
 
     Parameters
     ----------
     lines_m : (L, 4) float
         Lines x0, y0, x1, y1; ends that cut nothing are left out.
-    frame_m : (x0, y0, x1, y1)
-        The rectangle.
+    frame : shapely Polygon
+        The part, metres.
     """
-    frame = shapely.box(*frame_m)
     lines = shapely.linestrings(lines_m.reshape(-1, 2, 2))
     lines = shapely.intersection(lines, frame)
     network = shapely.union_all(np.append(lines, frame.exterior), grid_size=SNAP_M)

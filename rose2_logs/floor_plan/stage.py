@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 from numpy.typing import NDArray
+from shapely.affinity import rotate
 
 from rose2_logs.floor_plan.evidence import EdgeEvidence, edge_evidence
 from rose2_logs.floor_plan.faces import FaceGraph, build_faces
@@ -46,13 +47,16 @@ def make_floor_plan(
     lines_m: FloatArray,
     walls: BoolArray,
     free: BoolArray,
+    direction_rad: float,
     resolution_m: float,
     parameters: FloorPlanParameters,
 ) -> FloorPlanResult:
-    """Faces, edge weights, inside and outside, groups of faces."""
-    height, width = free.shape[0] * resolution_m, free.shape[1] * resolution_m
-    margin = FRAME_MARGIN_M
-    graph = build_faces(lines_m, (-margin, -margin, width + margin, height + margin))
+    """Faces, edge weights, inside and outside, groups of faces.
+
+    The plane is cut within a box along `direction_rad`, the strongest dominant direction: what lies beyond
+    counts as unseen, so that a box along the axes of the raster would give other rooms to a turned map.
+    """
+    graph = build_faces(lines_m, _frame(free | walls, direction_rad, resolution_m))
     count = len(graph.polygons)
     evidence = edge_evidence(graph.edges_m, lines_m, walls, free, resolution_m, parameters)
     face_of_cell = label_faces(graph, (free.shape[0], free.shape[1]), resolution_m)
@@ -65,3 +69,17 @@ def make_floor_plan(
     labels = np.concatenate([np.zeros(1, np.int32), group])[face_of_cell]
     labels[~free] = 0
     return FloorPlanResult(graph, evidence, seen, group, labels)
+
+
+def _frame(known: BoolArray, direction_rad: float, resolution_m: float) -> shapely.Polygon:
+    """Box around the known cells along a direction, with a margin: it turns with the map."""
+    rows = np.flatnonzero(known.any(1))
+    if len(rows) == 0:
+        return shapely.box(0, 0, known.shape[1] * resolution_m, known.shape[0] * resolution_m)
+    first = known.argmax(1)[rows]
+    last = known.shape[1] - known[:, ::-1].argmax(1)[rows]
+    corners = np.concatenate([np.column_stack([x, y]) for x in (first, last) for y in (rows, rows + 1)])
+    turned = rotate(shapely.multipoints(corners * resolution_m), -direction_rad, (0, 0), use_radians=True)
+    box = shapely.buffer(shapely.envelope(turned), FRAME_MARGIN_M, join_style="mitre")
+    frame: shapely.Polygon = rotate(box, direction_rad, (0, 0), use_radians=True)
+    return frame

@@ -11,6 +11,7 @@ from rose2_logs.floor_plan.evidence import EdgeEvidence, edge_evidence
 from rose2_logs.floor_plan.faces import build_faces, rasterise
 from rose2_logs.floor_plan.grouping import group_faces
 from rose2_logs.floor_plan.rooms import adopt_left_out, outline, settle_borders
+from rose2_logs.floor_plan.stage import make_floor_plan
 from rose2_logs.parameters import FloorPlanParameters
 
 PARAMETERS = FloorPlanParameters()
@@ -18,7 +19,7 @@ GRID_LINES = np.array([(x, -1, x, 7) for x in (2, 4)] + [(-1, y, 7, y) for y in 
 
 
 def test_lines_cut_the_frame_into_faces_that_fill_it():
-    graph = build_faces(GRID_LINES, (0, 0, 6, 6))
+    graph = build_faces(GRID_LINES, shapely.box(0, 0, 6, 6))
     assert len(graph.polygons) == 12
     assert shapely.area(graph.polygons).sum() == pytest.approx(36)
     inner = (graph.edge_faces >= 0).all(1)
@@ -27,19 +28,19 @@ def test_lines_cut_the_frame_into_faces_that_fill_it():
 
 
 def test_a_line_that_ends_in_the_open_cuts_nothing():
-    graph = build_faces(np.array([(1.0, 1.0, 3.0, 1.0)]), (0, 0, 6, 6))
+    graph = build_faces(np.array([(1.0, 1.0, 3.0, 1.0)]), shapely.box(0, 0, 6, 6))
     assert len(graph.polygons) == 1
 
 
 def test_a_face_within_a_face_is_a_hole_of_it():
     square = np.array([(2, 2, 4, 2), (4, 2, 4, 4), (4, 4, 2, 4), (2, 4, 2, 2)], float)
-    graph = build_faces(square, (0, 0, 6, 6))
+    graph = build_faces(square, shapely.box(0, 0, 6, 6))
     assert sorted(shapely.area(graph.polygons).round(6)) == [4, 32]
     assert ((graph.edge_faces >= 0).all(1)).sum() == 4
 
 
 def test_painted_faces_cover_every_cell():
-    graph = build_faces(GRID_LINES, (0, 0, 6, 6))
+    graph = build_faces(GRID_LINES, shapely.box(0, 0, 6, 6))
     painted = rasterise(graph.polygons, np.arange(1, 13, dtype=np.int32), (120, 120), 0.05)
     assert (painted > 0).all()
     sizes = np.bincount(painted.ravel(), minlength=13)[1:] * 0.05**2
@@ -85,6 +86,26 @@ def test_a_line_across_a_narrow_corridor_is_no_doorway_though_walls_go_on_at_bot
     line = np.array([(0.0, 4.0, 8.0, 4.0)])
     share = edge_evidence(line, line, walls, ~walls, 0.05, PARAMETERS).passage_share[0]
     assert share > PARAMETERS.join_min_passage
+
+
+@pytest.mark.parametrize("turn_deg", [0, 30, 77])
+def test_how_much_of_a_face_was_seen_does_not_hang_on_the_raster(turn_deg):
+    """A corridor of 8 x 2 m without walls at its ends, seen for half of its length, at any angle."""
+    turn = np.radians(turn_deg)
+    c, s = np.cos(turn), np.sin(turn)
+    y, x = (np.indices((300, 300)) + 0.5) * 0.05 - 7.5
+    along, across = x * c + y * s, y * c - x * s
+    known = (np.abs(along) < 4) & (np.abs(across) < 1)
+    free = known & (along < 0)
+    free[np.unravel_index(np.argmax(np.where(known, along, -9)), free.shape)] = True
+    walls = np.zeros_like(free)
+    ends = np.array([(-9.0, side, 9.0, side) for side in (-1.05, 1.05)]).reshape(-1, 2)
+    lines = (ends @ np.array([(c, s), (-s, c)]) + 7.5).reshape(-1, 4)
+    plan = make_floor_plan(lines, walls, free, turn, 0.05, PARAMETERS)
+    middle = shapely.Point(7.5 - 2 * c, 7.5 - 2 * s)
+    (face,) = (k for k, polygon in enumerate(plan.graph.polygons) if polygon.contains(middle))
+    # Half of the corridor, less the margin of a metre at both ends and the lines' distance from its cells.
+    assert plan.seen[face] == pytest.approx(4 * 2 / (10 * 2.1), abs=0.01)
 
 
 def make_evidence(wall, is_open, passage):
