@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from rose2_logs.evaluation.along import RunPoint
     from rose2_logs.evaluation.benchmark import CaseResult
+    from rose2_logs.evaluation.run_tracks import RunTrackScores
     from rose2_logs.log_facts import LogFacts, MapFacts
     from rose2_logs.run import OnSnapshot, RunResult
     from rose2_logs.static_map import StaticMapResult
@@ -233,6 +234,24 @@ def print_along(runs: Mapping[str, Sequence[RunPoint]]) -> None:
         figures = [f"{getattr(mean, name):.2f}" for name in ALONG_FIGURES]
         head = f"[bold]{escape(group)}, mean of {len(points)}"
         table.add_row(head, "", *figures, f"{mean.rooms_seg:.3g}/{mean.rooms_gt:.3g}", end_section=True)
+    _out.print(table)
+
+
+def print_tracks(runs: Mapping[str, RunTrackScores]) -> None:
+    """Print the figures of each run's tracks, in percent and in numbers."""
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False)
+    table.add_column("tracks of", no_wrap=True)
+    for heading in ("IDF1", "at best", "IDP", "IDR", "switches", "fragmentations", "tracks found/true"):
+        table.add_column(heading, justify="right")
+    for group, run in runs.items():
+        table.add_row(f"[bold]{escape(group)}")
+        for name, scores in (("rooms found", run.found), ("true rooms", run.true_rooms)):
+            shares = (scores.idf1, scores.idf1_bound, scores.idp, scores.idr)
+            counts = (str(scores.id_switches), str(scores.fragmentations))
+            number = f"{scores.tracks}/{scores.true_tracks}"
+            table.add_row(f"  {name}", *(f"{share:.2f}" for share in shares), *counts, number)
     _out.print(table)
 
 
