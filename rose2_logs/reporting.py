@@ -166,6 +166,13 @@ def print_run(result: RunResult) -> None:
     table.add_row("rooms at the end", f"{totals.rooms_last} ({totals.tracks} over the run)")
     changes = ", ".join(f"{events[kind]} {kind}" for kind in ("split", "merged", "lost", "returned"))
     table.add_row("changes", changes)
+    if events["shifted"]:
+        table.add_row("shifts of the map", f"{events['shifted']}; see shifted in events.parquet")
+    if result.layout_final is not None:
+        since = result.layout_final
+        table.add_row(
+            "layout as in the end", f"from {since.coverage:.1%} coverage on, {_duration(since.time_s)}"
+        )
     table.add_row("time", f"{result.seconds:.1f} s, {totals.snapshots / result.seconds:.2f} maps/s")
     _out.print(table)
     _out.print(f"results in [bold]{escape(str(result.folder))}[/]", soft_wrap=True)

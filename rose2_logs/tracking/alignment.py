@@ -68,6 +68,27 @@ class RigidMotion:
         (x, y), (dx, dy) = centre_m.tolist(), (to_m - centre_m).tolist()
         return cls((x, y), (dx, dy), float(turn_rad))
 
+    @classmethod
+    def none(cls) -> RigidMotion:
+        """Return the motion that leaves everything where it is."""
+        return cls((0.0, 0.0), (0.0, 0.0), 0.0)
+
+    @property
+    def pose(self) -> tuple[float, float, float]:
+        """Where the frame's origin comes to lie, x and y in metres, and the turn in radians."""
+        x, y = self.points(np.zeros(2)).tolist()
+        return x, y, self.turn_rad
+
+    def then(self, later: RigidMotion) -> RigidMotion:
+        """Return the motion of both, about the frame's origin; `later` is applied after this one."""
+        origin = np.zeros(2)
+        return RigidMotion.moving(origin, later.points(self.points(origin)), self.turn_rad + later.turn_rad)
+
+    def inverse(self) -> RigidMotion:
+        """Return the motion that takes this one back."""
+        centre, shift = np.asarray(self.centre_xy_m), np.asarray(self.shift_xy_m)
+        return RigidMotion.moving(centre + shift, centre, -self.turn_rad)
+
     def points(self, xy_m: FloatArray) -> FloatArray:
         """Where points (..., 2) come to lie, metres."""
         c, s = np.cos(self.turn_rad), np.sin(self.turn_rad)

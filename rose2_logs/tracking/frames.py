@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal, get_args
 
 from rose2_logs.occupancy import OccupancySnapshot
 from rose2_logs.pipeline import SnapshotAnalysis
+from rose2_logs.room_evidence import RoomEvidence
 from rose2_logs.tracking.alignment import RigidMotion
+from rose2_logs.tracking.layout_change import LayoutChange
 
 EventKind = Literal["shifted", "continued", "returned", "born", "split", "merged", "lost"]
 EVENT_ORDER: tuple[EventKind, ...] = get_args(EventKind)
@@ -47,6 +50,11 @@ class RoomEvent:
     motion: RigidMotion | None = None
 
 
+def map_motion(events: Iterable[RoomEvent]) -> RigidMotion | None:
+    """Motion of the whole map among one snapshot's events, if it moved."""
+    return next((event.motion for event in events if event.kind == "shifted"), None)
+
+
 @dataclass(frozen=True, eq=False)
 class TrackedSnapshot:
     """One snapshot with all that was found: what a sink receives.
@@ -63,6 +71,10 @@ class TrackedSnapshot:
         The track (1, 2, ... never used again) of room i + 1.
     events : tuple of RoomEvent
         What happened to the tracks at this snapshot.
+    evidence : RoomEvidence, optional
+        How sure the rooms are.
+    change : LayoutChange, optional
+        How the layout changed since the map before.
     """
 
     snapshot: OccupancySnapshot
@@ -70,3 +82,5 @@ class TrackedSnapshot:
     coverage: float
     track_ids: tuple[int, ...]
     events: tuple[RoomEvent, ...]
+    evidence: RoomEvidence | None = None
+    change: LayoutChange | None = None
