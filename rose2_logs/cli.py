@@ -240,7 +240,8 @@ def evaluate(
         typer.Option(
             "--along",
             help="Take each group's cases, in their order, as the maps of one run: figures over coverage, "
-            "the free area over that of the group's last map. With --pictures also as DIR/<group>.along.png.",
+            "the free area over that of the group's last map, and of the tracks: IDF1, switches, "
+            "fragmentations. With --pictures also as DIR/<group>.along.png.",
         ),
     ] = False,
     workers: Workers = 1,
@@ -256,6 +257,7 @@ def evaluate(
     from rose2_logs.evaluation.along import along_as_json, along_runs
     from rose2_logs.evaluation.benchmark import evaluate_cases, figures
     from rose2_logs.evaluation.cases import load_cases
+    from rose2_logs.evaluation.run_tracks import RunTracks, run_tracks_as_json
     from rose2_logs.sinks.case_pictures import CasePictures
     from rose2_logs.sinks.curves import draw_along
     from rose2_logs.sinks.label_image import write_image, write_label_image
@@ -264,6 +266,7 @@ def evaluate(
     parameters = resolve_parameters(config, settings, method)
     chosen = load_cases(cases, group)
     results = []
+    tracks = RunTracks(parameters)
     drawn = CasePictures(pictures) if pictures is not None else nullcontext()
     with drawn as drawer, reporting.case_progress(len(chosen)) as advance:
         for result in evaluate_cases(chosen, method, parameters, workers):
@@ -271,16 +274,21 @@ def evaluate(
                 write_label_image(predictions / result.case.group / f"{result.case.name}.png", result.labels)
             if drawer is not None:
                 drawer.add(result)
+            if along:
+                tracks.add(result)
             results.append(result.without_labels())
             advance(result.case.name)
     runs = along_runs(results) if along else {}
     if json_file is not None:
-        found = figures(results) | ({"along": along_as_json(runs)} if along else {})
+        found = figures(results)
+        if along:
+            found |= {"along": along_as_json(runs), "tracks": run_tracks_as_json(tracks.scores())}
         write_json(json_file, {"method": method, "parameters": parameters.resolved(), **found})
     if pictures is not None:
         for name, points in runs.items():
             write_image(pictures / f"{name}.along.png", draw_along(f"{name}, {method}", points))
     if along:
         reporting.print_along(runs)
+        reporting.print_tracks(tracks.scores())
     else:
         reporting.print_figures(results)

@@ -274,8 +274,24 @@ class TrackingParameters:
     part_min_share: float = _number(
         0.5, "share", "A room is part of another when most of it lies in it: never of two at once.", 0, 1
     )
+    shapes_kept: int = _number(
+        3, "shapes", "Shapes by which a track is known: whole, part, and as it was seen before.", 1
+    )
+    shape_same_iou: float = _number(0.8, "share", "A shape like one in memory by this takes its place.", 0, 1)
     lost_kept: int = _number(
         500, "tracks", "Lost rooms that may return; some kilobytes each, the longest lost go first."
+    )
+    shift_min_m: float = _number(
+        0.1, "m", "The whole map moved when its walls did by this on average: two cells of 5 cm.", 0.0
+    )
+    shift_search_m: float = _number(
+        2.0, "m", "How far the whole map may leap in a loop closure and still be laid over itself.", 0.0, 50
+    )
+    shift_search_rad: float = _number(
+        math.radians(5.0), "rad", "How far it may turn, likewise.", 0.0, math.pi
+    )
+    shift_min_share: float = _number(
+        0.5, "share", "A motion of the map is believed when it brings most of its walls together.", 0, 1
     )
 
 

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from rose2_logs.evaluation.along import RunPoint
     from rose2_logs.evaluation.benchmark import CaseResult
+    from rose2_logs.evaluation.run_tracks import RunTrackScores
     from rose2_logs.log_facts import LogFacts, MapFacts
     from rose2_logs.run import OnSnapshot, RunResult
     from rose2_logs.static_map import StaticMapResult
@@ -165,6 +166,13 @@ def print_run(result: RunResult) -> None:
     table.add_row("rooms at the end", f"{totals.rooms_last} ({totals.tracks} over the run)")
     changes = ", ".join(f"{events[kind]} {kind}" for kind in ("split", "merged", "lost", "returned"))
     table.add_row("changes", changes)
+    if events["shifted"]:
+        table.add_row("shifts of the map", f"{events['shifted']}; see shifted in events.parquet")
+    if result.layout_final is not None:
+        since = result.layout_final
+        table.add_row(
+            "layout as in the end", f"from {since.coverage:.1%} coverage on, {_duration(since.time_s)}"
+        )
     table.add_row("time", f"{result.seconds:.1f} s, {totals.snapshots / result.seconds:.2f} maps/s")
     _out.print(table)
     _out.print(f"results in [bold]{escape(str(result.folder))}[/]", soft_wrap=True)
@@ -233,6 +241,24 @@ def print_along(runs: Mapping[str, Sequence[RunPoint]]) -> None:
         figures = [f"{getattr(mean, name):.2f}" for name in ALONG_FIGURES]
         head = f"[bold]{escape(group)}, mean of {len(points)}"
         table.add_row(head, "", *figures, f"{mean.rooms_seg:.3g}/{mean.rooms_gt:.3g}", end_section=True)
+    _out.print(table)
+
+
+def print_tracks(runs: Mapping[str, RunTrackScores]) -> None:
+    """Print the figures of each run's tracks, in percent and in numbers."""
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False)
+    table.add_column("tracks of", no_wrap=True)
+    for heading in ("IDF1", "at best", "IDP", "IDR", "switches", "fragmentations", "tracks found/true"):
+        table.add_column(heading, justify="right")
+    for group, run in runs.items():
+        table.add_row(f"[bold]{escape(group)}")
+        for name, scores in (("rooms found", run.found), ("true rooms", run.true_rooms)):
+            shares = (scores.idf1, scores.idf1_bound, scores.idp, scores.idr)
+            counts = (str(scores.id_switches), str(scores.fragmentations))
+            number = f"{scores.tracks}/{scores.true_tracks}"
+            table.add_row(f"  {name}", *(f"{share:.2f}" for share in shares), *counts, number)
     _out.print(table)
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from rose2_logs.occupancy import FloatArray, GridGeometry
@@ -61,6 +62,21 @@ class RoomMap:
         labels = self.labels.view()
         labels.flags.writeable = False
         object.__setattr__(self, "labels", labels)
+
+    @classmethod
+    def from_labels(cls, labels: NDArray[np.int32], geometry: GridGeometry) -> RoomMap:
+        """Rooms known by their cells alone, as tracking needs them: without shapes and doorways.
+
+        Parameters
+        ----------
+        labels : (H, W) int32
+            0 = none; a number that does not occur is a room without cells.
+        geometry : GridGeometry
+            Where they lie.
+        """
+        cells = np.bincount(labels.ravel(), minlength=1)[1:]
+        areas = cells.astype(np.float64) * geometry.cell_area_m2
+        return cls(geometry, labels, (Polygon(),) * len(cells), areas)
 
     def __len__(self) -> int:
         return len(self.polygons)

@@ -18,15 +18,19 @@ from rose2_logs.pipeline import SnapshotAnalysis, analyse
 from rose2_logs.provenance import fingerprint, software_versions
 from rose2_logs.readers import Selection, inspect_log, open_log
 from rose2_logs.readers.log import LogReader
+from rose2_logs.room_evidence import RoomEvidence, room_evidence
 from rose2_logs.sinks.sink import RunInfo, Sink
 from rose2_logs.sinks.summary import RunTotals, write_summary
-from rose2_logs.tracking.frames import TrackedSnapshot
+from rose2_logs.sinks.tables import Tables
+from rose2_logs.tracking.frames import TrackedSnapshot, map_motion
+from rose2_logs.tracking.layout_change import LayoutFollower
+from rose2_logs.tracking.lives import Moment
 from rose2_logs.tracking.tracker import RoomTracker
 from rose2_logs.workers import ordered_map
 
 logger = logging.getLogger(__name__)
 
-TABLES = ("snapshots", "rooms", "events", "doorways")
+TABLES = ("snapshots", "rooms", "tracks", "events", "doorways")
 SUMMARY = "summary.json"
 
 
@@ -70,12 +74,13 @@ class RunOptions:
 
 @dataclass(frozen=True)
 class RunResult:
-    """What a run has written, and its totals."""
+    """What a run has written, its totals, and since when the layout was as in the end."""
 
     folder: Path
     files: tuple[Path, ...]
     totals: RunTotals
     seconds: float
+    layout_final: Moment | None
 
 
 OnSnapshot = Callable[[TrackedSnapshot, float], None]
@@ -140,7 +145,8 @@ def analyse_log(
         info = _run_info(path, reader, options)
         first_ns: int | None = None
         with ExitStack() as stack:
-            sinks = [stack.enter_context(sink) for sink in _make_sinks(planned, info, options)]
+            tables = Tables(folder)
+            sinks = [stack.enter_context(sink) for sink in (tables, *_make_sinks(planned, info, options))]
             for frame in tracked_snapshots(reader, last, options, totals):
                 for sink in sinks:
                     sink.write(frame)
@@ -158,13 +164,16 @@ def analyse_log(
         planned["summary"],
         info,
         totals,
+        tables.lives,
+        tables.hindsight,
         selection=dataclasses.asdict(options.selection),
         messages=messages,
         files=[file.name for file in files.values()],
         seconds=seconds,
         workers=options.workers,
     )
-    return RunResult(folder, (*files.values(), planned["summary"]), totals, seconds)
+    layout_final = None if tables.hindsight is None else tables.hindsight.layout_final
+    return RunResult(folder, (*files.values(), planned["summary"]), totals, seconds, layout_final)
 
 
 def tracked_snapshots(
@@ -184,16 +193,19 @@ def tracked_snapshots(
         Maps that cannot be analysed are left out and counted as invalid here.
     """
     final_free_m2 = free_area_m2(last, options.parameters.occupancy)
-    tracker = RoomTracker(options.parameters.tracking)
+    tracker = RoomTracker(options.parameters.tracking, options.parameters.occupancy)
+    layout = LayoutFollower()
     work = partial(_analyse_or_refuse, parameters=options.parameters, method=options.method)
-    for snapshot, analysis in ordered_map(work, reader.snapshots(), options.workers):
-        if isinstance(analysis, InvalidMapError):
+    for snapshot, found in ordered_map(work, reader.snapshots(), options.workers):
+        if isinstance(found, InvalidMapError):
             totals.invalid += 1
-            logger.warning("snapshot %d is left out: %s", snapshot.index, analysis)
+            logger.warning("snapshot %d is left out: %s", snapshot.index, found)
             continue
+        analysis, evidence = found
         track_ids, events = tracker.update(snapshot, analysis)
+        change = layout.update(analysis.rooms, track_ids, map_motion(events))
         coverage = min(analysis.free_area_m2 / final_free_m2, 1.0) if final_free_m2 > 0 else 0.0
-        yield TrackedSnapshot(snapshot, analysis, coverage, track_ids, events)
+        yield TrackedSnapshot(snapshot, analysis, coverage, track_ids, events, evidence, change)
 
 
 def free_area_m2(snapshot: OccupancySnapshot, parameters: OccupancyParameters) -> float:
@@ -208,11 +220,12 @@ def free_area_m2(snapshot: OccupancySnapshot, parameters: OccupancyParameters) -
 
 def _analyse_or_refuse(
     snapshot: OccupancySnapshot, parameters: Parameters, method: str
-) -> SnapshotAnalysis | InvalidMapError:
+) -> tuple[SnapshotAnalysis, RoomEvidence] | InvalidMapError:
     try:
-        return analyse(snapshot, parameters, method)
+        analysis = analyse(snapshot, parameters, method)
     except InvalidMapError as error:
         return error
+    return analysis, room_evidence(snapshot, analysis.rooms, parameters.occupancy)
 
 
 def _run_info(path: Path, reader: LogReader, options: RunOptions) -> RunInfo:
@@ -235,9 +248,7 @@ def _planned_files(folder: Path, stem: str, options: RunOptions) -> dict[str, Pa
 
 def _make_sinks(planned: dict[str, Path], info: RunInfo, options: RunOptions) -> list[Sink]:
     # Imported here: each brings a large library that the others do not need.
-    from rose2_logs.sinks.tables import Tables
-
-    sinks: list[Sink] = [Tables(planned["summary"].parent)]
+    sinks: list[Sink] = []
     if options.recording or options.live:
         from rose2_logs.sinks.rerun_recording import RerunRecording
 

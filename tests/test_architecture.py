@@ -24,6 +24,7 @@ ORDER = (
     "topology",
     "baselines",
     "pipeline",
+    "room_evidence",
     "tracking",
     "evaluation",
     "sinks",

@@ -52,6 +52,21 @@ def test_both_rooms_are_found_and_keep_their_numbers(run: Path):
     assert {row["snapshot"] for row in rooms if row["track"] == 1} == {0, 1, 2}
 
 
+def test_rooms_have_evidence_and_a_past(run: Path):
+    """Walls back most of both outlines; the second room came later and was whole in the end."""
+    tracks = pq.read_table(run / "out" / "tracks.parquet").to_pylist()
+    assert [row["in_last_map"] for row in tracks] == [True, True]
+    assert tracks[0]["first_coverage"] < tracks[1]["first_coverage"]
+    assert all(row["outline_wall_share"] > 0.8 for row in tracks)
+    snapshots = pq.read_table(run / "out" / "snapshots.parquet").to_pylist()
+    assert snapshots[0]["frontier_m"] > 2 > snapshots[2]["frontier_m"]
+    assert snapshots[0]["final_iou"] < 0.6 < snapshots[2]["final_iou"] == 1.0
+    assert [row["variation_bits"] is None for row in snapshots] == [True, False, False]
+    layout = json.loads((run / "out" / "summary.json").read_text())["layout"]
+    assert layout["final_since"]["coverage"] in [row["coverage"] for row in snapshots]
+    assert layout["frontier_m"] == snapshots[2]["frontier_m"]
+
+
 def test_the_summary_tells_what_the_run_was_made_of(run: Path):
     """Parameters, versions, fingerprint, counts; times only under seconds."""
     summary = json.loads((run / "out" / "summary.json").read_text())

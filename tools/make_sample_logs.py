@@ -9,6 +9,8 @@ Examples
     python tools/make_sample_logs.py --output DIR --seed 7
     # maps with true rooms of 20 buildings, for `rose2-logs evaluate DIR/cases.json`
     python tools/make_sample_logs.py --cases DIR --count 20 --seed 100
+    # every map of 20 whole runs, for `rose2-logs evaluate DIR/cases.json --along`
+    python tools/make_sample_logs.py --runs DIR --count 20 --seed 100
 
 The same options give the same bytes.
 """
@@ -29,6 +31,7 @@ from simulation.truth import write_case, write_truth
 START_NS = 1_700_000_000 * NANOSECONDS
 """The runs' first moment: any fixed time, so that remade files are the same."""
 MAPS_PER_LOG = 40
+MAPS_PER_RUN = 20
 SAMPLES = (
     ("office.mcap", "straight", 1.0, False),
     ("wing.bag", "bent", 0.0, False),
@@ -76,6 +79,21 @@ def make_cases(directory: Path, count: int, seed: int, style: str | None) -> Non
     print(f"{directory / 'cases.json'}: {len(cases)} cases")
 
 
+def make_runs(directory: Path, count: int, seed: int, style: str | None) -> None:
+    """Write benchmark cases of `count` buildings: every map of each run, a group each."""
+    directory.mkdir(parents=True, exist_ok=True)
+    cases = []
+    for number in range(seed, seed + count):
+        building = simulate_building(number, style or STYLES[number % len(STYLES)])
+        group = f"run_{building.name.replace(' ', '_')}"
+        maps = thinned_run(building, number, maps=MAPS_PER_RUN)
+        for index, step in enumerate(maps):
+            cases.append(write_case(directory, group, f"map{index:02d}", building, step.cells, step.geometry))
+        print(f"{group}: {cases[-1]['n_rooms']} rooms, {maps[-1].time_s:.0f} s")
+    (directory / "cases.json").write_text(json.dumps({"cases": cases}, indent=1) + "\n", encoding="utf-8")
+    print(f"{directory / 'cases.json'}: {len(cases)} cases")
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
     parser = argparse.ArgumentParser(
@@ -85,10 +103,13 @@ def main(arguments: list[str] | None = None) -> int:
     add("-o", "--output", type=Path, default=Path("sample_logs"), help="directory of the logs (%(default)s)")
     add("--seed", type=int, default=1, help="decides on buildings and runs (%(default)s)")
     add("--cases", type=Path, metavar="DIR", help="write benchmark cases to DIR instead of logs")
-    add("--count", type=int, default=10, help="number of buildings for --cases (%(default)s)")
-    add("--style", choices=STYLES, help="style of every building for --cases (default: all in turn)")
+    add("--runs", type=Path, metavar="DIR", help="write every map of whole runs as cases to DIR")
+    add("--count", type=int, default=10, help="number of buildings for --cases and --runs (%(default)s)")
+    add("--style", choices=STYLES, help="style of all these buildings (default: all in turn)")
     options = parser.parse_args(arguments)
-    if options.cases is None:
+    if options.runs is not None:
+        make_runs(options.runs, options.count, options.seed, options.style)
+    elif options.cases is None:
         make_sample_logs(options.output, options.seed)
     else:
         make_cases(options.cases, options.count, options.seed, options.style)

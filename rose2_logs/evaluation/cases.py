@@ -2,6 +2,7 @@
 
 The file holds ``{"cases": [{"group", "name", "map", "rooms", "resolution_m"}, ...]}`` with paths relative to
 itself: `map` is an 8-bit grey image in the convention of ROS maps, `rooms` a label image of the same size.
+A case may say ``"origin_xy_m": [x, y]``, where the image's lower left corner lies in the world.
 Images have row 0 at the top, occupancy grids at the origin below; a case converts between the two.
 """
 
@@ -37,6 +38,8 @@ class Case:
         The two images.
     resolution_m : float
         Side of a cell.
+    origin_xy_m : (float, float), optional
+        World position of the images' lower left corner, where it is known.
     """
 
     group: str
@@ -44,9 +47,10 @@ class Case:
     map_path: Path
     rooms_path: Path
     resolution_m: float
+    origin_xy_m: tuple[float, float] | None = None
 
     def snapshot(self) -> OccupancySnapshot:
-        """Read the map as an occupancy grid with its origin at the image's lower left corner.
+        """Read the map as an occupancy grid; its origin is (0, 0) where it is not known.
 
         Raises
         ------
@@ -59,7 +63,7 @@ class Case:
         cells = np.full(grey.shape, UNKNOWN, np.int8)
         cells[grey <= OCCUPIED_MAX_GREY] = 100
         cells[grey >= FREE_MIN_GREY] = 0
-        geometry = GridGeometry(self.resolution_m, (0.0, 0.0), 0.0, "map", grey.shape)
+        geometry = GridGeometry(self.resolution_m, self.origin_xy_m or (0.0, 0.0), 0.0, "map", grey.shape)
         return OccupancySnapshot(
             0, 0, 0, str(self.map_path), np.ascontiguousarray(np.flipud(cells)), geometry
         )
@@ -116,11 +120,19 @@ def _case(path: Path, number: int, entry: Any) -> Case:
             path.parent / entry["map"],
             path.parent / entry["rooms"],
             float(entry["resolution_m"]),
+            _origin(entry.get("origin_xy_m")),
         )
     except (KeyError, TypeError, ValueError) as error:
         raise CasesError(
             f"{path}: case {number} needs group, name, map, rooms, resolution_m: {error!r}"
         ) from error
+
+
+def _origin(given: Any) -> tuple[float, float] | None:
+    if given is None:
+        return None
+    x, y = given
+    return float(x), float(y)
 
 
 def _read_image(path: Path) -> NDArray[Any]:

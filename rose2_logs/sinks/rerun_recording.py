@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import socket
 import subprocess
 import sys
@@ -291,6 +292,9 @@ def _listens(port: int) -> bool:
 
 def event_text(event: RoomEvent) -> str:
     """Tell an event in a sentence."""
+    if event.motion is not None:
+        (x, y), turn_deg = event.motion.shift_xy_m, math.degrees(event.motion.turn_rad)
+        return f"the map shifted by {x:+.2f}, {y:+.2f} m and turned by {turn_deg:+.1f}°"
     others = ", ".join(str(track) for track in event.others)
     if event.kind == "split":
         return f"room {event.track} split; new: {others}" if others else f"room {event.track} split"
@@ -300,7 +304,9 @@ def event_text(event: RoomEvent) -> str:
 
 
 def _event_level(event: RoomEvent) -> str:
-    level = rr.TextLogLevel.WARN if event.kind in ("split", "merged", "lost") else rr.TextLogLevel.INFO
+    level = (
+        rr.TextLogLevel.WARN if event.kind in ("split", "merged", "lost", "shifted") else rr.TextLogLevel.INFO
+    )
     return str(level)
 
 

@@ -2,15 +2,41 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 from rose2_logs.errors import OutputError
 from rose2_logs.sinks.sink import RunInfo
 from rose2_logs.tracking.frames import TrackedSnapshot
+from rose2_logs.tracking.hindsight import Hindsight
+from rose2_logs.tracking.lives import RoomLives
+
+
+@dataclass
+class RunningMean:
+    """Mean and maximum of values that come one by one; None counts as no value."""
+
+    count: int = 0
+    total: float = 0.0
+    maximum: float | None = None
+
+    def add(self, value: float | None) -> None:
+        """Take a value."""
+        if value is not None:
+            self.count += 1
+            self.total += value
+            self.maximum = value if self.maximum is None else max(self.maximum, value)
+
+    @property
+    def mean(self) -> float | None:
+        """Mean of the values so far, None without any."""
+        return self.total / self.count if self.count else None
 
 
 @dataclass
@@ -33,6 +59,10 @@ class RunTotals:
         Of the first and the last snapshot.
     events : dict
         Number of events by kind.
+    changed_share, variation_bits : RunningMean
+        How the layout changed from map to map.
+    frontier_m : float
+        Open frontier of the last snapshot's rooms.
     stage_seconds, stage_seconds_max : dict
         Time per stage, summed and of the slowest snapshot.
     """
@@ -46,6 +76,9 @@ class RunTotals:
     first_log_time_ns: int | None = None
     last_log_time_ns: int | None = None
     events: Counter[str] = field(default_factory=Counter)
+    changed_share: RunningMean = field(default_factory=RunningMean)
+    variation_bits: RunningMean = field(default_factory=RunningMean)
+    frontier_m: float = 0.0
     stage_seconds: dict[str, float] = field(default_factory=dict)
     stage_seconds_max: dict[str, float] = field(default_factory=dict)
 
@@ -60,6 +93,11 @@ class RunTotals:
         self.rooms_last = len(frame.track_ids)
         self.tracks = max(self.tracks, *frame.track_ids, 0)
         self.events.update(event.kind for event in frame.events)
+        if frame.change is not None:
+            self.changed_share.add(frame.change.changed_share)
+            self.variation_bits.add(frame.change.variation_bits)
+        if frame.evidence is not None:
+            self.frontier_m = float(frame.evidence.frontier_m.sum())
         for stage, seconds in frame.analysis.seconds.items():
             self.stage_seconds[stage] = self.stage_seconds.get(stage, 0.0) + seconds
             self.stage_seconds_max[stage] = max(self.stage_seconds_max.get(stage, 0.0), seconds)
@@ -69,6 +107,8 @@ def write_summary(
     path: Path,
     info: RunInfo,
     totals: RunTotals,
+    lives: RoomLives,
+    hindsight: Hindsight | None,
     *,
     selection: dict[str, Any],
     messages: dict[str, int],
@@ -86,6 +126,8 @@ def write_summary(
         Log, method, resolved parameters, versions, provenance.
     totals : RunTotals
         What came out.
+    lives, hindsight : RoomLives, Hindsight
+        What is known of every room, and since when it was right.
     selection, messages : dict
         Which maps were asked for, and what became of the log's messages.
     files : list of str
@@ -120,6 +162,7 @@ def write_summary(
             "tracks": totals.tracks,
             "events": dict(sorted(totals.events.items())),
         },
+        "layout": _layout(totals, lives, hindsight),
         "files": files,
         "seconds": {
             "run": seconds,
@@ -129,6 +172,38 @@ def write_summary(
         },
     }
     write_json(path, summary)
+
+
+def _layout(totals: RunTotals, lives: RoomLives, hindsight: Hindsight | None) -> dict[str, Any]:
+    """Tell how the layout came to be: since when it was final, how much it changed, how sure it is."""
+    rooms = [lives.lives[track] for track in lives.in_last_map]
+    facts: dict[str, Any] = {
+        "final_since": None,
+        "changed_share_mean": totals.changed_share.mean,
+        "changed_share_max": totals.changed_share.maximum,
+        "variation_bits_mean": totals.variation_bits.mean,
+        "variation_bits_max": totals.variation_bits.maximum,
+        "outline_wall_share_median": _median(room.outline_wall_share for room in rooms),
+        "frontier_m": totals.frontier_m,
+    }
+    if hindsight is not None:
+        settled, right = hindsight.area_settled, hindsight.shape_right
+        facts |= {
+            "final_since": hindsight.layout_final and dataclasses.asdict(hindsight.layout_final),
+            "area_settled_coverage_median": _median(settled[track].coverage for track in lives.in_last_map),
+            "shape_right_coverage_median": _median(
+                right[track].coverage for track in lives.in_last_map if track in right
+            ),
+            "shape_right_seen_share_median": _median(
+                hindsight.shape_right_seen.get(track) for track in lives.in_last_map
+            ),
+        }
+    return facts
+
+
+def _median(values: Iterable[float | None]) -> float | None:
+    known = [value for value in values if value is not None]
+    return median(known) if known else None
 
 
 def write_json(path: Path, value: Any) -> None:

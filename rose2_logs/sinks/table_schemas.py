@@ -17,43 +17,99 @@ def _table(columns: dict[str, tuple[pa.DataType, str]], metadata: dict[str, str]
     return pa.schema(fields, metadata=metadata)
 
 
-_NULLABLE = frozenset({"label_x_m", "label_y_m", "clean_threshold"})
+_NULLABLE = frozenset(
+    {
+        "label_x_m",
+        "label_y_m",
+        "clean_threshold",
+        "outline_wall_share",
+        "frontier_m",
+        "variation_bits",
+        "changed_share",
+        "final_iou",
+        "final_share",
+        "shift_x_m",
+        "shift_y_m",
+        "turn_rad",
+        "shape_right_snapshot",
+        "shape_right_time_s",
+        "shape_right_coverage",
+        "shape_right_seen_share",
+    }
+)
 
 _SNAPSHOT: dict[str, tuple[pa.DataType, str]] = {
     "snapshot": (pa.int32(), "number of the snapshot among the distinct maps, from 0"),
     "log_time_ns": (pa.int64(), "when the map was recorded, nanoseconds since the epoch"),
 }
 
+_EVIDENCE: dict[str, tuple[pa.DataType, str]] = {
+    "outline_wall_share": (
+        pa.float64(),
+        "share of the outline, with its predicted part, that occupied cells back; doorways are not backed",
+    ),
+    "frontier_m": (pa.float64(), "open frontier: sides of its free cells towards unknown ones, metres"),
+}
+
+_SNAPSHOTS_ALONG: dict[str, tuple[pa.DataType, str]] = {
+    **_SNAPSHOT,
+    "stamp_ns": (pa.int64(), "header stamp of the map, nanoseconds"),
+    "time_s": (pa.float64(), "log time since the first snapshot, seconds"),
+    "coverage": (pa.float64(), "known free area over that of the run's last map, share in [0, 1]"),
+    "free_area_m2": (pa.float64(), "known free area, square metres"),
+    "rooms": (pa.int32(), "number of rooms"),
+    "rooms_area_m2": (pa.float64(), "area of all rooms as far as they were seen, square metres"),
+    "rooms_predicted_area_m2": (
+        pa.float64(),
+        "area of all rooms with their predicted parts, square metres",
+    ),
+    "doorways": (pa.int32(), "number of doorways between rooms"),
+    "directions_rad": (
+        pa.list_(pa.float64()),
+        "dominant directions, world frame, strongest first, radians",
+    ),
+    "clean_threshold": (pa.float64(), "structure score from which cells are in the clean map"),
+    "wall_segments": (pa.int32(), "number of wall segments"),
+    "lines": (pa.int32(), "number of representative lines"),
+    "faces": (pa.int32(), "number of faces"),
+    "repeats_before": (pa.int32(), "identical maps dropped since the snapshot before"),
+    "frame_id": (pa.string(), "name of the world frame"),
+    "resolution_m": (pa.float64(), "side of a cell, metres"),
+    "origin_x_m": (pa.float64(), "world x of the grid's origin, metres"),
+    "origin_y_m": (pa.float64(), "world y of the grid's origin, metres"),
+    "yaw_rad": (pa.float64(), "rotation of the grid in the world, radians counter-clockwise"),
+    "height_cells": (pa.int32(), "rows of the grid"),
+    "width_cells": (pa.int32(), "columns of the grid"),
+    "frontier_m": (pa.float64(), "open frontier of all rooms, metres"),
+    "variation_bits": (
+        pa.float64(),
+        "variation of information between the rooms of the map before and of this one, over the floor in "
+        "a room in both, bits; 0 for the same rooms, null without a map before",
+    ),
+    "changed_share": (
+        pa.float64(),
+        "share of this floor that is in a room of another track than in the map before",
+    ),
+    "drift_x_m": (pa.float64(), "where the first map's frame lies now: x of its origin, metres"),
+    "drift_y_m": (pa.float64(), "y of its origin, metres"),
+    "drift_yaw_rad": (pa.float64(), "its turn, radians counter-clockwise; changes with shifted events"),
+}
+
+SNAPSHOTS_ALONG = _table(_SNAPSHOTS_ALONG)
+"""Snapshots as far as they are known along the run."""
+
 SNAPSHOTS = _table(
     {
-        **_SNAPSHOT,
-        "stamp_ns": (pa.int64(), "header stamp of the map, nanoseconds"),
-        "time_s": (pa.float64(), "log time since the first snapshot, seconds"),
-        "coverage": (pa.float64(), "known free area over that of the run's last map, share in [0, 1]"),
-        "free_area_m2": (pa.float64(), "known free area, square metres"),
-        "rooms": (pa.int32(), "number of rooms"),
-        "rooms_area_m2": (pa.float64(), "area of all rooms as far as they were seen, square metres"),
-        "rooms_predicted_area_m2": (
+        **_SNAPSHOTS_ALONG,
+        "final_iou": (
             pa.float64(),
-            "area of all rooms with their predicted parts, square metres",
+            "mean intersection over union of the last map's rooms with their shape in this one, by area; "
+            "0 for a room that is not there yet",
         ),
-        "doorways": (pa.int32(), "number of doorways between rooms"),
-        "directions_rad": (
-            pa.list_(pa.float64()),
-            "dominant directions, world frame, strongest first, radians",
+        "final_share": (
+            pa.float64(),
+            "share of the last layout, by area, in rooms that overlap their last shape by 0.8",
         ),
-        "clean_threshold": (pa.float64(), "structure score from which cells are in the clean map"),
-        "wall_segments": (pa.int32(), "number of wall segments"),
-        "lines": (pa.int32(), "number of representative lines"),
-        "faces": (pa.int32(), "number of faces"),
-        "repeats_before": (pa.int32(), "identical maps dropped since the snapshot before"),
-        "frame_id": (pa.string(), "name of the world frame"),
-        "resolution_m": (pa.float64(), "side of a cell, metres"),
-        "origin_x_m": (pa.float64(), "world x of the grid's origin, metres"),
-        "origin_y_m": (pa.float64(), "world y of the grid's origin, metres"),
-        "yaw_rad": (pa.float64(), "rotation of the grid in the world, radians counter-clockwise"),
-        "height_cells": (pa.int32(), "rows of the grid"),
-        "width_cells": (pa.int32(), "columns of the grid"),
     }
 )
 
@@ -76,6 +132,7 @@ ROOMS = _table(
         "label_x_m": (pa.float64(), "world x of the point deepest inside the polygon, metres"),
         "label_y_m": (pa.float64(), "world y of the point deepest inside the polygon, metres"),
         "neighbours": (pa.list_(pa.int32()), "tracks of the rooms behind its doorways, ascending"),
+        **_EVIDENCE,
         "polygon_wkb": (pa.binary(), "shape with the predicted part, well-known binary, world metres"),
     },
     {"geo": json.dumps(GEOPARQUET, sort_keys=True)},
@@ -84,13 +141,19 @@ ROOMS = _table(
 EVENTS = _table(
     {
         **_SNAPSHOT,
-        "kind": (pa.string(), "born, continued, split, merged, lost or returned"),
-        "track": (pa.int32(), "the track that it is about; of a merge the one that stays"),
+        "kind": (pa.string(), "shifted, continued, returned, born, split, merged or lost"),
+        "track": (
+            pa.int32(),
+            "the track that it is about; of a merge the one that stays; 0 where the whole map shifted",
+        ),
         "others": (pa.list_(pa.int32()), "tracks of the parts of a split, tracks that a merge ended"),
         "overlap_iou": (
             pa.float64(),
             "intersection over union with the track's last shape, share; 0 for none",
         ),
+        "shift_x_m": (pa.float64(), "of a shift, how far the middle of the walls moved: x, metres"),
+        "shift_y_m": (pa.float64(), "y, metres"),
+        "turn_rad": (pa.float64(), "and how far the map turned about it, radians counter-clockwise"),
     }
 )
 
@@ -105,4 +168,39 @@ DOORWAYS = _table(
         "x1_m": (pa.float64(), "world x of the other end, metres"),
         "y1_m": (pa.float64(), "world y of the other end, metres"),
     }
+)
+
+TRACKS = _table(
+    {
+        "track": (pa.int32(), "number of the room over the run, from 1"),
+        "first_snapshot": (pa.int32(), "first map that shows it"),
+        "first_time_s": (pa.float64(), "when that was, log time since the first map, seconds"),
+        "first_coverage": (pa.float64(), "coverage then, share in [0, 1]"),
+        "last_snapshot": (pa.int32(), "last map that shows it"),
+        "last_time_s": (pa.float64(), "when that was, seconds"),
+        "last_coverage": (pa.float64(), "coverage then, share in [0, 1]"),
+        "maps": (pa.int32(), "number of maps that show it"),
+        "in_last_map": (pa.bool_(), "whether the run's last map shows it"),
+        "area_m2": (pa.float64(), "its last area, as far as it was seen, square metres"),
+        "predicted_area_m2": (pa.float64(), "area of its last shape, with the predicted part, square metres"),
+        "area_settled_snapshot": (pa.int32(), "map from which on its area was within 10 % of the last"),
+        "area_settled_time_s": (pa.float64(), "when that was, seconds"),
+        "area_settled_coverage": (pa.float64(), "coverage then, share in [0, 1]"),
+        "shape_right_snapshot": (
+            pa.int32(),
+            "first map whose shape, with the predicted part, overlaps the last by 0.8; null without a shape",
+        ),
+        "shape_right_time_s": (pa.float64(), "when that was, seconds"),
+        "shape_right_coverage": (pa.float64(), "coverage then, share in [0, 1]"),
+        "shape_right_seen_share": (
+            pa.float64(),
+            "area seen of it then over its last: how early the prediction was right; low is early",
+        ),
+        **_EVIDENCE,
+        "splits": (pa.int32(), "how often it was split"),
+        "merges": (pa.int32(), "how often it took in others"),
+        "losses": (pa.int32(), "how often it was lost"),
+        "polygon_wkb": (pa.binary(), "its last shape, well-known binary, world metres"),
+    },
+    {"geo": json.dumps(GEOPARQUET, sort_keys=True)},
 )

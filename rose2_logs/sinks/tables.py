@@ -1,60 +1,67 @@
-"""The run as Parquet tables: snapshots, rooms, events, doorways."""
+"""The run as Parquet tables: snapshots, rooms, tracks, events, doorways."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Self
 
-from rose2_logs.errors import OutputError
+from rose2_logs.sinks.hindsight_tables import write_hindsight
+from rose2_logs.sinks.parquet_table import ParquetTable, Row
 from rose2_logs.tracking.frames import TrackedSnapshot
+from rose2_logs.tracking.hindsight import Hindsight
+from rose2_logs.tracking.lives import Moment, RoomLives, evidence_of
 
 if TYPE_CHECKING:
-    import pyarrow as pa
-    import pyarrow.parquet as pq
     from shapely.geometry.base import BaseGeometry
 
-ROWS_PER_GROUP = 2000
-"""Rows held back until they are written as one row group: some hundred kilobytes with polygons."""
 POINT_TOLERANCE_M = 0.05
 """A label's point is the deepest of its room to this; one cell of usual maps."""
-COMPRESSION = "zstd"
-
-Row = dict[str, Any]
 
 
 class Tables:
-    """Sink that writes ``snapshots.parquet``, ``rooms.parquet``, ``events.parquet``, ``doorways.parquet``.
+    """Sink that writes ``snapshots``, ``rooms``, ``tracks``, ``events``, ``doorways``, each ``.parquet``.
 
     The tables hold nothing but what the log and the parameters determine: the same run gives the same bytes.
+    What only the last map tells is added at the end, by reading the rooms once more from the disk.
 
     Parameters
     ----------
     folder : path
         Where to; it is made.
+
+    Attributes
+    ----------
+    lives : RoomLives
+        What is known of every room over the run.
+    hindsight : Hindsight or None
+        What the last map tells of the ones before, once the tables are whole.
     """
 
     def __init__(self, folder: Path) -> None:
+        self.lives = RoomLives()
+        self.hindsight: Hindsight | None = None
         self._folder = folder
         self._stack = ExitStack()
-        self._tables: dict[str, _Table] = {}
-        self._first_time_ns: int | None = None
+        self._tables: dict[str, ParquetTable] = {}
 
     def __enter__(self) -> Self:
         from rose2_logs.sinks import table_schemas
 
-        schemas = {
-            "snapshots": table_schemas.SNAPSHOTS,
-            "rooms": table_schemas.ROOMS,
-            "events": table_schemas.EVENTS,
-            "doorways": table_schemas.DOORWAYS,
-        }
+        # Snapshots get two columns more in the end, and are written anew.
+        along = self._folder / ".snapshots.along.parquet.part"
         with ExitStack() as opening:
-            for name, schema in schemas.items():
-                path = self._folder / f"{name}.parquet"
-                self._tables[name] = opening.enter_context(_Table(path, schema))
+            for name, schema, part in (
+                ("along", table_schemas.SNAPSHOTS_ALONG, along),
+                ("snapshots", table_schemas.SNAPSHOTS, None),
+                ("rooms", table_schemas.ROOMS, None),
+                ("tracks", table_schemas.TRACKS, None),
+                ("events", table_schemas.EVENTS, None),
+                ("doorways", table_schemas.DOORWAYS, None),
+            ):
+                path = self._folder / f"{'snapshots' if name == 'along' else name}.parquet"
+                self._tables[name] = opening.enter_context(ParquetTable(path, schema, part))
             self._stack = opening.pop_all()
         return self
 
@@ -66,10 +73,9 @@ class Tables:
         OutputError
             If a file cannot be written.
         """
-        if self._first_time_ns is None:
-            self._first_time_ns = frame.snapshot.log_time_ns
+        self.lives.add(frame)
         about = {"snapshot": frame.snapshot.index, "log_time_ns": frame.snapshot.log_time_ns}
-        self._tables["snapshots"].add([about | _snapshot_row(frame, self._first_time_ns)])
+        self._tables["along"].add([about | _snapshot_row(frame, self.lives.moment(frame))])
         self._tables["rooms"].add([about | row for row in _room_rows(frame)])
         self._tables["events"].add([about | row for row in _event_rows(frame)])
         self._tables["doorways"].add([about | row for row in _doorway_rows(frame)])
@@ -77,70 +83,30 @@ class Tables:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
-        self._stack.__exit__(kind, error, traceback)
-
-
-class _Table:
-    """One Parquet file, written row group by row group beside its name and renamed when whole."""
-
-    def __init__(self, path: Path, schema: pa.Schema) -> None:
-        self._path = path
-        self._part = path.with_name(f".{path.name}.part")
-        self._schema = schema
-        self._rows: list[Row] = []
-        self._writer: pq.ParquetWriter | None = None
-
-    def __enter__(self) -> Self:
-        import pyarrow.parquet as pq
-
-        with _writing(self._path):
-            self._path.parent.mkdir(parents=True, exist_ok=True)
-            self._writer = pq.ParquetWriter(self._part, self._schema, compression=COMPRESSION)
-        return self
-
-    def add(self, rows: list[Row]) -> None:
-        self._rows += rows
-        if len(self._rows) >= ROWS_PER_GROUP:
-            self._flush()
-
-    def _flush(self) -> None:
-        import pyarrow as pa
-
-        if self._writer is not None and self._rows:
-            with _writing(self._path):
-                self._writer.write_table(pa.Table.from_pylist(self._rows, self._schema))
-            self._rows.clear()
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        try:
+        with self._stack:
             if kind is None:
-                self._flush()
-            if self._writer is not None:
-                with _writing(self._path):
-                    self._writer.close()
-            if kind is None:
-                with _writing(self._path):
-                    self._part.replace(self._path)
-        finally:
-            self._part.unlink(missing_ok=True)
+                along, *others = self._tables.values()
+                for name in ("along", "rooms", "events", "doorways"):
+                    self._tables[name].close()
+                self.hindsight = write_hindsight(
+                    self.lives,
+                    rooms_path=self._tables["rooms"].part,
+                    along_path=along.part,
+                    snapshots=self._tables["snapshots"],
+                    tracks=self._tables["tracks"],
+                )
+                for table in others:
+                    table.publish()
 
 
-@contextmanager
-def _writing(path: Path) -> Iterator[None]:
-    try:
-        yield
-    except OSError as error:
-        raise OutputError(f"{path}: cannot be written: {error}") from error
-
-
-def _snapshot_row(frame: TrackedSnapshot, first_time_ns: int) -> Row:
+def _snapshot_row(frame: TrackedSnapshot, moment: Moment) -> Row:
     snapshot, analysis, geometry = frame.snapshot, frame.analysis, frame.analysis.geometry
     structure, walls, plan = analysis.structure, analysis.walls, analysis.floor_plan
+    change = frame.change
+    x, y, yaw = (0.0, 0.0, 0.0) if change is None else change.drift.pose
     return {
         "stamp_ns": snapshot.stamp_ns,
-        "time_s": (snapshot.log_time_ns - first_time_ns) / 1e9,
+        "time_s": moment.time_s,
         "coverage": frame.coverage,
         "free_area_m2": analysis.free_area_m2,
         "rooms": len(analysis.rooms),
@@ -160,6 +126,12 @@ def _snapshot_row(frame: TrackedSnapshot, first_time_ns: int) -> Row:
         "yaw_rad": geometry.yaw_rad,
         "height_cells": geometry.shape[0],
         "width_cells": geometry.shape[1],
+        "frontier_m": None if frame.evidence is None else float(frame.evidence.frontier_m.sum()),
+        "variation_bits": change and change.variation_bits,
+        "changed_share": change and change.changed_share,
+        "drift_x_m": x,
+        "drift_y_m": y,
+        "drift_yaw_rad": yaw,
     }
 
 
@@ -168,6 +140,7 @@ def _room_rows(frame: TrackedSnapshot) -> list[Row]:
     rows = []
     for number, (track, polygon) in enumerate(zip(tracks, rooms.polygons, strict=True), start=1):
         x, y = _label_point(polygon)
+        wall_share, frontier_m = evidence_of(frame, number - 1)
         rows.append(
             {
                 "track": track,
@@ -177,6 +150,8 @@ def _room_rows(frame: TrackedSnapshot) -> list[Row]:
                 "label_x_m": x,
                 "label_y_m": y,
                 "neighbours": sorted(tracks[other - 1] for other in rooms.neighbours(number)),
+                "outline_wall_share": wall_share,
+                "frontier_m": frontier_m,
                 "polygon_wkb": polygon.wkb,
             }
         )
@@ -194,15 +169,22 @@ def _label_point(polygon: BaseGeometry) -> tuple[float | None, float | None]:
 
 
 def _event_rows(frame: TrackedSnapshot) -> list[Row]:
-    return [
-        {
-            "kind": event.kind,
-            "track": event.track,
-            "others": list(event.others),
-            "overlap_iou": event.overlap,
-        }
-        for event in frame.events
-    ]
+    rows = []
+    for event in frame.events:
+        motion = event.motion
+        x, y = (None, None) if motion is None else motion.shift_xy_m
+        rows.append(
+            {
+                "kind": event.kind,
+                "track": event.track,
+                "others": list(event.others),
+                "overlap_iou": event.overlap,
+                "shift_x_m": x,
+                "shift_y_m": y,
+                "turn_rad": motion and motion.turn_rad,
+            }
+        )
+    return rows
 
 
 def _doorway_rows(frame: TrackedSnapshot) -> list[Row]:

@@ -2,33 +2,44 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 from rose2_logs.occupancy import OccupancySnapshot
 from rose2_logs.pipeline import SnapshotAnalysis
+from rose2_logs.room_evidence import RoomEvidence
+from rose2_logs.tracking.alignment import RigidMotion
+from rose2_logs.tracking.layout_change import LayoutChange
 
-EventKind = Literal["born", "continued", "split", "merged", "lost", "returned"]
+EventKind = Literal["shifted", "continued", "returned", "born", "split", "merged", "lost"]
+EVENT_ORDER: tuple[EventKind, ...] = get_args(EventKind)
+"""Order of one snapshot's events: the map, what the rooms are, then what became of the tracks before."""
+MAP_TRACK = 0
+"""Stands for the track in an event of the whole map."""
 
 
 @dataclass(frozen=True)
 class RoomEvent:
-    """Something that happened to the identity of rooms at one snapshot.
+    """Something that happened to the identity of rooms, or to the whole map, at one snapshot.
 
     Attributes
     ----------
     kind : str
         born: a track begins; continued: a room takes its track on; split: a track's room is now several
         rooms; merged: several tracks' rooms are now one; lost: a track has no room any more;
-        returned: a lost track has a room again.
+        returned: a lost track has a room again; shifted: the whole map moved within its frame.
     snapshot : int
         Index of the snapshot.
     track : int
-        The track that the event is about: of a split the one that was split, of a merge the one that stays.
+        The track that the event is about: of a split the one that was split, of a merge the one that stays,
+        of a shift `MAP_TRACK`.
     others : tuple of int
         The further tracks: the parts that a split gave birth to, the tracks that a merge ended.
     overlap : float
         Intersection over union of the room with its track's last shape; 0 where there is none.
+    motion : RigidMotion, optional
+        Of a shift: how the map moved since the snapshot before.
     """
 
     kind: EventKind
@@ -36,6 +47,12 @@ class RoomEvent:
     track: int
     others: tuple[int, ...] = ()
     overlap: float = 0.0
+    motion: RigidMotion | None = None
+
+
+def map_motion(events: Iterable[RoomEvent]) -> RigidMotion | None:
+    """Motion of the whole map among one snapshot's events, if it moved."""
+    return next((event.motion for event in events if event.kind == "shifted"), None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +71,10 @@ class TrackedSnapshot:
         The track (1, 2, ... never used again) of room i + 1.
     events : tuple of RoomEvent
         What happened to the tracks at this snapshot.
+    evidence : RoomEvidence, optional
+        How sure the rooms are.
+    change : LayoutChange, optional
+        How the layout changed since the map before.
     """
 
     snapshot: OccupancySnapshot
@@ -61,3 +82,5 @@ class TrackedSnapshot:
     coverage: float
     track_ids: tuple[int, ...]
     events: tuple[RoomEvent, ...]
+    evidence: RoomEvidence | None = None
+    change: LayoutChange | None = None

@@ -242,7 +242,11 @@ def test_evaluate_along_a_run(cli, cases: Path, tmp_path: Path):
     )
     assert code == 0
     assert "100.0%" in out
-    along = json.loads((tmp_path / "f.json").read_text())["along"]["drawn"]
+    assert "IDF1" in out
+    figures = json.loads((tmp_path / "f.json").read_text())
+    assert figures["tracks"]["drawn"]["found"]["idf1"] == 100
+    assert figures["tracks"]["drawn"]["true_rooms"]["true_tracks"] == 2
+    along = figures["along"]["drawn"]
     assert [point["name"] for point in along] == ["half", "flat"]
     assert 0.6 < along[0]["coverage"] < 0.9
     assert along[1]["coverage"] == 1.0

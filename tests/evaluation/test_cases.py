@@ -31,6 +31,21 @@ def test_a_case_is_read_as_a_grid_with_row_0_at_the_bottom(cases_file: Path):
     assert snapshot.geometry.resolution_m == 0.1
 
 
+def test_a_case_may_say_where_it_lies(cases_file: Path):
+    """The origin goes into the grid; without one it is (0, 0), and known not to be known."""
+    listed = json.loads(cases_file.read_text())["cases"]
+    listed[0]["origin_xy_m"] = [-3, 4.5]
+    cases_file.write_text(json.dumps({"cases": listed}))
+    told, silent = load_cases(cases_file)
+    assert told.snapshot().geometry.origin_xy_m == told.origin_xy_m == (-3.0, 4.5)
+    assert silent.snapshot().geometry.origin_xy_m == (0.0, 0.0)
+    assert silent.origin_xy_m is None
+    listed[0]["origin_xy_m"] = [1]
+    cases_file.write_text(json.dumps({"cases": listed}))
+    with pytest.raises(CasesError, match="case 0"):
+        load_cases(cases_file)
+
+
 def test_truth_keeps_image_orientation_and_16_bit_labels(cases_file: Path):
     """Labels above 255 survive the way through a PNG."""
     assert load_cases(cases_file)[0].truth().tolist() == [[300, 0, 0], [0, 0, 2]]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from pathlib import Path
 
@@ -14,12 +15,13 @@ from drawn_rooms import drawn, rows
 from rose2_logs.errors import OutputError
 from rose2_logs.parameters import TrackingParameters
 from rose2_logs.rooms import Doorway
-from rose2_logs.sinks import tables as tables_module
+from rose2_logs.sinks import parquet_table
 from rose2_logs.sinks.tables import Tables
-from rose2_logs.tracking.frames import TrackedSnapshot
+from rose2_logs.tracking.alignment import RigidMotion
+from rose2_logs.tracking.frames import MAP_TRACK, RoomEvent, TrackedSnapshot
 from rose2_logs.tracking.tracker import RoomTracker
 
-NAMES = ("snapshots", "rooms", "events", "doorways")
+NAMES = ("snapshots", "rooms", "tracks", "events", "doorways")
 
 
 def frames() -> list[TrackedSnapshot]:
@@ -89,19 +91,54 @@ def test_doorways_name_the_tracks_on_both_sides(tmp_path: Path):
     assert table[0]["width_m"] == pytest.approx(0.9)
 
 
+def test_tracks_have_one_row_a_room_over_the_run(tmp_path: Path):
+    """First, last, since when it was right, how often it was lost, and its last shape."""
+    one, two = write(tmp_path)["tracks"]
+    assert [(row["track"], row["maps"], row["losses"], row["in_last_map"]) for row in (one, two)] == [
+        (1, 3, 0, True),
+        (2, 2, 1, True),
+    ]
+    assert (two["first_snapshot"], two["last_snapshot"], two["last_time_s"]) == (0, 2, 2.0)
+    assert (two["area_settled_snapshot"], two["shape_right_coverage"]) == (0, 1.0)
+    assert shapely.from_wkb(two["polygon_wkb"]).equals(shapely.box(2, 0, 4, 2))
+    # These frames carry no evidence: not measured is not zero.
+    assert one["outline_wall_share"] is None
+
+
+def test_snapshots_are_compared_with_the_last_one(tmp_path: Path):
+    """Half of the last layout is missing in the second map; what was not measured is null."""
+    table = write(tmp_path)["snapshots"]
+    assert [row["final_iou"] for row in table] == [1.0, 0.5, 1.0]
+    assert [row["final_share"] for row in table] == [1.0, 0.5, 1.0]
+    assert [row["variation_bits"] for row in table] == [None] * 3
+
+
+def test_a_shift_of_the_map_is_an_event_of_no_track(tmp_path: Path):
+    """How far it moved and turned; other events have no motion."""
+    frame = frames()[0]
+    shift = RoomEvent("shifted", 0, MAP_TRACK, motion=RigidMotion((9.0, 9.0), (0.5, -0.25), 0.01))
+    with Tables(tmp_path) as sink:
+        sink.write(dataclasses.replace(frame, events=(shift, *frame.events)))
+    first, *others = pq.read_table(tmp_path / "events.parquet").to_pylist()
+    assert (first["kind"], first["track"]) == ("shifted", 0)
+    assert (first["shift_x_m"], first["shift_y_m"], first["turn_rad"]) == (0.5, -0.25, 0.01)
+    assert {row["shift_x_m"] for row in others} == {None}
+
+
 def test_every_column_says_what_it_is(tmp_path: Path):
     """Each field has a description, and GeoParquet's metadata names the polygons."""
     write(tmp_path)
     for name in NAMES:
         for field in pq.read_schema(tmp_path / f"{name}.parquet"):
             assert field.metadata[b"description"], field.name
-    geo = json.loads(pq.read_schema(tmp_path / "rooms.parquet").metadata[b"geo"])
-    assert geo["primary_column"] in pq.read_schema(tmp_path / "rooms.parquet").names
+    for name in ("rooms", "tracks"):
+        schema = pq.read_schema(tmp_path / f"{name}.parquet")
+        assert json.loads(schema.metadata[b"geo"])["primary_column"] in schema.names
 
 
 def test_row_groups_are_written_along_the_way_and_twice_the_same(tmp_path: Path, monkeypatch):
     """Memory does not grow: rows leave in groups. The same run gives the same bytes."""
-    monkeypatch.setattr(tables_module, "ROWS_PER_GROUP", 2)
+    monkeypatch.setattr(parquet_table, "ROWS_PER_GROUP", 2)
     write(tmp_path / "a")
     write(tmp_path / "b")
     assert pq.ParquetFile(tmp_path / "a" / "events.parquet").num_row_groups == 3

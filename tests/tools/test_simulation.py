@@ -175,3 +175,15 @@ def test_static_cases_have_the_form_of_the_benchmark(tmp_path):
         assert np.unique(rooms).tolist() == list(range(case["n_rooms"] + 1))
         assert (grey[rooms > 0] == 254).all()
         assert case["free"] == (grey == 254).sum()
+
+
+def test_runs_are_cases_in_their_order_with_origins(tmp_path):
+    from make_sample_logs import main
+
+    assert main(["--runs", str(tmp_path), "--count", "1", "--seed", "8", "--style", "flat"]) == 0
+    cases = json.loads((tmp_path / "cases.json").read_text())["cases"]
+    assert {case["group"] for case in cases} == {"run_flat_8"}
+    assert [case["name"] for case in cases] == [f"map{index:02d}" for index in range(len(cases))]
+    assert len(cases) > 10
+    assert cases[0]["free"] < 0.9 * cases[-1]["free"]
+    assert all(len(case["origin_xy_m"]) == 2 for case in cases)

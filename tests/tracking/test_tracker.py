@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
+from drawn_maps import office, snapshot
 from drawn_rooms import drawn, rows
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from moved_maps import motion_about, moved
 
-from rose2_logs.evaluation.cases import load_cases
 from rose2_logs.parameters import TrackingParameters
+from rose2_logs.rooms import RoomMap
+from rose2_logs.tracking.frames import MAP_TRACK
 from rose2_logs.tracking.tracker import RoomTracker
-
-BENCHMARK = Path(__file__).parents[3] / "shared" / "benchmark"
 
 
 def run(*maps, parameters: TrackingParameters | None = None):
@@ -175,12 +175,44 @@ def test_moving_the_world_changes_no_track(seeds, shift):
         assert alive == set(tracks)
 
 
-@pytest.mark.skipif(not BENCHMARK.exists(), reason="the benchmark is not beside the project")
-def test_true_rooms_of_a_real_run_keep_their_tracks():
-    """In a real exploration with true rooms, there are hardly more tracks than rooms in the end."""
+def test_flicker_of_parts_does_not_swap_numbers():
+    """Which of two parts is the larger one changes from map to map, and they are one in between."""
+    one, left, right = rows("1111111111"), rows("1111112222"), rows("1111222222")
+    ids, _ = run(one, left, one, right, one, left, one)
+    assert ids == [(1,), (1, 2), (1,), (1, 2), (1,), (1, 2), (1,)]
+
+
+def test_a_good_pair_is_not_given_up_for_two_poor_ones():
+    """A track stays with the room that it overlaps most, though two tracks could be continued instead."""
+    ids, events = run(rows("11111111112."), rows("222211111111"))
+    assert ids[1] == (1, 3)
+    assert ("merged", 1, (2,)) in events[1]
+
+
+def test_when_the_whole_map_shifts_rooms_are_looked_for_where_they_now_are():
+    """Rooms a metre wide that all move by a metre keep their numbers, a lost one too."""
+    cells, labels = office(pad=(30, 30))
+    narrow = np.where(labels > 0, 1 + np.arange(labels.shape[1]) // 20, 0).astype(np.int32)
+    narrow = np.unique(narrow, return_inverse=True)[1].reshape(labels.shape).astype(np.int32)
+    first = snapshot(cells)
+    second, there = moved(first, narrow, motion_about(first, (1.0, 0.0), 0.0))
     tracker = RoomTracker(TrackingParameters())
-    for index, case in enumerate(load_cases(BENCHMARK / "cases.json", "incremental_fr79")):
-        labels = case.truth()
-        ids, _ = tracker.update(*drawn(labels, index, resolution_m=case.resolution_m))
-        assert len(ids) == labels.max()
-    assert max(ids) <= 1.25 * len(ids)
+    before, _ = tracker.update(first, RoomMap.from_labels(narrow, first.geometry))
+    kept = np.where(there == 3, 0, there).astype(np.int32)
+    after, events = tracker.update(second, RoomMap.from_labels(kept, second.geometry))
+    assert [track for track in after if track != after[2]] == [track for track in before if track != 3]
+    (shift,) = [event for event in events if event.kind == "shifted"]
+    assert shift.track == MAP_TRACK
+    assert shift.motion is not None
+    assert shift.motion.shift_xy_m == pytest.approx((1.0, 0.0), abs=0.01)
+    returned, events = tracker.update(second, RoomMap.from_labels(there, second.geometry))
+    assert returned == before
+    assert ("returned", 3) in [(event.kind, event.track) for event in events]
+
+
+def test_a_memory_of_one_shape_forgets_the_whole():
+    """With one shape a track, the part that was last seen is what is compared."""
+    parameters = TrackingParameters(shapes_kept=1)
+    one, left, right = rows("1111111111"), rows("1111112222"), rows("1112222222")
+    assert run(one, left, one, right)[0][3] == (1, 2)
+    assert run(one, left, one, right, parameters=parameters)[0][3] != (1, 2)

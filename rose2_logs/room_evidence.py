@@ -1,0 +1,98 @@
+"""What a map shows of each room's outline: how much of it is wall, and where the room goes on unseen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+
+from rose2_logs.explored import ExploredPart
+from rose2_logs.occupancy import UNKNOWN, BoolArray, FloatArray, GridGeometry, OccupancySnapshot, known_window
+from rose2_logs.parameters import OccupancyParameters
+from rose2_logs.rooms import RoomMap
+
+OUTLINE_STEP_M = 0.1
+"""Outlines are looked at every so many metres: two cells of usual maps."""
+WALL_REACH_M = 0.2
+"""An outline is backed by occupied cells this near: it runs in the middle of walls of usual thickness."""
+
+
+@dataclass(frozen=True, eq=False)
+class RoomEvidence:
+    """How sure the rooms of one map are.
+
+    Attributes
+    ----------
+    outline_wall_share : (R,) float
+        Share of each room's outline, with its predicted part, that occupied cells back; NaN for a room
+        without outline. Doorways are not backed, so an ordinary room stays a little below 1.
+    frontier_m : (R,) float
+        Length of each room's open frontier: cell sides between its free cells and unknown ones, metres.
+    """
+
+    outline_wall_share: FloatArray
+    frontier_m: FloatArray
+
+
+def room_evidence(
+    snapshot: OccupancySnapshot, rooms: RoomMap, parameters: OccupancyParameters
+) -> RoomEvidence:
+    """Measure how far the outlines of rooms are backed by walls, and their open frontier.
+
+    Parameters
+    ----------
+    snapshot : OccupancySnapshot
+        The map.
+    rooms : RoomMap
+        The rooms found in it, on its grid.
+    parameters : OccupancyParameters
+        Which cells are walls.
+    """
+    return RoomEvidence(_wall_shares(snapshot, rooms, parameters), _frontiers(snapshot, rooms))
+
+
+def _wall_shares(snapshot: OccupancySnapshot, rooms: RoomMap, parameters: OccupancyParameters) -> FloatArray:
+    explored = ExploredPart.of(snapshot.cells, snapshot.geometry, parameters)
+    near = _within(explored.occupied, WALL_REACH_M / explored.resolution_m)
+    corner = np.array([explored.window[1].start, explored.window[0].start]) * snapshot.geometry.resolution_m
+    x, y = snapshot.geometry.grid_to_world(corner).tolist()
+    grid = GridGeometry(
+        explored.resolution_m, (x, y), snapshot.geometry.yaw_rad, snapshot.geometry.frame_id, near.shape
+    )
+    shares = np.full(len(rooms), np.nan)
+    for number, polygon in enumerate(rooms.polygons):
+        outline = polygon.boundary
+        if outline.is_empty:
+            continue
+        distances = np.arange(0.0, outline.length, OUTLINE_STEP_M)
+        points = shapely.get_coordinates(shapely.line_interpolate_point(outline, distances))
+        row, column = np.moveaxis(grid.world_to_cell(points), -1, 0)
+        inside = (row >= 0) & (row < near.shape[0]) & (column >= 0) & (column < near.shape[1])
+        shares[number] = np.count_nonzero(near[row[inside], column[inside]]) / len(points)
+    return shares
+
+
+def _within(mask: BoolArray, reach_cells: float) -> BoolArray:
+    """Cells no further from one of a mask (H, W) than a number of cells."""
+    import cv2
+
+    distance = cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
+    return np.asarray(distance <= reach_cells)
+
+
+def _frontiers(snapshot: OccupancySnapshot, rooms: RoomMap) -> FloatArray:
+    """Length (R,) in metres of the sides that cells of each room share with unknown ones."""
+    known = known_window(rooms.labels > 0)
+    # What lies beyond the canvas is not known to be unknown, so only neighbours on it count.
+    window = tuple(slice(max(part.start - 1, 0), part.stop + 1) for part in known)
+    labels, unknown = rooms.labels[window], snapshot.cells[window] == UNKNOWN
+    sides = np.zeros(len(rooms) + 1, np.int64)
+    for here, beside in (
+        ((slice(1, None), slice(None)), (slice(None, -1), slice(None))),
+        ((slice(None), slice(1, None)), (slice(None), slice(None, -1))),
+    ):
+        for one, other in ((here, beside), (beside, here)):
+            open_to = labels[one][unknown[other]]
+            sides += np.bincount(open_to, minlength=len(sides))
+    return sides[1:].astype(np.float64) * snapshot.geometry.resolution_m

@@ -1,0 +1,84 @@
+"""How far outlines are walls, and how much of a room is open: counted on drawn maps."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+import shapely
+from drawn_maps import office, snapshot
+from drawn_rooms import rows
+
+from rose2_logs.occupancy import OccupancySnapshot
+from rose2_logs.parameters import OccupancyParameters
+from rose2_logs.room_evidence import RoomEvidence, room_evidence
+from rose2_logs.rooms import RoomMap
+
+PARAMETERS = OccupancyParameters()
+
+
+def rooms_with(map_: OccupancySnapshot, labels: np.ndarray, *polygons: shapely.Polygon) -> RoomMap:
+    return dataclasses.replace(RoomMap.from_labels(labels, map_.geometry), polygons=polygons)
+
+
+def frontiers(labels: np.ndarray, cells: np.ndarray, resolution_m: float = 1.0) -> list[float]:
+    map_ = snapshot(cells, resolution_m)
+    return room_evidence(map_, RoomMap.from_labels(labels, map_.geometry), PARAMETERS).frontier_m.tolist()
+
+
+def test_a_frontier_is_counted_in_cell_sides():
+    """Sides towards unknown cells count; those towards walls, other rooms and the canvas' end do not."""
+    labels = rows("112", "112")
+    cells = np.array([[0, 0, 0], [0, 0, 0]])
+    assert frontiers(labels, cells) == [0, 0]
+    unknown_beside = np.pad(cells, ((0, 1), (1, 1)), constant_values=-1)
+    grown = np.pad(labels, ((0, 1), (1, 1)))
+    assert frontiers(grown, unknown_beside) == [4, 3]
+    unknown_beside[2] = 100
+    assert frontiers(grown, unknown_beside, 0.5) == [1, 1]
+
+
+def test_an_unknown_hole_is_a_frontier_too():
+    """One unseen cell within a room has four sides."""
+    labels, cells = rows("111", "1.1", "111"), np.zeros((3, 3), int)
+    cells[1, 1] = -1
+    assert frontiers(labels, cells) == [4]
+
+
+@pytest.mark.parametrize("turn_deg", [0, 33])
+def test_outlines_along_walls_are_backed_and_others_are_not(turn_deg: int):
+    """A room's outline is wall but for its door; the same room drawn two metres off has hardly any."""
+    turn = float(np.deg2rad(turn_deg))
+    cells, labels = office(turn_rad=turn)
+    map_ = snapshot(cells, origin_xy_m=(3.0, -7.0))
+    centre = map_.geometry.corners_m().mean(axis=0)
+
+    def box(x0: float, y0: float, x1: float, y1: float) -> shapely.Polygon:
+        plain = shapely.affinity.translate(shapely.box(x0, y0, x1, y1), -5.0, -3.0)
+        turned = shapely.affinity.rotate(plain, turn, origin=(0, 0), use_radians=True)
+        return shapely.affinity.translate(turned, *centre)
+
+    right, off, nothing = box(0, 2, 5, 6), box(2, 3.5, 4.2, 5.2), shapely.Polygon()
+    found = room_evidence(map_, rooms_with(map_, labels, right, off, nothing), PARAMETERS)
+    outline = 2 * (5 + 4)
+    assert found.outline_wall_share[0] == pytest.approx((outline - 0.5) / outline, abs=0.03)
+    assert found.outline_wall_share[1] < 0.1
+    assert np.isnan(found.outline_wall_share[2])
+
+
+def test_an_outline_beyond_the_map_is_not_backed():
+    """Predicted parts outside the canvas count as unseen; half of this outline lies there."""
+    cells = np.full((20, 20), 100)
+    map_ = snapshot(cells)
+    labels = np.ones((20, 20), np.int32)
+    found = room_evidence(map_, rooms_with(map_, labels, shapely.box(-0.5, 0.3, 0.5, 0.7)), PARAMETERS)
+    assert found.outline_wall_share[0] == pytest.approx(0.5, abs=0.05)
+
+
+def test_a_map_without_rooms_has_no_evidence():
+    """Empty arrays, no error."""
+    map_ = snapshot(np.full((5, 5), -1))
+    found = room_evidence(map_, RoomMap.from_labels(np.zeros((5, 5), np.int32), map_.geometry), PARAMETERS)
+    assert isinstance(found, RoomEvidence)
+    assert len(found.outline_wall_share) == len(found.frontier_m) == 0

@@ -1,0 +1,175 @@
+"""Change of the layout from map to map, and what the last map tells of the ones before: counted by hand."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+import shapely
+from drawn_rooms import drawn, rows
+
+from rose2_logs.parameters import TrackingParameters
+from rose2_logs.rooms import RoomMap
+from rose2_logs.tracking.alignment import RigidMotion
+from rose2_logs.tracking.frames import TrackedSnapshot
+from rose2_logs.tracking.hindsight import Hindsight, RoomRows, look_back
+from rose2_logs.tracking.layout_change import LayoutFollower, variation_of_information
+from rose2_logs.tracking.lives import Moment, RoomLives
+from rose2_logs.tracking.tracker import RoomTracker
+
+MOTION = RigidMotion((4.0, -1.0), (0.5, 0.25), math.radians(20))
+
+
+def changes(*maps) -> list[tuple[float | None, float | None]]:
+    """Variation of information and changed share of each map; a map is labels and track ids."""
+    follower = LayoutFollower()
+    found = []
+    for labels, track_ids in maps:
+        _, analysis = drawn(labels)
+        change = follower.update(analysis.rooms, track_ids, None)
+        found.append((change.variation_bits, change.changed_share))
+    return found
+
+
+def test_the_same_rooms_have_no_variation_whatever_their_numbers():
+    """Labels do not matter; tracks matter for the changed share alone."""
+    first, again, other = changes((rows("1122"), (1, 2)), (rows("2211"), (2, 1)), (rows("1122"), (1, 3)))
+    assert first == (None, None)
+    assert again == (0.0, 0.0)
+    assert other == (0.0, 0.5)
+
+
+def test_a_room_cut_in_halves_varies_by_one_bit():
+    """Half of its floor is in another track then; floor that is new does not count."""
+    _, halves = changes((rows("1111...."), (1,)), (rows("11223333"), (1, 2, 3)))
+    assert halves == pytest.approx((1.0, 0.5))
+    _, thirds = changes((rows("111..."), (1,)), (rows("112..."), (1, 2)))
+    assert thirds == pytest.approx((math.log2(3) - 2 / 3, 1 / 3))
+
+
+def test_two_divisions_across_each_other_vary_by_both():
+    """Four equal parts: a bit in each direction, and the same the other way round."""
+    common = np.array([[1.0, 1.0], [1.0, 1.0]])
+    assert variation_of_information(common) == pytest.approx(2.0)
+    uneven = np.array([[3.0, 1.0, 0.0], [0.0, 2.0, 5.0]])
+    assert variation_of_information(uneven) == pytest.approx(variation_of_information(uneven.T))
+
+
+def test_rooms_are_compared_where_the_map_moved_to():
+    """A map that moves as a whole changes nothing, and the motions add up."""
+    labels = rows("1122", "1122", "3322")
+    rooms = [drawn(labels)[1].rooms]
+    for _ in range(2):
+        moved = MOTION.grid(rooms[-1].geometry)
+        rooms.append(RoomMap.from_labels(labels, moved))
+    follower = LayoutFollower()
+    follower.update(rooms[0], (1, 2, 3), None)
+    found = [follower.update(later, (1, 2, 3), MOTION) for later in rooms[1:]]
+    assert [change.changed_share for change in found] == [0.0, 0.0]
+    corner = rooms[-1].geometry
+    assert found[-1].drift.pose == pytest.approx((*corner.origin_xy_m, corner.yaw_rad))
+
+
+def test_a_motion_and_its_inverse_leave_everything_where_it_is():
+    """One after the other, in either order."""
+    points = np.array([[0.0, 0.0], [3.0, -2.0]])
+    for both in (MOTION.then(MOTION.inverse()), MOTION.inverse().then(MOTION)):
+        assert both.points(points) == pytest.approx(points)
+        assert both.turn_rad == pytest.approx(0)
+    twice = MOTION.then(MOTION)
+    assert twice.points(points) == pytest.approx(MOTION.points(MOTION.points(points)))
+
+
+def lived(*labels: np.ndarray) -> tuple[RoomLives, list[RoomRows], dict[int, Moment]]:
+    """Lives of the rooms of a run, its rooms as rows, and its maps; coverage is a tenth a map."""
+    lives, tracker, all_rows, moments = RoomLives(), RoomTracker(TrackingParameters()), [], {}
+    for index, map_ in enumerate(labels):
+        snapshot, analysis = drawn(map_, index)
+        ids, events = tracker.update(snapshot, analysis)
+        frame = TrackedSnapshot(snapshot, analysis, (index + 1) / 10, ids, events)
+        lives.add(frame)
+        moments[index] = lives.moment(frame)
+        polygons = np.array(analysis.rooms.polygons, object)
+        all_rows.append(RoomRows(np.full(len(ids), index), np.array(ids), analysis.rooms.areas_m2, polygons))
+    return lives, all_rows, moments
+
+
+def looked_back(*labels: np.ndarray) -> tuple[RoomLives, Hindsight]:
+    lives, all_rows, moments = lived(*labels)
+    return lives, look_back(all_rows, lives, moments, dict.fromkeys(moments, RigidMotion.none()))
+
+
+GROWING = (
+    rows("1111......"),
+    rows("1111111..."),
+    rows("1111111112"),
+    rows("111111111."),
+    rows("1111111112"),
+)
+"""A room of 9 cells in the end, seen to 4, 7, 9, and one of 1 that comes, goes, and comes back."""
+
+
+def test_a_life_is_gathered_map_by_map():
+    """First and last map, number of maps, last area, losses."""
+    lives, _ = looked_back(*GROWING)
+    one, two = lives.lives[1], lives.lives[2]
+    assert (one.first.snapshot, one.last.snapshot, one.maps, one.area_m2) == (0, 4, 5, 9.0)
+    assert (two.first, two.last) == (Moment(2, 2.0, 0.3), Moment(4, 4.0, 0.5))
+    assert (two.maps, two.losses) == (2, 1)
+    assert lives.in_last_map == (1, 2)
+
+
+def test_since_when_a_room_was_right():
+    """Area within a tenth of the last, shape within 0.8 of it: the growing room from its third map on."""
+    _, found = looked_back(*GROWING)
+    assert {track: moment.snapshot for track, moment in found.area_settled.items()} == {1: 2, 2: 2}
+    assert {track: moment.snapshot for track, moment in found.shape_right.items()} == {1: 2, 2: 2}
+    assert found.shape_right_seen == {1: 1.0, 2: 1.0}
+
+
+def test_an_area_that_changes_again_has_not_settled():
+    """Right, wrong, right: it settled the second time; its shape was right the first time."""
+    full, half = rows("1111111111"), rows("1111......")
+    _, found = looked_back(full, half, full)
+    assert found.area_settled[1].snapshot == 2
+    assert found.shape_right[1].snapshot == 0
+
+
+def test_a_prediction_is_right_before_the_room_is_seen():
+    """The shape counts with its predicted part; how much was seen is told."""
+    lives, all_rows, moments = lived(rows("1111......"), rows("1111111111"))
+    all_rows[0].polygons[0] = shapely.box(0, 0, 9, 1)
+    found = look_back(all_rows, lives, moments, dict.fromkeys(moments, RigidMotion.none()))
+    assert found.shape_right[1].snapshot == 0
+    assert found.shape_right_seen[1] == pytest.approx(0.4)
+
+
+def test_how_far_a_layout_was_the_last_one():
+    """Weighted by the last rooms' area; final from the first map after which it stays so."""
+    _, found = looked_back(*GROWING)
+    assert found.final_iou == pytest.approx({0: 0.4, 1: 0.7, 2: 1.0, 3: 0.9, 4: 1.0})
+    assert found.final_share == pytest.approx({0: 0.0, 1: 0.0, 2: 1.0, 3: 0.9, 4: 1.0})
+    assert found.layout_final is not None
+    assert found.layout_final.snapshot == 2
+
+
+def test_a_last_map_without_rooms_has_no_layout():
+    """There is nothing to compare with."""
+    _, found = looked_back(rows("11"), rows(".."))
+    assert found.final_iou == {0: None, 1: None}
+    assert found.layout_final is None
+
+
+def test_shapes_are_compared_where_the_last_map_has_them():
+    """A room that moved with the whole map was right from the beginning."""
+    lives, all_rows, moments = lived(rows("1111", "1111"), rows("1111", "1111"))
+    moved = shapely.transform(all_rows[1].polygons, MOTION.points)
+    lives.lives[1] = dataclasses.replace(lives.lives[1], polygon=moved[0])
+    all_rows[1] = dataclasses.replace(all_rows[1], polygons=moved)
+    drifts = {0: RigidMotion.none(), 1: RigidMotion.none().then(MOTION)}
+    assert look_back(all_rows, lives, moments, drifts).final_iou == pytest.approx({0: 1.0, 1: 1.0})
+    unmoved = look_back(all_rows, lives, moments, dict.fromkeys(moments, RigidMotion.none()))
+    assert unmoved.final_iou[0] is not None
+    assert unmoved.final_iou[0] < 0.8
