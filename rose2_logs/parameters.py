@@ -14,33 +14,30 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from rose2_logs.baseline_parameters import (
+    DistanceParameters,
+    MorphologicalParameters,
+    VoronoiBaselineParameters,
+    VoronoiMergeParameters,
+)
 from rose2_logs.errors import ParameterError
-
-
-def _number(default: float, unit: str, why: str, low: float = 0.0, high: float = math.inf) -> Any:
-    """Declare a numeric parameter: its default, unit, the sentence that says where it comes from, bounds."""
-    return field(default=default, metadata={"unit": unit, "why": why, "low": low, "high": high})
-
-
-def _choice(default: str, choices: tuple[str, ...], why: str) -> Any:
-    """Declare a parameter that takes one of a few names."""
-    return field(default=default, metadata={"unit": "name", "why": why, "choices": choices})
+from rose2_logs.parameter_fields import choice, number
 
 
 @dataclass(frozen=True)
 class OccupancyParameters:
     """Which cells count as occupied and which as free."""
 
-    occupied_min_percent: float = _number(
+    occupied_min_percent: float = number(
         65.0, "%", "Cells above are occupied; map_server's default occupied_thresh.", 0, 100
     )
-    free_max_percent: float = _number(
+    free_max_percent: float = number(
         19.6, "%", "Known cells below are free; map_server's default free_thresh.", 0, 100
     )
-    working_resolution_m: float = _number(
+    working_resolution_m: float = number(
         0.05, "m", "Finer maps are analysed in blocks up to this size: SLAM's usual cell.", 0.0
     )
-    analysed_max_cells: int = _number(
+    analysed_max_cells: int = number(
         20_000_000, "cells", "Explored parts with more are analysed in blocks; 220 m squared at 5 cm.", 10_000
     )
 
@@ -53,47 +50,45 @@ class OccupancyParameters:
 class SpectrumParameters:
     """Stage A: dominant directions, structure score, clean map (paper, III-A)."""
 
-    wall_sigma_m: float = _number(0.06, "m", "Walls in SLAM maps wobble by about one cell of 5 cm.", 0.001)
-    longest_wave_m: float = _number(
-        10.0, "m", "Longer waves show the building's outline, not its walls.", 0.1
-    )
-    shortest_wave_m: float = _number(0.25, "m", "Shorter waves show the raster (five cells of 5 cm).", 0.001)
-    angle_step_rad: float = _number(
+    wall_sigma_m: float = number(0.06, "m", "Walls in SLAM maps wobble by about one cell of 5 cm.", 0.001)
+    longest_wave_m: float = number(10.0, "m", "Longer waves show the building's outline, not its walls.", 0.1)
+    shortest_wave_m: float = number(0.25, "m", "Shorter waves show the raster (five cells of 5 cm).", 0.001)
+    angle_step_rad: float = number(
         math.radians(0.25), "rad", "A wall of 10 m leaves its line by less than a cell.", 1e-4, 0.2
     )
-    angle_sigma_rad: float = _number(
+    angle_sigma_rad: float = number(
         math.radians(0.75), "rad", "Smoothing of the angular energy, three bins.", 0.0, 0.2
     )
-    peak_min_prominence: float = _number(
+    peak_min_prominence: float = number(
         0.12,
         "share of the range",
         "A direction's peak stands out by this much: one wing of a building.",
         0,
         1,
     )
-    direction_min_gap_rad: float = _number(
+    direction_min_gap_rad: float = number(
         math.radians(5.0), "rad", "Directions closer than this are one.", 0.0, 1.5
     )
-    structure_length_m: float = _number(
+    structure_length_m: float = number(
         4.0,
         "m",
         "Length of wall over which a cell gathers its score: a room's side, more than furniture.",
         0.01,
     )
-    piece_max_gap_m: float = _number(0.25, "m", "Occupied cells hang together over gaps of five cells.", 0.0)
-    piece_min_extent_m: float = _number(
+    piece_max_gap_m: float = number(0.25, "m", "Occupied cells hang together over gaps of five cells.", 0.0)
+    piece_min_extent_m: float = number(
         1.6, "m", "Pieces longer than a door is wide may be walls by themselves.", 0.0
     )
-    piece_min_score: float = _number(
+    piece_min_score: float = number(
         0.5, "score", "Shorter pieces are walls where this share of the line through them is wall.", 0, 1
     )
-    threshold_min: float = _number(0.25, "score", "Least threshold of the clean map that is tried.", 0, 1)
-    threshold_max: float = _number(0.85, "score", "Greatest threshold of the clean map that is tried.", 0, 1)
-    threshold_step: float = _number(0.05, "score", "Step of the search for the threshold.", 0.001, 1)
-    attached_share: float = _number(
+    threshold_min: float = number(0.25, "score", "Least threshold of the clean map that is tried.", 0, 1)
+    threshold_max: float = number(0.85, "score", "Greatest threshold of the clean map that is tried.", 0, 1)
+    threshold_step: float = number(0.05, "score", "Step of the search for the threshold.", 0.001, 1)
+    attached_share: float = number(
         0.5, "share", "Cells of this share of the threshold that touch the clean map are wall too.", 0, 1
     )
-    walls_max_per_m2: float = _number(
+    walls_max_per_m2: float = number(
         0.15, "1/m2", "Wall clusters per free area of a clean map; empty floor plans have about 0.1.", 0.0
     )
 
@@ -102,195 +97,122 @@ class SpectrumParameters:
 class WallParameters:
     """Stage B: segments, wall clusters, representative lines (paper, III-B)."""
 
-    segment_min_length_m: float = _number(0.4, "m", "Shortest segment: a wall beside a door.", 0.01)
-    segment_max_gap_m: float = _number(0.25, "m", "Gap bridged within a segment; the paper's 5 cells.", 0.0)
-    segment_min_fill: float = _number(
+    segment_min_length_m: float = number(0.4, "m", "Shortest segment: a wall beside a door.", 0.01)
+    segment_max_gap_m: float = number(0.25, "m", "Gap bridged within a segment; the paper's 5 cells.", 0.0)
+    segment_min_fill: float = number(
         0.6, "share", "Least share of a segment that cells cover: more than half is wall.", 0, 1
     )
-    direction_tolerance_rad: float = _number(
+    direction_tolerance_rad: float = number(
         math.radians(6.0), "rad", "A segment this near to a dominant direction follows it.", 0.0, 0.8
     )
-    local_direction_step_rad: float = _number(
+    local_direction_step_rad: float = number(
         math.pi / 36, "rad", "Curved walls are approximated by chords every 5 degrees.", 0.02, 0.8
     )
-    cluster_lateral_m: float = _number(0.15, "m", "Offset within one wall cluster: a wall's thickness.", 0.01)
-    cluster_gap_m: float = _number(0.6, "m", "Gap along one wall cluster: furniture before a wall.", 0.01)
-    local_segment_min_length_m: float = _number(
+    cluster_lateral_m: float = number(0.15, "m", "Offset within one wall cluster: a wall's thickness.", 0.01)
+    cluster_gap_m: float = number(0.6, "m", "Gap along one wall cluster: furniture before a wall.", 0.01)
+    local_segment_min_length_m: float = number(
         1.2, "m", "Off the dominant directions only walls longer than most furniture count.", 0.01
     )
-    line_lateral_m: float = _number(0.2, "m", "Both faces of one wall share a representative line.", 0.0)
-    extension_m: float = _number(
+    line_lateral_m: float = number(0.2, "m", "Both faces of one wall share a representative line.", 0.0)
+    extension_m: float = number(
         8.0, "m", "A wall may go on unseen for a room's width beyond its evidence.", 0.0
     )
-    local_extension_m: float = _number(1.0, "m", "A chord of a curved wall reaches to the next chord.", 0.0)
-    extension_per_length: float = _number(
-        4.0, "1", "A short wall reaches not further than this times itself."
-    )
-    line_min_weight: float = _number(0.1, "share", "Least covered share of a line; the paper's value.", 0, 1)
+    local_extension_m: float = number(1.0, "m", "A chord of a curved wall reaches to the next chord.", 0.0)
+    extension_per_length: float = number(4.0, "1", "A short wall reaches not further than this times itself.")
+    line_min_weight: float = number(0.1, "share", "Least covered share of a line; the paper's value.", 0, 1)
 
 
 @dataclass(frozen=True)
 class FloorPlanParameters:
     """Stage C: edge weights, faces, rooms (paper, III-C)."""
 
-    wall_tolerance_m: float = _number(
+    wall_tolerance_m: float = number(
         0.15, "m", "A wall counts for an edge when it lies this near: a wall's half thickness and drift.", 0.0
     )
-    face_min_seen: float = _number(
+    face_min_seen: float = number(
         0.1, "share", "A face less seen than this is outside: it holds rays through windows.", 0, 1
     )
-    shape_min_seen: float = _number(
+    shape_min_seen: float = number(
         0.2, "share", "A face seen this much belongs to its room's predicted shape; the paper's value.", 0, 1
     )
-    grouping: str = _choice(
+    grouping: str = choice(
         "agglomerative",
         ("agglomerative", "dbscan"),
         "How faces are joined to rooms: by whole borders, or pair by pair with DBSCAN as in the paper.",
     )
-    dbscan_max_weight: float = _number(
+    dbscan_max_weight: float = number(
         0.24, "share", "DBSCAN joins faces with edges up to this weight: exp(-w / 0.125) = 0.15.", 0, 1
     )
-    join_min_openness: float = _number(
+    join_min_openness: float = number(
         0.7, "share", "Faces join when at least this share of their known border is open.", 0, 1
     )
-    join_min_open_m: float = _number(
-        0.15, "m", "Least open border for faces to join: three cells of 5 cm.", 0
-    )
-    join_min_passage: float = _number(
+    join_min_open_m: float = number(0.15, "m", "Least open border for faces to join: three cells of 5 cm.", 0)
+    join_min_passage: float = number(
         0.7, "1", "Faces join when the passage is this wide against the narrower one's width.", 0
     )
-    passage_look_widths: float = _number(
+    passage_look_widths: float = number(
         2.0, "1", "How far from a passage its width is compared with the room's, in widths.", 0.0
     )
-    passage_look_max_m: float = _number(3.0, "m", "The same at most: half a large room.", 0.0)
-    doorway_max_width_m: float = _number(
+    passage_look_max_m: float = number(3.0, "m", "The same at most: half a large room.", 0.0)
+    doorway_max_width_m: float = number(
         2.0, "m", "A gap in a wall up to this width is a doorway: a double door.", 0.0
     )
-    jamb_length_m: float = _number(0.5, "m", "Wall beside a gap that makes it one: a jamb.", 0.01)
-    jamb_min_fill: float = _number(0.6, "share", "Least share of a jamb that walls cover.", 0, 1)
-    leak_max_width_m: float = _number(
+    jamb_length_m: float = number(0.5, "m", "Wall beside a gap that makes it one: a jamb.", 0.01)
+    jamb_min_fill: float = number(0.6, "share", "Least share of a jamb that walls cover.", 0, 1)
+    leak_max_width_m: float = number(
         0.5, "m", "Free space outside rooms that is narrower is rays; wider it is part of a room.", 0.0
     )
-    border_strip_m: float = _number(
+    border_strip_m: float = number(
         0.25, "m", "Strips of a room narrower than this, along a wall's other side, change room.", 0.0
     )
-    room_min_area_m2: float = _number(3.0, "m2", "Smaller pieces of free space are no rooms.", 0.0)
-    room_min_clearance_m: float = _number(0.6, "m", "Half the width of the narrowest room.", 0.0)
+    room_min_area_m2: float = number(3.0, "m2", "Smaller pieces of free space are no rooms.", 0.0)
+    room_min_clearance_m: float = number(0.6, "m", "Half the width of the narrowest room.", 0.0)
 
 
 @dataclass(frozen=True)
 class TopologyParameters:
     """Stage D: Voronoi graph, splitting of rooms, doorways (paper, III-D)."""
 
-    summit_reach_m: float = _number(
+    summit_reach_m: float = number(
         0.15, "m", "A summit of the clearance is the highest this far around: a wall's thickness.", 0.0
     )
-    passage_min_ratio: float = _number(
+    passage_min_ratio: float = number(
         0.2, "share", "A passage joins with this share of the clearance beside it; gaps have less.", 0, 1
     )
-    split_min_clearance_m: float = _number(
+    split_min_clearance_m: float = number(
         0.5, "m", "Parts narrower on both sides of their middle are niches.", 0.0
     )
-    split_min_area_m2: float = _number(3.0, "m2", "Smaller parts are niches: the least room.", 0.0)
-    split_min_purity: float = _number(
-        0.98, "share", "A cut leaves this share of each part on its side.", 0, 1
-    )
-    max_rounds: int = _number(5, "1", "Rounds of splitting; the paper's implementation has five.", 0, 100)
-    doorway_min_width_m: float = _number(0.3, "m", "Narrower contacts of two rooms are noise.", 0.0)
-
-
-@dataclass(frozen=True)
-class MorphologicalParameters:
-    """Baseline: morphological segmentation (survey of Bormann et al., ICRA 2016)."""
-
-    room_min_area_m2: float = _number(0.8, "m2", "A part that erosion leaves is a room above; the survey's.")
-    room_max_area_m2: float = _number(47.0, "m2", "And below this area; the survey's value.")
-    max_rounds: int = _number(73, "rounds", "Rounds of erosion, one cell each; the survey's value.", 0, 10**5)
-
-
-@dataclass(frozen=True)
-class DistanceParameters:
-    """Baseline: distance transform segmentation (survey of Bormann et al., ICRA 2016)."""
-
-    room_min_area_m2: float = _number(0.35, "m2", "Least area of a room's seed; the survey's value.")
-    room_max_area_m2: float = _number(163.0, "m2", "Greatest area of a room's seed; the survey's value.")
-
-
-@dataclass(frozen=True)
-class VoronoiBaselineParameters:
-    """Baseline: Voronoi segmentation (survey of Bormann et al., ICRA 2016)."""
-
-    room_min_area_m2: float = _number(0.1, "m2", "Least area of a piece between cuts; the survey's value.")
-    room_max_area_m2: float = _number(1e6, "m2", "Greatest area of a piece; the survey's value: any.")
-    clear_rounds: int = _number(2, "rounds", "The graph keeps this many cells clear of obstacles.", 0, 100)
-    prune_passes: int = _number(100, "passes", "Loose ends of the graph shorter than this go.", 0, 10**5)
-    neighbourhood_cells2: float = _number(
-        280.0, "cells^2", "Cells of a neighbourhood times the distance from obstacles; the survey's value.", 1
-    )
-    neighbourhood_max_rounds: int = _number(
-        150, "rounds", "Most steps from a neighbourhood's centre; the survey's value.", 0, 10**5
-    )
-    critical_min_gap: float = _number(
-        0.5, "1", "Closer critical points, by their distance from obstacles, compete; the survey's value."
-    )
-
-
-@dataclass(frozen=True)
-class VoronoiMergeParameters:
-    """Baseline: which pieces the Voronoi segmentation joins; the values are those of the survey's program.
-
-    Borders and walls are shares of a perimeter.
-    """
-
-    dead_end_max_area_m2: float = _number(
-        12.5, "m2", "Area of a room with one neighbour; the survey's value."
-    )
-    dead_end_max_wall: float = _number(0.75, "share", "Wall of a room with one neighbour.", 0, 1)
-    small_max_area_m2: float = _number(2.0, "m2", "Area of a small room.")
-    small_min_border: float = _number(0.2, "share", "Border of a small room with its target.", 0, 1)
-    small_target_max_wall: float = _number(0.8, "share", "Wall of a small room's target.", 0, 1)
-    niche_min_cover: float = _number(0.98, "share", "Wall and border of a niche: it has no other side.", 0, 1)
-    niche_min_wall: float = _number(0.5, "share", "Wall of a niche.", 0, 1)
-    niche_min_border: float = _number(0.15, "share", "Border of a niche with its target.", 0, 1)
-    niche_target_min_cover: float = _number(
-        0.95, "share", "Wall and two longest borders of a niche's target with more than two neighbours.", 0, 1
-    )
-    open_min_border: float = _number(0.2, "share", "Border of a room that is open to its target.", 0, 1)
-    half_open_min_border: float = _number(0.1, "share", "The same where walls fit a corridor's piece.", 0, 1)
-    half_open_wall: float = _number(
-        0.95, "share", "Wall and twice the border of a corridor's piece, at least.", 0, 1
-    )
-    open_min_border_back: float = _number(0.1, "share", "The same border in the target's perimeter.", 0, 1)
-    wide_min_border: float = _number(0.4, "share", "Border with which any room is joined.", 0, 1)
+    split_min_area_m2: float = number(3.0, "m2", "Smaller parts are niches: the least room.", 0.0)
+    split_min_purity: float = number(0.98, "share", "A cut leaves this share of each part on its side.", 0, 1)
+    max_rounds: int = number(5, "1", "Rounds of splitting; the paper's implementation has five.", 0, 100)
+    doorway_min_width_m: float = number(0.3, "m", "Narrower contacts of two rooms are noise.", 0.0)
 
 
 @dataclass(frozen=True)
 class TrackingParameters:
     """Identity of rooms over the snapshots of a run."""
 
-    match_min_iou: float = _number(
+    match_min_iou: float = number(
         0.2, "share", "Least overlap for a room to continue a track; half-seen rooms double in size.", 0, 1
     )
-    part_min_share: float = _number(
+    part_min_share: float = number(
         0.5, "share", "A room is part of another when most of it lies in it: never of two at once.", 0, 1
     )
-    shapes_kept: int = _number(
+    shapes_kept: int = number(
         3, "shapes", "Shapes by which a track is known: whole, part, and as it was seen before.", 1
     )
-    shape_same_iou: float = _number(0.8, "share", "A shape like one in memory by this takes its place.", 0, 1)
-    lost_kept: int = _number(
+    shape_same_iou: float = number(0.8, "share", "A shape like one in memory by this takes its place.", 0, 1)
+    lost_kept: int = number(
         500, "tracks", "Lost rooms that may return; some kilobytes each, the longest lost go first."
     )
-    shift_min_m: float = _number(
+    shift_min_m: float = number(
         0.1, "m", "The whole map moved when its walls did by this on average: two cells of 5 cm.", 0.0
     )
-    shift_search_m: float = _number(
+    shift_search_m: float = number(
         2.0, "m", "How far the whole map may leap in a loop closure and still be laid over itself.", 0.0, 50
     )
-    shift_search_rad: float = _number(
-        math.radians(5.0), "rad", "How far it may turn, likewise.", 0.0, math.pi
-    )
-    shift_min_share: float = _number(
+    shift_search_rad: float = number(math.radians(5.0), "rad", "How far it may turn, likewise.", 0.0, math.pi)
+    shift_min_share: float = number(
         0.5, "share", "A motion of the map is believed when it brings most of its walls together.", 0, 1
     )
 

@@ -13,6 +13,8 @@ ORDER = (
     "__init__",
     "errors",
     "workers",
+    "parameter_fields",
+    "baseline_parameters",
     "parameters",
     "occupancy",
     "explored",

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from rose2_logs.baseline_parameters import DistanceParameters
 from rose2_logs.baselines.growing import grow
 from rose2_logs.baselines.regions import connected_parts, eroded, obstacle_distance
 from rose2_logs.occupancy import BoolArray
-from rose2_logs.parameters import DistanceParameters
 
 
 def segment_distance(

@@ -7,8 +7,8 @@ import heapq
 import numpy as np
 from numpy.typing import NDArray
 
+from rose2_logs.baseline_parameters import VoronoiMergeParameters
 from rose2_logs.baselines.regions import ranks_by_size
-from rose2_logs.parameters import VoronoiMergeParameters
 
 WALL = 0
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from rose2_logs.baseline_parameters import VoronoiBaselineParameters, VoronoiMergeParameters
 from rose2_logs.baselines.critical_lines import best_lines, critical_lines
 from rose2_logs.baselines.growing import grow
 from rose2_logs.baselines.merging import merge_rooms
 from rose2_logs.baselines.regions import connected_parts, middle_of, obstacle_distance
 from rose2_logs.baselines.voronoi_graph import boundary_cells, narrowest_cells, voronoi_cells
 from rose2_logs.occupancy import BoolArray
-from rose2_logs.parameters import VoronoiBaselineParameters, VoronoiMergeParameters
 
 
 def segment_voronoi(
