@@ -17,6 +17,8 @@ from saved_maps import save_run
 from rose2_logs.errors import OutputError
 from rose2_logs.readers import Selection
 from rose2_logs.run import RunOptions, analyse_log
+from rose2_logs.tracking.alignment import RigidMotion
+from rose2_logs.tracking.frames import MAP_TRACK, RoomEvent
 
 PROJECT = Path(__file__).parents[2]
 BIN = Path(sys.executable).parent
@@ -162,3 +164,11 @@ def test_live_without_a_viewer_or_a_screen_says_what_to_do(tmp_path, monkeypatch
     with pytest.raises(OutputError, match="no Rerun viewer is open"):
         analyse_log(PROJECT / "sample_logs" / "office.mcap", tmp_path / "out", options)
     assert not list((tmp_path / "out").glob("*.rrd"))
+
+
+def test_a_shift_of_the_map_is_told_in_metres_and_degrees():
+    from rose2_logs.sinks.rerun_recording import event_text
+
+    motion = RigidMotion((3.0, 4.0), (0.204, -0.05), np.deg2rad(1.2))
+    text = event_text(RoomEvent("shifted", 5, MAP_TRACK, motion=motion))
+    assert text == "the map shifted by +0.20, -0.05 m and turned by +1.2°"
