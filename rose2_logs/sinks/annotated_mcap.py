@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import json
+from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager
-from itertools import chain
 from pathlib import Path
 from types import TracebackType
 from typing import IO, Self
@@ -90,6 +90,8 @@ class AnnotatedMcap:
         self._schemas: dict[int | tuple[str, str, bytes], int] = {}
         self._items = log.messages()
         self._waiting: CopiedMessage | CopiedChunk | None = None
+        # The messages of a chunk that was taken apart; they come before all else.
+        self._opened: deque[CopiedMessage] = deque()
         self._maker = MessageMaker()
         self._sequence = 0
         map_metadata: dict[str, str] = {}
@@ -163,7 +165,7 @@ class AnnotatedMcap:
         """Copy what was logged up to a time; a chunk that goes on after it is taken apart."""
         while True:
             if self._waiting is None:
-                self._waiting = next(self._items, None)
+                self._waiting = self._opened.popleft() if self._opened else next(self._items, None)
             item = self._waiting
             if item is None or (time_ns is not None and item.log_time > time_ns):
                 return
@@ -176,7 +178,7 @@ class AnnotatedMcap:
                 self._writer.copy_chunk(item.stream, item.index)
             else:
                 try:
-                    self._items = chain(item.messages(), self._items)
+                    self._opened.extend(item.messages())
                 except DAMAGE:
                     # Nothing of it can be told apart any more; it stays what it is.
                     self._writer.copy_chunk(item.stream, item.index)
@@ -210,7 +212,7 @@ class AnnotatedMcap:
         schema = self._schema(kind, "ros2msg", self._maker.definition(kind))
         return self._writer.register_channel(topic, "cdr", schema, {"offered_qos_profiles": self._qos})
 
-    def _add(self, channel: int, time_ns: int, data: bytes) -> None:
+    def _add(self, channel: int, time_ns: int, data: bytearray) -> None:
         self._writer.add_message(channel, time_ns, data, time_ns, self._sequence)
 
     def _abandon(self) -> None:

@@ -58,9 +58,9 @@ class CdrWriter:
         """Append points (N, 2) as a sequence of geometry_msgs/Point, or of Point32 as single precision."""
         self.sequence(np.column_stack([xy_m, np.zeros(len(xy_m))]).astype(dtype))
 
-    def bytes(self) -> bytes:
-        """Return the message so far."""
-        return bytes(self._data)
+    def message(self) -> bytearray:
+        """Return the message, which is written no further."""
+        return self._data
 
     def _align(self, size: int) -> None:
         self._data += bytes(-(len(self._data) - len(ENCAPSULATION)) % size)

@@ -94,7 +94,12 @@ class McapWriter:
         return number
 
     def add_message(
-        self, channel_id: int, log_time: int, data: bytes | memoryview, publish_time: int, sequence: int
+        self,
+        channel_id: int,
+        log_time: int,
+        data: bytes | bytearray | memoryview,
+        publish_time: int,
+        sequence: int,
     ) -> None:
         """Add one message to the chunk in the making; log time and publish time in nanoseconds."""
         self._entries.setdefault(channel_id, []).append((log_time, len(self._records)))

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from rose2_logs.occupancy import FloatArray, GridGeometry, known_window
 from rose2_logs.sinks.palette import track_colour
+from rose2_logs.sinks.rerun_columns import Picture
 from rose2_logs.tracking.frames import TrackedSnapshot
 
 FILL_OPACITY = 0.6
@@ -42,11 +43,11 @@ class MapPictures:
         )
         self.corners_m = self._place.corners_m()
 
-    def map(self, height_m: float) -> rr.GridMap:
+    def map(self, height_m: float) -> Picture:
         """Draw the map as RViz does, at a height in the world."""
         return self._picture(self._cells, height_m, rr.components.Colormap.RvizMap)
 
-    def rooms(self, height_m: float) -> rr.GridMap:
+    def rooms(self, height_m: float) -> Picture:
         """Draw the map with each room in the colour of its track."""
         shades = _shades()
         colours = np.array([track_colour(track) for track in self._frame.track_ids], float).reshape(-1, 1, 3)
@@ -54,7 +55,7 @@ class MapPictures:
         labels = self._frame.analysis.rooms.labels[self._part]
         return self._picture(self._painted(labels, [shades, *painted]), height_m)
 
-    def clean_map(self, clean: NDArray[np.bool_], height_m: float) -> rr.GridMap:
+    def clean_map(self, clean: NDArray[np.bool_], height_m: float) -> Picture:
         """Draw the map faintly with the cells of a mask (H, W) over it."""
         faint = 255 - (255 - _shades()) / 4
         colours = [faint, np.full_like(faint, CLEAN_COLOUR)]
@@ -72,22 +73,9 @@ class MapPictures:
 
     def _picture(
         self, pixels: NDArray[np.uint8], height_m: float, colormap: rr.components.Colormap | None = None
-    ) -> rr.GridMap:
-        half = self._place.yaw_rad / 2
-        return rr.GridMap(
-            data=pixels.tobytes(),
-            format=rr.components.ImageFormat(
-                width=pixels.shape[1],
-                height=pixels.shape[0],
-                color_model="L" if pixels.ndim == 2 else "RGBA",
-                channel_datatype="U8",
-            ),
-            cell_size=self._place.resolution_m,
-            translation=[*self._place.origin_xy_m, height_m],
-            quaternion=rr.Quaternion(xyzw=[0.0, 0.0, float(np.sin(half)), float(np.cos(half))]),
-            colormap=colormap,
-            draw_order=height_m,
-        )
+    ) -> Picture:
+        place = self._place
+        return Picture(pixels, place.resolution_m, (*place.origin_xy_m, height_m), place.yaw_rad, colormap)
 
 
 def _shades() -> FloatArray:

@@ -8,6 +8,7 @@ import socket
 import subprocess
 import sys
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -20,7 +21,8 @@ from rose2_logs.errors import OutputError
 from rose2_logs.occupancy import FloatArray
 from rose2_logs.sinks.palette import track_colour
 from rose2_logs.sinks.rerun_blueprint import COVERAGE_UNIT, corners_of, make_blueprint
-from rose2_logs.sinks.rerun_layers import ChangedLayers
+from rose2_logs.sinks.rerun_columns import Entry, Label, Scalar, Strips
+from rose2_logs.sinks.rerun_layers import CHUNK_BYTES, Layers
 from rose2_logs.sinks.rerun_pictures import MapPictures
 from rose2_logs.sinks.ros_messages import outer_rings
 from rose2_logs.sinks.sink import RunInfo
@@ -33,9 +35,6 @@ LAYER_STEP_M = 0.01
 OUTLINE_POINTS, WALL_POINTS, LINE_POINTS = 2.0, 1.5, 0.75
 """Widths of lines in points of the screen, which stay readable at any zoom."""
 FLUSH_TIMEOUT_S = 60.0
-FLUSH_FRAMES, FLUSH_PICTURE_BYTES = 64, 64 << 20
-"""What was logged waits in memory for so many snapshots, or until their pictures are so large. Rerun joins
-what waits to one chunk for each entity; of every chunk it keeps an entry until the file is closed."""
 VIEWER_PORT = 9876
 """Where Rerun's viewer listens unless told otherwise."""
 VIEWER_START_S, VIEWER_SETTLE_S = 30.0, 1.0
@@ -82,9 +81,9 @@ class RerunRecording:
             "rose2_logs",
             recording_id=f"{self._info.log_path.stem}-{fingerprint[:16]}",
             send_properties=True,
-            batcher_config=None if self._live else rr.ChunkBatcherConfig.NEVER(),
         )
-        self._layers = ChangedLayers(self._recording)
+        # A live viewer shows each snapshot at once.
+        self._layers = Layers(self._recording, 0 if self._live else CHUNK_BYTES)
         sinks: list[rr.FileSink | rr.GrpcSink] = []
         if self._part is not None:
             try:
@@ -115,27 +114,23 @@ class RerunRecording:
         self._log_map(frame)
         self._log_rooms(frame)
         self._log_structure(frame)
-        recording.log("/run/coverage", rr.Scalars(frame.coverage))
-        recording.log("/run/rooms", rr.Scalars(len(frame.track_ids)))
+        self._layers.add("/run/coverage", Scalar(frame.coverage))
+        self._layers.add("/run/rooms", Scalar(len(frame.track_ids)))
         for event in frame.events:
             if event.kind != "continued":
-                recording.log("/events", rr.TextLog(event_text(event), level=_event_level(event)))
+                self._layers.add("/events", Entry(event_text(event), _event_level(event)))
         if self._frames == 0:
             # A live viewer shows the layout from the beginning; the file gets the final one.
             recording.send_blueprint(make_blueprint(self._low, self._high))
         self._frames += 1
-        if (
-            self._live
-            or self._frames % FLUSH_FRAMES == 0
-            or self._layers.picture_bytes >= FLUSH_PICTURE_BYTES
-        ):
-            self._flush()
+        self._flush()
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
         try:
             if kind is None:
+                self._layers.flush()
                 self._recording.log(
                     "/summary", rr.TextDocument(self._summary(), media_type="text/markdown"), static=True
                 )
@@ -154,7 +149,6 @@ class RerunRecording:
 
     def _flush(self) -> None:
         """Write what was logged; a viewer that was closed along the way is not waited for again."""
-        self._layers.picture_bytes = 0
         if self._live and not self._viewer_answers:
             return
         try:
@@ -169,30 +163,27 @@ class RerunRecording:
         pictures = MapPictures(frame)
         low, high = corners_of(pictures.corners_m)
         self._low, self._high = np.minimum(self._low, low), np.maximum(self._high, high)
-        self._layers.log_picture("/world/map", pictures.map(0.0))
-        self._layers.log_picture("/world/room_fills", pictures.rooms(LAYER_STEP_M))
+        self._layers.show("/world/map", pictures.map(0.0))
+        self._layers.show("/world/room_fills", pictures.rooms(LAYER_STEP_M))
         if frame.analysis.structure is not None:
             clean = pictures.clean_map(frame.analysis.structure.clean, 2 * LAYER_STEP_M)
-            self._layers.log_picture("/world/clean_map", clean)
+            self._layers.show("/world/clean_map", clean)
 
     def _log_rooms(self, frame: TrackedSnapshot) -> None:
-        recording, rooms = self._recording, frame.analysis.rooms
+        rooms = frame.analysis.rooms
         for track in sorted(self._shown - set(frame.track_ids)):
             self._layers.clear(f"/world/rooms/{track}")
-            recording.log(f"/run/area/{track}", rr.Clear(recursive=False))
+            self._layers.clear(f"/run/area/{track}")
         self._shown = set(frame.track_ids)
-        points = _lifted(np.nan_to_num(rooms.label_points_m), 6)
+        points = _lifted(np.nan_to_num(rooms.label_points_m), 6).tolist()
         for number, track in enumerate(frame.track_ids):
             if track not in self._begun:
                 self._begin_track(track, frame.snapshot.index)
             shape, area = rooms.polygons[number], float(rooms.areas_m2[number])
-            rings = [_lifted(ring, 3) for ring in outer_rings(shape)]
-            self._layers.log(f"/world/rooms/{track}", rr.LineStrips3D.from_fields(strips=rings))
-            label = rr.Points3D.from_fields(
-                positions=points[number : number + 1], labels=[f"{track}: {area:.0f} m²"]
-            )
-            self._layers.log(f"/world/rooms/{track}/label", label)
-            recording.log(f"/run/area/{track}", rr.Scalars(area))
+            self._layers.show(f"/world/rooms/{track}", _strips(outer_rings(shape), 3))
+            x, y, z = points[number]
+            self._layers.show(f"/world/rooms/{track}/label", Label((x, y, z), f"{track}: {area:.0f} m²"))
+            self._layers.add(f"/run/area/{track}", Scalar(area))
 
     def _begin_track(self, track: int, index: int) -> None:
         """Log what stays the same for a track."""
@@ -229,8 +220,8 @@ class RerunRecording:
     def _log_lines(
         self, path: str, ends_m: FloatArray, layer: int, colours: NDArray[np.uint8] | None = None
     ) -> None:
-        strips = _lifted(ends_m.reshape(-1, 2), layer).reshape(-1, 2, 3).astype(np.float32)
-        self._layers.log(path, rr.LineStrips3D.from_fields(strips=strips, colors=colours))
+        points = _lifted(ends_m.reshape(-1, 2), layer)
+        self._layers.show(path, Strips(points, np.full(len(ends_m), 2, np.int32), colours))
 
     def _summary(self) -> str:
         info = self._info
@@ -298,6 +289,12 @@ def _event_level(event: RoomEvent) -> str:
     return str(level)
 
 
-def _lifted(points_m: FloatArray, layer: int) -> FloatArray:
+def _lifted(points_m: FloatArray, layer: int) -> NDArray[np.float32]:
     """Points (K, 2) as (K, 3) at a layer's height."""
-    return np.column_stack([points_m, np.full(len(points_m), layer * LAYER_STEP_M)])
+    return np.column_stack([points_m, np.full(len(points_m), layer * LAYER_STEP_M)]).astype(np.float32)
+
+
+def _strips(rings: Sequence[FloatArray], layer: int) -> Strips:
+    """Closed rings at a layer's height."""
+    points = _lifted(np.concatenate([np.zeros((0, 2)), *rings]), layer)
+    return Strips(points, np.array([len(ring) for ring in rings], np.int32))

@@ -80,17 +80,17 @@ class MessageMaker:
         """Text of a type's definition with all it is made of, as MCAP's ros2msg schema."""
         return self._store.generate_msgdef(message_type, ros_version=2)[0].encode()
 
-    def source_map(self, frame: TrackedSnapshot) -> bytes:
+    def source_map(self, frame: TrackedSnapshot) -> bytearray:
         """Make the map itself, for inputs that are no log of messages."""
         return _grid(frame, frame.snapshot.cells)
 
-    def segmented_map(self, frame: TrackedSnapshot) -> bytes:
+    def segmented_map(self, frame: TrackedSnapshot) -> bytearray:
         """Make the segmented map: rooms as 1..98, occupied 100, other free cells 0, unknown -1."""
         values = np.array([0, *(1 + (track - 1) % HIGHEST_VALUE for track in frame.track_ids)], np.int8)
         labels = frame.analysis.rooms.labels
         return _grid(frame, np.where(labels == 0, np.maximum(frame.snapshot.cells, UNKNOWN), values[labels]))
 
-    def clean_map(self, frame: TrackedSnapshot) -> bytes | None:
+    def clean_map(self, frame: TrackedSnapshot) -> bytearray | None:
         """Make the clean map: 100 where structure, 0 where free or clutter, -1 unknown; None without one."""
         structure = frame.analysis.structure
         if structure is None:
@@ -98,7 +98,7 @@ class MessageMaker:
         known = np.clip(frame.snapshot.cells, UNKNOWN, 0)
         return _grid(frame, np.where(structure.clean, np.int8(100), known))
 
-    def rooms(self, frame: TrackedSnapshot) -> bytes:
+    def rooms(self, frame: TrackedSnapshot) -> bytearray:
         """Make the rooms message, by ascending track."""
         rooms, tracks = frame.analysis.rooms, frame.track_ids
         message = CdrWriter()
@@ -117,9 +117,9 @@ class MessageMaker:
                 message.points(ring[:-1], np.float32)
             neighbours = sorted(tracks[other - 1] for other in rooms.neighbours(number))
             message.sequence(np.array(neighbours, np.uint32))
-        return message.bytes()
+        return message.message()
 
-    def markers(self, frame: TrackedSnapshot) -> bytes:
+    def markers(self, frame: TrackedSnapshot) -> bytearray:
         """Make the markers: all old ones deleted, then fills, outlines, labels, walls, lines, doorways."""
         analysis, rooms = frame.analysis, frame.analysis.rooms
         made = [Marker("", 0, TRIANGLES, action=DELETE_ALL)]
@@ -158,7 +158,7 @@ class MessageMaker:
         message.numbers("I", len(made))
         for marker in made:
             marker.write(message, frame.snapshot.stamp_ns, analysis.geometry.frame_id)
-        return message.bytes()
+        return message.message()
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,7 +217,7 @@ class Marker:
         message.numbers("B", 0)  # mesh_use_embedded_materials
 
 
-def _grid(frame: TrackedSnapshot, cells: NDArray[np.int8]) -> bytes:
+def _grid(frame: TrackedSnapshot, cells: NDArray[np.int8]) -> bytearray:
     """Make a nav_msgs/OccupancyGrid with the stamp and the geometry of the map."""
     geometry, stamp_ns = frame.analysis.geometry, frame.snapshot.stamp_ns
     message = CdrWriter()
@@ -228,7 +228,7 @@ def _grid(frame: TrackedSnapshot, cells: NDArray[np.int8]) -> bytes:
     half = geometry.yaw_rad / 2
     message.numbers("d", *geometry.origin_xy_m, 0.0, 0.0, 0.0, float(np.sin(half)), float(np.cos(half)))
     message.sequence(cells.astype(np.int8, copy=False).ravel())
-    return message.bytes()
+    return message.message()
 
 
 def triangle_corners(shape: BaseGeometry) -> FloatArray:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import subprocess
 import sys
+import tracemalloc
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,8 +20,11 @@ from rosbags.highlevel import AnyReader
 from saved_maps import save_run
 
 from rose2_logs.errors import OutputError
-from rose2_logs.run import RunOptions, analyse_log
-from rose2_logs.sinks.annotated_mcap import ADDED, ATTACHMENT, METADATA
+from rose2_logs.readers import open_log
+from rose2_logs.run import RunOptions, analyse_log, start_workers, tracked_snapshots
+from rose2_logs.sinks.annotated_mcap import ADDED, ATTACHMENT, METADATA, AnnotatedMcap
+from rose2_logs.sinks.sink import RunInfo
+from rose2_logs.sinks.summary import RunTotals
 
 PROJECT = Path(__file__).parents[2]
 SHARED = PROJECT.parent / "shared" / "bags"
@@ -184,9 +190,12 @@ class ChunkedLog:
     with_map: list[bytes]
 
 
-def chunked_log(path: Path, compression: CompressionType = CompressionType.ZSTD) -> ChunkedLog:
+def chunked_log(
+    path: Path,
+    compression: CompressionType = CompressionType.ZSTD,
+    maps_in: Sequence[int] = (5, 6, 18),
+) -> ChunkedLog:
     """Write 20 chunks of two notes, the second so long that it ends the chunk, some with a map between."""
-    maps_in = (5, 6, 18)
     with LOGS["sample mcap"].open("rb") as source, path.open("w+b") as target:
         kind, channel, first = next(make_reader(source).iter_messages(topics=["/map"]))
         cells = bytearray(first.data)
@@ -258,6 +267,28 @@ def test_a_damaged_chunk_stays_as_it_is(tmp_path):
     log.path.write_bytes(log.path.read_bytes().replace(log.without_map[3], bytes(damaged)))
     path = annotate(log.path, tmp_path / "out")
     assert bytes(damaged) in path.read_bytes()
+
+
+def test_nothing_is_kept_of_chunks_that_were_taken_apart(tmp_path):
+    """Memory does not grow with the log: after 18 chunks with a map it is what it was after two."""
+    log = chunked_log(tmp_path / "run.mcap", maps_in=range(20))
+    options = RunOptions()
+    with open_log(log.path) as reader, start_workers(options) as workers:
+        totals = RunTotals()
+        frame = next(tracked_snapshots(reader, reader.last(), workers, options.parameters, totals))
+        times = [snapshot.log_time_ns for snapshot in reader.snapshots()]
+    info = RunInfo(log.path, "/map", "rose2", options.parameters, {}, {})
+    held = []
+    tracemalloc.start()
+    try:
+        with AnnotatedMcap(tmp_path / "out.mcap", info) as sink:
+            for time in times:
+                snapshot = dataclasses.replace(frame.snapshot, log_time_ns=time)
+                sink.write(dataclasses.replace(frame, snapshot=snapshot))
+                held.append(tracemalloc.get_traced_memory()[0])
+    finally:
+        tracemalloc.stop()
+    assert held[-1] - held[1] < frame.snapshot.cells.nbytes
 
 
 def test_a_log_without_an_index_is_copied_message_by_message(tmp_path):
