@@ -129,7 +129,9 @@ def analyze(
     from rose2_logs import reporting
     from rose2_logs.readers import Selection
     from rose2_logs.run import RunOptions, analyse_log, log_stem, seconds_into_log
+    from rose2_logs.workers import keep_freed_memory
 
+    keep_freed_memory()
     parameters = resolve_parameters(config, settings, method)
     names = [log_stem(log) for log in logs]
     if twice := {name for name in names if names.count(name) > 1}:
@@ -262,7 +264,9 @@ def evaluate(
     from rose2_logs.sinks.curves import draw_along
     from rose2_logs.sinks.label_image import write_image, write_label_image
     from rose2_logs.sinks.summary import write_json
+    from rose2_logs.workers import keep_freed_memory
 
+    keep_freed_memory()
     parameters = resolve_parameters(config, settings, method)
     chosen = load_cases(cases, group)
     results = []

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
+from contextlib import closing
 from dataclasses import dataclass
 from typing import Any
 
 from rose2_logs.errors import LogError
 from rose2_logs.occupancy import OccupancySnapshot, classify
 from rose2_logs.parameters import OccupancyParameters
-from rose2_logs.readers import inspect_log, open_log
-from rose2_logs.readers.log import LogInfo
+from rose2_logs.readers import LogReader, Selection, open_source
+from rose2_logs.readers.source import LogInfo, MessageSource
 
 
 @dataclass(frozen=True)
@@ -80,15 +81,16 @@ def describe_log(log: str) -> LogFacts:
     LogError
         If the log cannot be opened. A map topic that cannot be read is told as such.
     """
-    info = inspect_log(log)
-    topics = [topic for topic in info.topics if topic.is_map and topic.message_count != 0]
-    return LogFacts(info, tuple(_topic_facts(log, topic.name) for topic in topics))
+    # Opened once: the index of a large log is megabytes.
+    with closing(open_source(log)) as source:
+        topics = [topic for topic in source.info.topics if topic.is_map and topic.message_count != 0]
+        return LogFacts(source.info, tuple(_topic_facts(source, topic.name) for topic in topics))
 
 
-def _topic_facts(log: str, topic: str) -> TopicFacts:
+def _topic_facts(source: MessageSource, topic: str) -> TopicFacts:
     try:
-        with open_log(log, topic=topic) as reader:
-            return TopicFacts(topic, _map_facts(reader.first()), _map_facts(reader.last()))
+        reader = LogReader(source, topic, Selection())
+        return TopicFacts(topic, _map_facts(reader.first()), _map_facts(reader.last()))
     except LogError as error:
         return TopicFacts(topic, None, None, str(error))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -71,6 +71,16 @@ class SnapshotAnalysis:
     walls: Walls | None
     floor_plan: FloorPlan | None
     seconds: dict[str, float]
+
+    def again_for(self, snapshot: OccupancySnapshot) -> SnapshotAnalysis:
+        """Return the same for another snapshot of the same free and occupied cells at the same place."""
+        return replace(
+            self,
+            index=snapshot.index,
+            log_time_ns=snapshot.log_time_ns,
+            stamp_ns=snapshot.stamp_ns,
+            seconds=dict.fromkeys(self.seconds, 0.0),
+        )
 
 
 def analyse(snapshot: OccupancySnapshot, parameters: Parameters, method: str = "rose2") -> SnapshotAnalysis:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,9 @@ from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from rose2_logs.occupancy import FloatArray, GridGeometry
+
+LABEL_TOLERANCE_M = 0.05
+"""A label's point is the deepest of its room to this: one cell of usual maps."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,6 +89,18 @@ class RoomMap:
     def predicted_areas_m2(self) -> FloatArray:
         """Area (R,) of each room's polygon in square metres."""
         return np.array([polygon.area for polygon in self.polygons], float)
+
+    @cached_property
+    def label_points_m(self) -> FloatArray:
+        """World point (R, 2) deepest inside each room's polygon, metres; NaN for an empty polygon."""
+        import shapely
+
+        shapes = np.array(self.polygons, object)
+        points = np.full((len(shapes), 2), np.nan)
+        drawn = ~shapely.is_empty(shapes)
+        radii = shapely.maximum_inscribed_circle(shapes[drawn], tolerance=LABEL_TOLERANCE_M)
+        points[drawn] = shapely.get_coordinates(shapely.get_point(radii, 0))
+        return points
 
     @property
     def adjacency(self) -> tuple[tuple[int, int], ...]:

@@ -11,8 +11,11 @@ from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from rose2_logs.errors import InvalidMapError, OutputError
-from rose2_logs.occupancy import OccupancySnapshot, classify
+from rose2_logs.occupancy import UNKNOWN, OccupancySnapshot, classify
 from rose2_logs.parameters import OccupancyParameters, Parameters
 from rose2_logs.pipeline import SnapshotAnalysis, analyse
 from rose2_logs.provenance import fingerprint, software_versions
@@ -26,7 +29,7 @@ from rose2_logs.tracking.frames import TrackedSnapshot, map_motion
 from rose2_logs.tracking.layout_change import LayoutFollower
 from rose2_logs.tracking.lives import Moment
 from rose2_logs.tracking.tracker import RoomTracker
-from rose2_logs.workers import ordered_map
+from rose2_logs.workers import Workers
 
 logger = logging.getLogger(__name__)
 
@@ -49,7 +52,8 @@ class RunOptions:
     method : str
         The segmentation method.
     workers : int
-        Processes; results do not depend on it.
+        Processes; results do not depend on it. A script that asks for several does so under
+        ``if __name__ == "__main__"``, as each of them imports it.
     recording, annotated_log : bool
         Whether to write the Rerun recording and the annotated MCAP. The tables are always written.
     live : bool
@@ -83,6 +87,7 @@ class RunResult:
     layout_final: Moment | None
 
 
+SnapshotWorkers = Workers[OccupancySnapshot, tuple[SnapshotAnalysis, RoomEvidence] | InvalidMapError]
 OnSnapshot = Callable[[TrackedSnapshot, float], None]
 """Told of each finished snapshot and of the share, in [0, 1], of the log's time that is done."""
 
@@ -140,14 +145,17 @@ def analyse_log(
     if not options.overwrite and (existing := [file for file in planned.values() if file.exists()]):
         raise OutputError(f"{existing[0]}: exists already; choose another folder or pass --overwrite")
     totals = RunTotals()
-    with open_log(path, topic=options.topic, selection=options.selection) as reader:
+    with (
+        open_log(path, topic=options.topic, selection=options.selection) as reader,
+        start_workers(options) as workers,
+    ):
         last = reader.last()
         info = _run_info(path, reader, options)
         first_ns: int | None = None
         with ExitStack() as stack:
             tables = Tables(folder)
             sinks = [stack.enter_context(sink) for sink in (tables, *_make_sinks(planned, info, options))]
-            for frame in tracked_snapshots(reader, last, options, totals):
+            for frame in tracked_snapshots(reader, last, workers, options.parameters, totals):
                 for sink in sinks:
                     sink.write(frame)
                 totals.add(frame)
@@ -176,8 +184,18 @@ def analyse_log(
     return RunResult(folder, (*files.values(), planned["summary"]), totals, seconds, layout_final)
 
 
+def start_workers(options: RunOptions) -> SnapshotWorkers:
+    """Return what analyses snapshots: a context manager, to be entered as early as possible."""
+    work = partial(_analyse_or_refuse, parameters=options.parameters, method=options.method)
+    return Workers(work, options.workers)
+
+
 def tracked_snapshots(
-    reader: LogReader, last: OccupancySnapshot, options: RunOptions, totals: RunTotals
+    reader: LogReader,
+    last: OccupancySnapshot,
+    workers: SnapshotWorkers,
+    parameters: Parameters,
+    totals: RunTotals,
 ) -> Iterator[TrackedSnapshot]:
     """Yield every map of a log with its rooms and their identity.
 
@@ -187,35 +205,64 @@ def tracked_snapshots(
         The log.
     last : OccupancySnapshot
         The last map of the run, which coverage refers to.
-    options : RunOptions
-        Parameters, method, workers.
+    workers : Workers
+        What analyses the maps, started.
+    parameters : Parameters
+        Those that it was started with.
     totals : RunTotals
         Maps that cannot be analysed are left out and counted as invalid here.
     """
-    final_free_m2 = free_area_m2(last, options.parameters.occupancy)
-    tracker = RoomTracker(options.parameters.tracking, options.parameters.occupancy)
+    final_free_m2 = free_area_m2(last, parameters.occupancy)
+    tracker = RoomTracker(parameters.tracking, parameters.occupancy)
     layout = LayoutFollower()
-    work = partial(_analyse_or_refuse, parameters=options.parameters, method=options.method)
-    for snapshot, found in ordered_map(work, reader.snapshots(), options.workers):
+    is_same = partial(is_same_to_analysis, parameters=parameters.occupancy)
+    for snapshot, found in workers.map(reader.snapshots(), is_same):
         if isinstance(found, InvalidMapError):
             totals.invalid += 1
             logger.warning("snapshot %d is left out: %s", snapshot.index, found)
             continue
         analysis, evidence = found
+        if analysis.index != snapshot.index:
+            analysis = analysis.again_for(snapshot)
+            totals.unchanged += 1
         track_ids, events = tracker.update(snapshot, analysis)
         change = layout.update(analysis.rooms, track_ids, map_motion(events))
         coverage = min(analysis.free_area_m2 / final_free_m2, 1.0) if final_free_m2 > 0 else 0.0
         yield TrackedSnapshot(snapshot, analysis, coverage, track_ids, events, evidence, change)
 
 
+def is_same_to_analysis(
+    before: OccupancySnapshot, now: OccupancySnapshot, parameters: OccupancyParameters
+) -> bool:
+    """Whether two maps have the same free, occupied and unknown cells at the same place: all that counts.
+
+    Maps that hold probabilities change at every scan, mostly without passing a threshold.
+    """
+    if before.geometry != now.geometry:
+        return False
+    changed = before.cells != now.cells
+    kind_before, kind_now = (
+        np.stack([*_classified(cells[changed], parameters), cells[changed] == UNKNOWN])
+        for cells in (before.cells, now.cells)
+    )
+    return np.array_equal(kind_before, kind_now)
+
+
 def free_area_m2(snapshot: OccupancySnapshot, parameters: OccupancyParameters) -> float:
     """Known free area of a map in square metres."""
-    free, _ = classify(
-        snapshot.cells,
+    free, _ = _classified(snapshot.cells, parameters)
+    return float(free.sum()) * snapshot.geometry.cell_area_m2
+
+
+def _classified(
+    cells: NDArray[np.int8], parameters: OccupancyParameters
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Masks of the free and of the occupied cells."""
+    return classify(
+        cells,
         occupied_min_percent=parameters.occupied_min_percent,
         free_max_percent=parameters.free_max_percent,
     )
-    return float(free.sum()) * snapshot.geometry.cell_area_m2
 
 
 def _analyse_or_refuse(

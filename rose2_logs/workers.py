@@ -5,14 +5,21 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import sys
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
-from typing import TypeVar
+from contextlib import ExitStack, contextmanager, suppress
+from functools import lru_cache
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Generic, Self, TypeVar
 
 from rose2_logs.errors import Rose2LogsError
+from rose2_logs.parcels import Parcel, pack, parcel_folders, unpack
+
+if TYPE_CHECKING:
+    from threadpoolctl import ThreadpoolController
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -21,63 +28,171 @@ LOOK_AHEAD_PER_WORKER = 2
 """Items handed out and not yet taken back, for each worker: one in work and one waiting."""
 THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "RAYON_NUM_THREADS")
 """Where OpenMP, the linear algebra libraries and Rerun look for the number of threads when loaded."""
+M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3
+"""Options of the GNU C library's `mallopt` (malloc.h)."""
+KEPT_ARRAY_BYTES, KEPT_BYTES = 32 << 20, 1 << 30
+"""Arrays up to the first size are kept when they are freed, the most that all versions of the library allow;
+all together up to the second, far above what one map takes."""
 
 
 class WorkerError(Rose2LogsError):
     """A worker process ended before its work was done."""
 
 
-def ordered_map(
-    function: Callable[[Item], Result], items: Iterable[Item], workers: int = 1
-) -> Iterator[tuple[Item, Result]]:
-    """Yield each item with its result, in the order of the items.
+class Workers(Generic[Item, Result]):
+    """Calls one function on items in several processes; a context manager that starts them and ends them.
 
-    Each call runs on a single thread, so that a result does not depend on the number of workers.
+    Each call runs on a single thread, so that a result does not depend on the number of workers. Items and
+    results go through shared memory.
 
     Parameters
     ----------
     function : callable
         With more than one worker it must be picklable, like its argument and its result.
-    items : iterable
-        Taken as they are needed, never more than `LOOK_AHEAD_PER_WORKER` for each worker ahead.
-    workers : int
+    count : int
         Processes; with 1 the work is done in this one.
-
-    Raises
-    ------
-    WorkerError
-        If a worker process is killed.
     """
-    if workers <= 1:
-        for item in items:
-            yield item, _call_on_one_thread(function, item)
-        return
-    # Forking a process that already runs threads (Rerun, Arrow) may lock up; a fresh interpreter cannot.
-    pool = ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), initializer=_ignore_interrupts)
-    pending: deque[tuple[Item, Future[Result]]] = deque()
-    try:
-        for item in items:
-            pending.append((item, pool.submit(_call_on_one_thread, function, item)))
-            if len(pending) >= LOOK_AHEAD_PER_WORKER * workers:
+
+    def __init__(self, function: Callable[[Item], Result], count: int = 1) -> None:
+        self._function = function
+        self._count = count
+        self._stack = ExitStack()
+        self._pool: ProcessPoolExecutor | None = None
+        self._folders: tuple[str, ...] = ()
+
+    def __enter__(self) -> Self:
+        if self._count > 1:
+            self._folders = self._stack.enter_context(parcel_folders())
+            # Forking a process that runs threads already (Rerun, Arrow) may lock up; a fresh one cannot.
+            context = multiprocessing.get_context("spawn")
+            self._pool = ProcessPoolExecutor(
+                self._count, context, initializer=_begin, initargs=(self._function, self._folders)
+            )
+            self._stack.callback(self._pool.shutdown, wait=True, cancel_futures=True)
+            # A task starts a process: they import what they need while this one opens its files.
+            for _ in range(self._count):
+                self._pool.submit(_nothing)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self._stack.close()
+
+    def map(
+        self, items: Iterable[Item], is_same: Callable[[Item, Item], bool] | None = None
+    ) -> Iterator[tuple[Item, Result]]:
+        """Yield each item with its result, in the order of the items.
+
+        Parameters
+        ----------
+        items : iterable
+            Taken as they are needed, never more than `LOOK_AHEAD_PER_WORKER` for each worker ahead.
+        is_same : callable, optional
+            Whether an item and the next one have the same result: then the function is not called again.
+
+        Raises
+        ------
+        WorkerError
+            If a worker process is killed.
+        """
+        if self._pool is None:
+            yield from self._map_here(items, is_same)
+            return
+        pending: deque[tuple[Item, _Task]] = deque()
+        before: tuple[Item, _Task] | None = None
+        try:
+            for item in items:
+                if before is not None and is_same is not None and is_same(before[0], item):
+                    before = (item, before[1])
+                else:
+                    parcel = pack(item, self._folders)
+                    before = (item, _Task(self._pool.submit(_work, parcel)))
+                pending.append(before)
+                if len(pending) >= LOOK_AHEAD_PER_WORKER * self._count:
+                    yield _taken(pending)
+            while pending:
                 yield _taken(pending)
-        while pending:
-            yield _taken(pending)
-    except BrokenProcessPool as error:
-        raise WorkerError(
-            f"one of {workers} worker processes was killed, likely for lack of memory; use fewer --workers"
-        ) from error
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)
+        except BrokenProcessPool as error:
+            raise WorkerError(
+                f"one of {self._count} worker processes was killed, likely for lack of memory; "
+                "use fewer --workers"
+            ) from error
+
+    def _map_here(
+        self, items: Iterable[Item], is_same: Callable[[Item, Item], bool] | None
+    ) -> Iterator[tuple[Item, Result]]:
+        before: tuple[Item, Result] | None = None
+        for item in items:
+            if before is not None and is_same is not None and is_same(before[0], item):
+                before = (item, before[1])
+            else:
+                before = None  # so that only one result is held
+                before = (item, _call_on_one_thread(self._function, item))
+            yield before
 
 
-def _taken(pending: deque[tuple[Item, Future[Result]]]) -> tuple[Item, Result]:
-    item, future = pending.popleft()
-    return item, future.result()
+def ordered_map(
+    function: Callable[[Item], Result], items: Iterable[Item], workers: int = 1
+) -> Iterator[tuple[Item, Result]]:
+    """Yield each item with its result, in the order of the items: `Workers` for a single stream."""
+    with Workers(function, workers) as processes:
+        yield from processes.map(items)
 
 
-def _ignore_interrupts() -> None:
-    """Leave Ctrl-C to the parent, which then ends its workers."""
+class _Task:
+    """A result that comes once and may be asked for several times."""
+
+    def __init__(self, future: Future[Parcel]) -> None:
+        self._future: Future[Parcel] | None = future
+        self._result: Any = None
+
+    def result(self) -> Any:
+        if self._future is not None:
+            self._result = unpack(self._future.result())
+            self._future = None
+        return self._result
+
+
+def _taken(pending: deque[tuple[Item, _Task]]) -> tuple[Item, Any]:
+    item, task = pending.popleft()
+    return item, task.result()
+
+
+# What a worker process calls, and where its results go; set once in each.
+_function: Callable[[Any], Any]
+_folders: tuple[str, ...]
+
+
+def _begin(function: Callable[[Any], Any], folders: tuple[str, ...]) -> None:
+    """Get a worker process ready, and leave Ctrl-C to the parent, which then ends its workers."""
+    global _function, _folders
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    keep_freed_memory()
+    _function, _folders = function, folders
+
+
+def keep_freed_memory() -> None:
+    """Let this process keep the memory of large arrays that it has freed, for those that come next.
+
+    The GNU C library gives it back, so that every map's arrays are made of fresh pages again, which the
+    kernel clears: some percent of the time of an analysis. The peak stays what it is. Elsewhere this does
+    nothing.
+    """
+    import ctypes
+
+    with suppress(OSError, AttributeError):
+        mallopt = ctypes.CDLL(None).mallopt
+        mallopt(M_MMAP_THRESHOLD, KEPT_ARRAY_BYTES)
+        mallopt(M_TRIM_THRESHOLD, KEPT_BYTES)
+
+
+def _nothing() -> None:
+    return
+
+
+def _work(parcel: Parcel) -> Parcel:
+    return pack(_call_on_one_thread(_function, unpack(parcel)), _folders)
 
 
 def _call_on_one_thread(function: Callable[[Item], Result], item: Item) -> Result:
@@ -89,15 +204,22 @@ def _call_on_one_thread(function: Callable[[Item], Result], item: Item) -> Resul
 def _one_thread() -> Iterator[None]:
     """Hold OpenCV and the linear algebra libraries to one thread, and let them go afterwards."""
     import cv2
-    from threadpoolctl import threadpool_limits
 
     threads = cv2.getNumThreads()
     cv2.setNumThreads(1)
     try:
-        with threadpool_limits(1):
+        with _thread_pools(len(sys.modules)).limit(limits=1):
             yield
     finally:
         cv2.setNumThreads(threads)
+
+
+@lru_cache(maxsize=1)
+def _thread_pools(modules: int) -> ThreadpoolController:
+    """Look the thread pools of the loaded libraries up, once for each number of imported modules."""
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController()
 
 
 def limit_process_to_one_thread() -> None:

@@ -12,6 +12,7 @@ PACKAGE = Path(__file__).parents[1] / "rose2_logs"
 ORDER = (
     "__init__",
     "errors",
+    "parcels",
     "workers",
     "parameter_fields",
     "baseline_parameters",

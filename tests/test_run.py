@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
 import json
 from pathlib import Path
@@ -9,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from saved_maps import save_run, two_rooms
+from saved_maps import FREE, WALL, save_map, save_run, two_rooms
 
 from rose2_logs.errors import OutputError
 from rose2_logs.provenance import fingerprint, log_files
@@ -85,6 +86,26 @@ def test_any_number_of_workers_gives_the_same_bytes(run: Path, tmp_path: Path):
     result = analyse_log(run / "maps", tmp_path, options)
     assert result.totals.snapshots == 3
     assert table_bytes(tmp_path) == table_bytes(run / "out")
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_map_that_did_not_change_is_not_analysed_again(tmp_path: Path, monkeypatch, workers: int):
+    """Probabilities that pass no threshold change nothing: the same bytes as if each map were analysed."""
+    folder = tmp_path / "maps"
+    for number, (columns, free) in enumerate([(180, 0), (180, 12), (180, 3), (240, 3), (240, 30)]):
+        image = two_rooms(columns)
+        percent = np.select([image == FREE, image == WALL], [free, 100 - free], 255).astype(np.uint8)
+        path = save_map(folder, f"map{number}", percent)
+        path.write_text(path.read_text() + "mode: raw\n")
+    options = dataclasses.replace(TABLES_ONLY, workers=workers)
+    result = analyse_log(folder, tmp_path / "out", options)
+    assert (result.totals.snapshots, result.totals.unchanged) == (5, 2)
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert summary["results"]["unchanged_maps"] == 2
+    monkeypatch.setattr("rose2_logs.run.is_same_to_analysis", lambda before, now, parameters: False)
+    each = analyse_log(folder, tmp_path / "each", options)
+    assert (each.totals.snapshots, each.totals.unchanged) == (5, 0)
+    assert table_bytes(tmp_path / "out") == table_bytes(tmp_path / "each")
 
 
 def test_progress_ends_at_one(run: Path, tmp_path: Path):

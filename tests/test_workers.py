@@ -7,10 +7,12 @@ import subprocess
 import sys
 import time
 
+import numpy as np
 import pytest
 
+from rose2_logs import parcels
 from rose2_logs.errors import InvalidMapError
-from rose2_logs.workers import LOOK_AHEAD_PER_WORKER, WorkerError, ordered_map
+from rose2_logs.workers import LOOK_AHEAD_PER_WORKER, WorkerError, Workers, ordered_map
 
 
 def slow_square(number: int) -> int:
@@ -34,6 +36,41 @@ def refuse_two(number: int) -> int:
     if number == 2:
         raise InvalidMapError("two is bad")
     return number
+
+
+def token(_: str) -> tuple[int, int]:
+    """Another result at each call."""
+    return os.getpid(), time.monotonic_ns()
+
+
+def layers(number: int) -> np.ndarray:
+    return np.full((300, 400), number, np.int32)
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_an_item_like_the_one_before_gets_its_result(workers: int):
+    """The function is not called again for it; like means: the one before, not any."""
+    with Workers(token, workers) as processes:
+        found = list(processes.map("aabaaac", lambda one, other: one == other))
+    assert "".join(item for item, _ in found) == "aabaaac"
+    results = [result for _, result in found]
+    assert results[0] == results[1]
+    assert results[3] == results[4] == results[5]
+    assert len(set(results)) == 4
+
+
+def test_large_results_come_through_shared_memory_and_leave_nothing(tmp_path, monkeypatch):
+    """Also where the stream is left before its end."""
+    monkeypatch.setattr(parcels, "SHARED_MEMORY", tmp_path)
+    with Workers(layers, 2) as processes:
+        for number, (item, result) in enumerate(processes.map(range(9))):
+            assert (result == item).all()
+            assert result.shape == (300, 400)
+            if number == 5:
+                assert list(tmp_path.iterdir())
+                break
+    assert not list(tmp_path.iterdir())
+    assert (result == 5).all()
 
 
 @pytest.mark.parametrize("workers", [1, 2])

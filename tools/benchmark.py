@@ -2,7 +2,7 @@
 """Measure the project and write reports.
 
 `accuracy` gives every figure of every method; `sensitivity` how much the figures hang on each parameter, and
-what a choice made without a building gives there.
+what a choice made without a building gives there; `speed` how fast everything is.
 
 Examples
 --------
@@ -16,9 +16,11 @@ Examples
     # each parameter of the stages a step down and up, or only some of them
     python tools/benchmark.py sensitivity -o DIR
     python tools/benchmark.py sensitivity --parameters "walls.*" floor_plan.join_min_openness -o DIR
+    # how fast everything is, on an otherwise idle machine; at a glance with --quick
+    python tools/benchmark.py speed -o DIR
 
 DIR/report.md is the report, DIR/report.json holds all of it as numbers; DIR/pictures shows every map with its
-true rooms, the found ones, and what is wrong.
+true rooms, the found ones, and what is wrong. That of speed is DIR/speed.md with speed.png and speed.json.
 """
 
 from __future__ import annotations
@@ -39,6 +41,8 @@ from benchmarking.sensitivity import (
     sensitivity_as_json,
     sensitivity_report,
 )
+from benchmarking.speed import FULL, QUICK, SpeedOptions, measure_speed
+from benchmarking.speed_report import write_speed_report
 
 from rose2_logs.errors import Rose2LogsError
 from rose2_logs.parameters import load_parameters
@@ -46,7 +50,11 @@ from rose2_logs.pipeline import METHODS
 
 SHARED_CASES = Path(__file__).parents[2] / "shared" / "benchmark" / "cases.json"
 """The room segmentation benchmark's place beside the project."""
+SAMPLE_LOGS = [
+    Path(__file__).parents[1] / "sample_logs" / name for name in ("office.mcap", "wing.bag", "ring")
+]
 PARTS = ("ablations", "robustness", "pictures")
+SPEED_PARTS = ("maps", "tiles", "logs", "outputs")
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -69,6 +77,15 @@ def main(arguments: list[str] | None = None) -> int:
             help="figures with each parameter changed, and with buildings left out",
             description=__doc__,
             formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+    )
+    _add_speed(
+        commands.add_parser(
+            "speed",
+            help="times, memory and how both grow: maps, logs, workers, outputs, starting up",
+            description="Time maps on one core by stage, beside a floor and the other methods; a building "
+            "tiled again and again; logs of 10 to 1000 maps with one and two workers; outputs, copying, "
+            "starting up.",
         )
     )
     options = parser.parse_args(arguments)
@@ -164,6 +181,48 @@ def _sensitivity(options: argparse.Namespace) -> int:
     report = options.output / "report.md"
     report.write_text(sensitivity_report(measured))
     print(report)
+    return 0
+
+
+def _add_speed(parser: argparse.ArgumentParser) -> None:
+    add = parser.add_argument
+    add("-o", "--output", type=Path, required=True, metavar="DIR", help="folder of the report")
+    add(
+        "--cases",
+        type=Path,
+        nargs="*",
+        default=[SHARED_CASES],
+        metavar="CASES.json",
+        help="maps to time; by default the benchmark beside the project; none of them where this is empty",
+    )
+    add(
+        "--logs",
+        type=Path,
+        nargs="+",
+        default=SAMPLE_LOGS,
+        metavar="LOG",
+        help="logs to time; the first, an MCAP, also gives the building of the scaling runs; by default the "
+        "samples",
+    )
+    add("--quick", action="store_true", help="a glance: few maps, short logs, everything once")
+    add("--skip", nargs="+", choices=SPEED_PARTS, default=[], help="parts to leave out")
+    add("--config", type=Path, metavar="FILE.toml", help="parameters, one table per stage")
+    add("--set", action="append", default=[], metavar="STAGE.NAME=VALUE", help="change one parameter")
+    parser.set_defaults(run=_speed)
+
+
+def _speed(options: argparse.Namespace) -> int:
+    speed = measure_speed(
+        SpeedOptions(
+            cases=tuple(options.cases),
+            logs=tuple(options.logs),
+            amount=QUICK if options.quick else FULL,
+            skip=frozenset(options.skip),
+            config=options.config,
+            settings=tuple(options.set),
+        )
+    )
+    print(write_speed_report(speed, options.output))
     return 0
 
 

@@ -10,7 +10,7 @@ import logging
 import struct
 from collections import Counter, OrderedDict
 from collections.abc import Callable, Collection, Iterator
-from io import BytesIO
+from io import BufferedReader, BytesIO
 from pathlib import Path
 from typing import NamedTuple
 
@@ -19,8 +19,8 @@ from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.reader import make_reader
-from mcap.records import Channel, Chunk, MessageIndex, Schema
-from mcap.stream_reader import StreamReader, get_chunk_data_stream
+from mcap.records import Channel, Chunk, Schema
+from mcap.stream_reader import get_chunk_data_stream
 from mcap.summary import Summary
 
 from rose2_logs.errors import LogError
@@ -30,6 +30,8 @@ logger = logging.getLogger(__name__)
 
 _RECORD = struct.Struct("<BQ")  # opcode, length of what follows
 _MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time; then the data
+_INDEX = struct.Struct("<BQHI")  # head of a message index: and channel, length of its entries
+_INDEX_ENTRY = struct.Struct("<QQ")  # log time, offset in the uncompressed chunk
 _MAGIC = b"\x89MCAP0\r\n"
 # Chunks that overlap in time are read in turns; two are kept so that each is decompressed once.
 _CHUNKS_KEPT = 2
@@ -102,7 +104,7 @@ class McapFile:
         self._chunks: OrderedDict[int, memoryview] = OrderedDict()
         self._scanned: list[Place] = []
         try:
-            self._stream = path.open("rb")
+            self._stream = path.open("rb", buffering=0)
         except OSError as error:
             raise LogError(f"{path}: cannot be opened: {error.strerror}") from error
         try:
@@ -131,20 +133,28 @@ class McapFile:
         for chunk in self._summary.chunk_indexes:
             for channel_id in set(channel_ids) & set(chunk.message_index_offsets):
                 try:
-                    self._stream.seek(chunk.message_index_offsets[channel_id])
-                    record = next(StreamReader(self._stream, skip_magic=True).records)
-                    if not isinstance(record, MessageIndex) or record.channel_id != channel_id:
-                        raise McapError("no message index where the summary says")
-                except (*_DAMAGE, StopIteration) as error:
+                    entries = self._message_index(chunk.message_index_offsets[channel_id], channel_id)
+                except _DAMAGE as error:
                     raise LogError(
                         f"{self.path}: its index is damaged ({error}); repair it with `mcap recover`"
                     ) from error
                 places += [
                     Place(time, chunk.chunk_start_offset, offset, channel_id)
-                    for time, offset in record.records
+                    for time, offset in entries
                     if time <= _LATEST_NS
                 ]
         return sorted(places)
+
+    def _message_index(self, begin: int, channel_id: int) -> list[tuple[int, int]]:
+        """Log time and offset of each message of a channel, from the message index at a file offset.
+
+        Read exactly: in a large log there are thousands.
+        """
+        self._stream.seek(begin)
+        opcode, _, channel, length = _INDEX.unpack(self._read(_INDEX.size))
+        if opcode != Opcode.MESSAGE_INDEX or channel != channel_id:
+            raise McapError("no message index where the summary says")
+        return list(_INDEX_ENTRY.iter_unpack(self._read(length)))
 
     def payload(self, place: Place) -> memoryview:
         """Return the data of one message.
@@ -173,11 +183,15 @@ class McapFile:
 
     def _usable_summary(self) -> Summary | None:
         """Return the summary if every message of the file can be found by it."""
+        # A summary is many small records; all else is read in the pieces that are needed.
+        buffered = BufferedReader(self._stream)
         try:
-            self._stream.seek(0)
-            summary = make_reader(self._stream).get_summary()
+            buffered.seek(0)
+            summary = make_reader(buffered).get_summary()
         except (*_DAMAGE, OSError, StopIteration):
             return None
+        finally:
+            buffered.detach()
         if summary is None or summary.statistics is None:
             return None
         if len(summary.channels) < summary.statistics.channel_count or any(

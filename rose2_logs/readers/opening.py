@@ -50,7 +50,7 @@ def open_log(path: LogPath, *, topic: str | None = None, selection: Selection = 
     LogError
         If the log cannot be opened.
     """
-    source = _open_source(path)
+    source = open_source(path)
     try:
         return LogReader(source, topic, selection)
     except BaseException:
@@ -71,17 +71,29 @@ def inspect_log(path: LogPath) -> LogInfo:
     LogError
         If the log cannot be opened.
     """
-    source = _open_source(path)
+    source = open_source(path)
     source.close()
     return source.info
 
 
-def _open_source(path: LogPath) -> MessageSource:
+def open_source(path: LogPath) -> MessageSource:
+    """Open a log for looking at several of its topics; to be closed.
+
+    Parameters
+    ----------
+    path : str, Path or a sequence of them
+        As for `open_log`.
+
+    Raises
+    ------
+    LogError
+        If the log cannot be opened.
+    """
     if not isinstance(path, (str, Path)):
         files = [Path(each) for each in path]
         if not files:
             raise LogError("no log was given")
-        return _open_files(files[0], files) if len(files) > 1 else _open_source(files[0])
+        return _open_files(files[0], files) if len(files) > 1 else open_source(files[0])
     log = Path(path)
     if log.is_dir():
         return _open_directory(log)

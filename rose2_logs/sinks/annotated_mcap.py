@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections import Counter
+from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,16 +11,18 @@ from types import TracebackType
 from typing import IO, Self
 
 from mcap.exceptions import McapError
-from mcap.writer import CompressionType, Writer
 
 from rose2_logs.errors import OutputError
 from rose2_logs.sinks.mcap_input import (
+    DAMAGE,
     LATCHED_QOS,
     CopiedChannel,
+    CopiedChunk,
     CopiedLog,
     CopiedMessage,
     open_copied_log,
 )
+from rose2_logs.sinks.mcap_writer import McapWriter
 from rose2_logs.sinks.ros_messages import ROOMS_TYPE, MessageMaker
 from rose2_logs.sinks.sink import RunInfo
 from rose2_logs.tracking.frames import TrackedSnapshot
@@ -41,10 +43,10 @@ METADATA = "rose2_logs"
 class AnnotatedMcap:
     """Sink that copies the input log and adds the topics of `ADDED` with the source map's stamp and frame.
 
-    Messages, schemas, channels, attachments and metadata of an MCAP stay as they were, byte for byte; a bag
-    becomes an MCAP of the ros2 profile with every message as CDR. The copy is read along with the run,
-    so that messages stand by log time and the log is never held in memory. Of saved maps, which are no
-    messages yet, each map is written to the map topic.
+    Messages, schemas, channels, attachments and metadata of an MCAP stay as they were, byte for byte; chunks
+    between those with a map are copied compressed as they are. A bag becomes an MCAP of the ros2 profile with
+    every message as CDR. The copy is read along with the run, so that messages stand by log time and the log
+    is never held in memory. Of saved maps, which are no messages yet, each map is written to the map topic.
 
     Parameters
     ----------
@@ -52,11 +54,6 @@ class AnnotatedMcap:
         Where to; written beside and renamed when whole.
     info : RunInfo
         The run.
-
-    Attributes
-    ----------
-    copied_counts : dict of topic to int
-        Messages copied from the input.
 
     Raises
     ------
@@ -71,7 +68,6 @@ class AnnotatedMcap:
         self._part = path.with_name(f".{path.name}.part")
         self._info = info
         self._file: IO[bytes] | None = None
-        self.copied_counts: Counter[str] = Counter()
 
     def __enter__(self) -> Self:
         self._log: CopiedLog = open_copied_log(self._info.log_path)
@@ -79,21 +75,23 @@ class AnnotatedMcap:
             with self._writing():
                 self._path.parent.mkdir(parents=True, exist_ok=True)
                 self._file = self._part.open("wb")
-                self._writer = Writer(self._file, compression=CompressionType.ZSTD)
-                self._begin()
+                self._begin(self._file)
         except BaseException:
             self._abandon()
             raise
         return self
 
-    def _begin(self) -> None:
+    def _begin(self, file: IO[bytes]) -> None:
         log, info = self._log, self._info
-        library = f"rose2_logs {info.versions.get('rose2_logs', '')}".strip()
-        self._writer.start(log.profile, f"{log.library}; {library}" if log.library else library)
+        library = f"rose2_logs {info.versions.get('rose2-logs', '')}".strip()
+        library = f"{log.library}; {library}" if log.library else library
+        self._writer = McapWriter(file, log.profile, library)
         self._channels: dict[int, int] = {}
-        self._schemas: dict[tuple[str, str, bytes], int] = {}
-        self._messages = log.messages()
-        self._waiting: CopiedMessage | None = None
+        self._schemas: dict[int | tuple[str, str, bytes], int] = {}
+        self._items = log.messages()
+        self._waiting: CopiedMessage | CopiedChunk | None = None
+        # The messages of a chunk that was taken apart; they come before all else.
+        self._opened: deque[CopiedMessage] = deque()
         self._maker = MessageMaker()
         self._sequence = 0
         map_metadata: dict[str, str] = {}
@@ -124,7 +122,7 @@ class AnnotatedMcap:
         return self._add_channel(self._info.topic, GRID_TYPE) if not self._has_messages() else None
 
     def _has_messages(self) -> bool:
-        self._waiting = next(self._messages, None)
+        self._waiting = next(self._items, None)
         return self._waiting is not None
 
     def write(self, frame: TrackedSnapshot) -> None:
@@ -156,7 +154,7 @@ class AnnotatedMcap:
                 self._copy_until(None)
                 text = json.dumps(self._info.parameters.resolved(), indent=2)
                 self._writer.add_attachment(0, 0, ATTACHMENT, "application/json", text.encode())
-                self._writer.finish()  # type: ignore[no-untyped-call]
+                self._writer.finish()
                 if self._file is not None:
                     self._file.close()
                 self._part.replace(self._path)
@@ -164,20 +162,26 @@ class AnnotatedMcap:
             self._abandon()
 
     def _copy_until(self, time_ns: int | None) -> None:
+        """Copy what was logged up to a time; a chunk that goes on after it is taken apart."""
         while True:
             if self._waiting is None:
-                self._waiting = next(self._messages, None)
-            if self._waiting is None or (time_ns is not None and self._waiting.log_time > time_ns):
+                self._waiting = self._opened.popleft() if self._opened else next(self._items, None)
+            item = self._waiting
+            if item is None or (time_ns is not None and item.log_time > time_ns):
                 return
-            message, self._waiting = self._waiting, None
-            self._writer.add_message(
-                self._register(message.channel),
-                message.log_time,
-                bytes(message.data),
-                message.publish_time,
-                message.sequence,
-            )
-            self.copied_counts[message.channel.topic] += 1
+            self._waiting = None
+            if isinstance(item, CopiedMessage):
+                self._writer.add_message(
+                    self._register(item.channel), item.log_time, item.data, item.publish_time, item.sequence
+                )
+            elif time_ns is None or item.end_time <= time_ns:
+                self._writer.copy_chunk(item.stream, item.index)
+            else:
+                try:
+                    self._opened.extend(item.messages())
+                except DAMAGE:
+                    # Nothing of it can be told apart any more; it stays what it is.
+                    self._writer.copy_chunk(item.stream, item.index)
 
     def _register(self, channel: CopiedChannel) -> int:
         if channel.key not in self._channels:
@@ -186,24 +190,29 @@ class AnnotatedMcap:
                     f"{self._info.log_path}: holds {channel.topic} already; analyse the log it was made from"
                 )
             schema = (channel.schema_name, channel.schema_encoding, channel.schema_data)
+            # The chunks that are copied name channels and schemas by their ids.
             self._channels[channel.key] = self._writer.register_channel(
-                channel.topic, channel.message_encoding, self._schema(*schema), channel.metadata
+                channel.topic,
+                channel.message_encoding,
+                self._schema(*schema, channel.schema_id) if any(schema) else 0,
+                channel.metadata,
+                channel.key,
             )
         return self._channels[channel.key]
 
-    def _schema(self, name: str, encoding: str, data: bytes) -> int:
-        if not (name or encoding or data):
-            return 0
-        key = (name, encoding, data)
+    def _schema(self, name: str, encoding: str, data: bytes, copied_id: int | None = None) -> int:
+        content = (name, encoding, data)
+        key = content if copied_id is None else copied_id
         if key not in self._schemas:
-            self._schemas[key] = self._writer.register_schema(name, encoding, data)
+            made = self._writer.register_schema(name, encoding, data, copied_id)
+            self._schemas[key] = self._schemas[content] = made
         return self._schemas[key]
 
     def _add_channel(self, topic: str, kind: str) -> int:
         schema = self._schema(kind, "ros2msg", self._maker.definition(kind))
         return self._writer.register_channel(topic, "cdr", schema, {"offered_qos_profiles": self._qos})
 
-    def _add(self, channel: int, time_ns: int, data: bytes) -> None:
+    def _add(self, channel: int, time_ns: int, data: bytearray) -> None:
         self._writer.add_message(channel, time_ns, data, time_ns, self._sequence)
 
     def _abandon(self) -> None:

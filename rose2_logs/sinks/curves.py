@@ -45,12 +45,15 @@ class Curve:
     name : str
         For the legend.
     x, y : (N,) float
-        Its points, joined in their order.
+        Its points.
+    is_joined : bool
+        Whether a line joins them in their order.
     """
 
     name: str
     x: FloatArray
     y: FloatArray
+    is_joined: bool = True
 
 
 def draw_along(title: str, points: Sequence[RunPoint]) -> Image:
@@ -71,7 +74,13 @@ def draw_along(title: str, points: Sequence[RunPoint]) -> Image:
 
 
 def draw_curves(
-    curves: Sequence[Curve], title: str, x_label: str, y_range: tuple[float, float] | None = None
+    curves: Sequence[Curve],
+    title: str,
+    x_label: str,
+    y_range: tuple[float, float] | None = None,
+    *,
+    log_x: bool = False,
+    log_y: bool = False,
 ) -> Image:
     """Draw curves with axes, grid and legend.
 
@@ -82,16 +91,23 @@ def draw_curves(
     title, x_label : str
         Above and below the axes.
     y_range : (float, float), optional
-        Ends of the vertical axis; by default from 0 to a round number above every curve.
+        Ends of the vertical axis; by default from 0, or the power of ten below on a logarithmic axis, to a
+        round number above every curve.
+    log_x, log_y : bool
+        Whether an axis is logarithmic: then all its values are above 0.
 
     Returns
     -------
     (H, W, 3) uint8
         RGB.
     """
-    x_low, x_high = _round_range(np.concatenate([curve.x for curve in curves]))
+    x_axis = _axis(np.concatenate([curve.x for curve in curves]), log_x)
     top = np.concatenate([curve.y for curve in curves])
-    y_low, y_high = y_range if y_range is not None else (0.0, _round_range(np.append(top, 0.0))[1])
+    if y_range is not None:
+        y_axis = _Axis(*y_range, log_y)
+    else:
+        y_axis = _axis(top if log_y else np.append(top, 0.0), log_y)
+        y_axis = y_axis if log_y else _Axis(0.0, y_axis.high, is_log=False)
     s = SMOOTHING
     image = PillowImage.new("RGB", (WIDTH_PX * s, HEIGHT_PX * s), PAPER)
     draw, font = ImageDraw.Draw(image), ImageFont.load_default(TEXT_PX * s)
@@ -99,15 +115,14 @@ def draw_curves(
     upper, lower = TOP_PX * s, (HEIGHT_PX - BOTTOM_PX) * s
 
     def to_pixels(x: float, y: float) -> tuple[float, float]:
-        along, up = (x - x_low) / (x_high - x_low), (y - y_low) / (y_high - y_low)
-        return left + along * (right - left), lower - up * (lower - upper)
+        return left + x_axis.share(x) * (right - left), lower - y_axis.share(y) * (lower - upper)
 
-    for value in _ticks(x_low, x_high):
-        place = to_pixels(value, y_low)[0]
+    for value in x_axis.ticks():
+        place = to_pixels(value, y_axis.low)[0]
         draw.line((place, upper, place, lower), GRID, s)
         draw.text((place, lower + TEXT_PX * s), f"{value:g}", INK, font, anchor="mm")
-    for value in _ticks(y_low, y_high):
-        place = to_pixels(x_low, value)[1]
+    for value in y_axis.ticks():
+        place = to_pixels(x_axis.low, value)[1]
         draw.line((left, place, right, place), GRID, s)
         draw.text((left - TEXT_PX * s / 2, place), f"{value:g}", INK, font, anchor="rm")
     draw.rectangle((left, upper, right, lower), outline=INK, width=s)
@@ -116,7 +131,8 @@ def draw_curves(
     for number, curve in enumerate(curves):
         colour = LINE_COLOURS[number % len(LINE_COLOURS)]
         pixels = [to_pixels(x, y) for x, y in zip(curve.x.tolist(), curve.y.tolist(), strict=True)]
-        draw.line(pixels, colour, LINE_PX * s, joint="curve")
+        if curve.is_joined:
+            draw.line(pixels, colour, LINE_PX * s, joint="curve")
         for x, y in pixels:
             draw.ellipse((x - DOT_PX * s, y - DOT_PX * s, x + DOT_PX * s, y + DOT_PX * s), colour)
         beside = upper + (number + 0.5) * 1.6 * TEXT_PX * s
@@ -125,24 +141,44 @@ def draw_curves(
     return np.asarray(image.reduce(s))
 
 
+@dataclass(frozen=True)
+class _Axis:
+    """The range of an axis; a logarithmic one lies above 0."""
+
+    low: float
+    high: float
+    is_log: bool
+
+    def share(self, value: float) -> float:
+        """Where a value lies, 0 at the low end and 1 at the high one."""
+        if self.is_log:
+            return float(np.log(value / self.low) / np.log(self.high / self.low))
+        return (value - self.low) / (self.high - self.low)
+
+    def ticks(self) -> list[float]:
+        if self.is_log:
+            powers = range(round(np.log10(self.low)), round(np.log10(self.high)) + 1)
+            return [10.0**power for power in powers]
+        step = _step(self.low, self.high)
+        first, last = np.ceil(self.low / step - 1e-9), np.floor(self.high / step + 1e-9)
+        # Adding nothing turns a negative zero into zero.
+        return [float(number) * step + 0.0 for number in np.arange(first, last + 1)]
+
+
+def _axis(values: FloatArray, is_log: bool) -> _Axis:
+    """Return an axis that holds all values: its ends are multiples of its step, or powers of ten."""
+    low, high = float(values.min()), float(values.max())
+    if is_log:
+        first, last = np.floor(np.log10(low) + 1e-9), np.ceil(np.log10(high) - 1e-9)
+        return _Axis(10.0**first, 10.0 ** max(last, first + 1), is_log=True)
+    if high <= low:
+        low, high = low - 1.0, high + 1.0
+    step = _step(low, high)
+    return _Axis(float(np.floor(low / step) * step), float(np.ceil(high / step) * step), is_log=False)
+
+
 def _step(low: float, high: float) -> float:
     """Return the least round step that gives at most `TICKS_MAX` ticks."""
     exact = (high - low) / TICKS_MAX
     power = 10.0 ** np.floor(np.log10(exact))
     return float(next(round_step * power for round_step in ROUND_STEPS if round_step * power >= exact))
-
-
-def _round_range(values: FloatArray) -> tuple[float, float]:
-    """Ends of an axis that holds all values, at multiples of its step."""
-    low, high = float(values.min()), float(values.max())
-    if high <= low:
-        low, high = low - 1.0, high + 1.0
-    step = _step(low, high)
-    return float(np.floor(low / step) * step), float(np.ceil(high / step) * step)
-
-
-def _ticks(low: float, high: float) -> list[float]:
-    step = _step(low, high)
-    first, last = np.ceil(low / step - 1e-9), np.floor(high / step + 1e-9)
-    # Adding nothing turns a negative zero into zero.
-    return [float(number) * step + 0.0 for number in np.arange(first, last + 1)]

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import struct
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any
 
+import zstandard
+from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.reader import NonSeekingReader, make_reader
-from mcap.records import Attachment, Metadata
+from mcap.records import Attachment, Chunk, ChunkIndex, Message, Metadata
+from mcap.stream_reader import breakup_chunk
+from mcap.summary import Summary
 
 from rose2_logs.errors import LogError
 from rose2_logs.sinks.ros_messages import ros2_typestore
@@ -29,15 +34,25 @@ LATCHED_QOS = (
     "  avoid_ros_namespace_conventions: false"
 )
 """Keep last, depth 1, reliable, transient local: how ROS 2 publishes maps; rosbag2's spelling."""
+RECORD_HEAD_BYTES = 9
+"""Of an MCAP record: opcode and length."""
+INDEX_RECORD_BYTES, INDEX_ENTRY_BYTES = 15, 16
+"""Of an MCAP's message index: record head, channel, length of the entries; log time and offset."""
+DAMAGE = (McapError, zstandard.ZstdError, ValueError, RuntimeError, KeyError, EOFError, struct.error)
+"""What the mcap package and its decompressors raise on bytes that are not what they should be."""
 
 
 @dataclass(frozen=True)
 class CopiedChannel:
-    """A channel with its schema, as it is to stand in the output; channels are equal by `key`."""
+    """A channel with its schema, as it is to stand in the output; channels are equal by `key`.
+
+    `key` and `schema_id` are the ids of channel and schema in the input.
+    """
 
     key: int
     topic: str
     message_encoding: str
+    schema_id: int
     schema_name: str
     schema_encoding: str
     schema_data: bytes
@@ -53,6 +68,29 @@ class CopiedMessage:
     publish_time: int
     sequence: int
     data: bytes | memoryview
+
+
+@dataclass(frozen=True)
+class CopiedChunk:
+    """A chunk of messages that can stand in the output as it is, compressed.
+
+    Attributes
+    ----------
+    log_time, end_time : int
+        Log times of its first and its last message.
+    stream : binary file
+        Holds it.
+    index : ChunkIndex
+        Where it lies.
+    messages : callable
+        Gives its messages by log time; raises what `DAMAGE` lists where they cannot be read.
+    """
+
+    log_time: int
+    end_time: int
+    stream: IO[bytes]
+    index: ChunkIndex
+    messages: Callable[[], list[CopiedMessage]] = field(repr=False)
 
 
 class CopiedLog(ABC):
@@ -72,8 +110,11 @@ class CopiedLog(ABC):
         """List the channels that are known before reading, those without a message among them."""
 
     @abstractmethod
-    def messages(self) -> Iterator[CopiedMessage]:
-        """Yield every message by log time, or in the order of the file where it has no index."""
+    def messages(self) -> Iterator[CopiedMessage | CopiedChunk]:
+        """Yield every message by log time, or in the order of the file where it has no index.
+
+        Messages in chunks that can go over as they are come as those chunks, in the order of the file.
+        """
 
     def attachments(self) -> Iterator[Attachment]:
         """Yield the attachments."""
@@ -111,12 +152,12 @@ class _NoLog(CopiedLog):
     def channels(self) -> list[CopiedChannel]:
         return []
 
-    def messages(self) -> Iterator[CopiedMessage]:
+    def messages(self) -> Iterator[CopiedMessage | CopiedChunk]:
         return iter(())
 
 
 class _McapLog(CopiedLog):
-    """An MCAP file, record by record as it is."""
+    """An MCAP file: chunk by chunk, or message by message where its index does not tell of every message."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -140,7 +181,17 @@ class _McapLog(CopiedLog):
         schemas = self._summary.schemas
         return [self._channel(item, schemas.get(item.schema_id)) for item in self._summary.channels.values()]
 
-    def messages(self) -> Iterator[CopiedMessage]:
+    def messages(self) -> Iterator[CopiedMessage | CopiedChunk]:
+        if self._summary is not None and _is_all_in_indexed_chunks(self._summary):
+            for index in sorted(self._summary.chunk_indexes, key=lambda index: index.chunk_start_offset):
+                yield CopiedChunk(
+                    index.message_start_time,
+                    index.message_end_time,
+                    self._file,
+                    index,
+                    partial(self._messages_in, index),
+                )
+            return
         self._file.seek(0)
         reader = make_reader(self._file) if self._summary else NonSeekingReader(self._file)
         try:
@@ -152,9 +203,24 @@ class _McapLog(CopiedLog):
                     message.sequence,
                     message.data,
                 )
-        except McapError as error:
+        except DAMAGE as error:
             if self._summary is not None:
                 raise LogError(f"{self._path}: cannot be copied: {error}") from error
+
+    def _messages_in(self, index: ChunkIndex) -> list[CopiedMessage]:
+        self._file.seek(index.chunk_start_offset + RECORD_HEAD_BYTES)
+        records = breakup_chunk(Chunk.read(ReadDataStream(self._file)), validate_crc=True)
+        found = [record for record in records if isinstance(record, Message)]
+        return [
+            CopiedMessage(
+                self._channels[message.channel_id],
+                message.log_time,
+                message.publish_time,
+                message.sequence,
+                message.data,
+            )
+            for message in sorted(found, key=lambda message: message.log_time)
+        ]
 
     def attachments(self) -> Iterator[Attachment]:
         if self._summary is not None:
@@ -173,9 +239,35 @@ class _McapLog(CopiedLog):
         if channel.id not in self._channels:
             name, encoding, data = (schema.name, schema.encoding, schema.data) if schema else ("", "", b"")
             self._channels[channel.id] = CopiedChannel(
-                channel.id, channel.topic, channel.message_encoding, name, encoding, data, channel.metadata
+                channel.id,
+                channel.topic,
+                channel.message_encoding,
+                channel.schema_id,
+                name,
+                encoding,
+                data,
+                channel.metadata,
             )
         return self._channels[channel.id]
+
+
+def _is_all_in_indexed_chunks(summary: Summary) -> bool:
+    """Whether every message lies in a chunk that is followed by its message index.
+
+    An index record is 15 bytes and 16 for each message, so that its length tells how many there are.
+    """
+    indexed = 0
+    for chunk in summary.chunk_indexes:
+        offsets = chunk.message_index_offsets
+        if offsets and min(offsets.values()) != chunk.chunk_start_offset + chunk.chunk_length:
+            return False
+        indexed += (chunk.message_index_length - INDEX_RECORD_BYTES * len(offsets)) // INDEX_ENTRY_BYTES
+    return (
+        summary.statistics is not None
+        and summary.statistics.message_count == indexed
+        and summary.statistics.chunk_count == len(summary.chunk_indexes)
+        and summary.statistics.channel_count == len(summary.channels)
+    )
 
 
 class _BagLog(CopiedLog):
@@ -192,6 +284,8 @@ class _BagLog(CopiedLog):
         except (AnyReaderError, KeyError, UnicodeDecodeError, OSError) as error:
             raise LogError(f"{path}: cannot be copied: {error}") from error
         self._target = ros2_typestore(self._reader.typestore.fielddefs)
+        types = sorted({item.msgtype for item in self._reader.connections})
+        self._schema_ids = {name: number for number, name in enumerate(types, start=1)}
         self._channels = {
             self._connection_key(item): self._as_channel(number, item)
             for number, item in enumerate(self._reader.connections, start=1)
@@ -200,7 +294,7 @@ class _BagLog(CopiedLog):
     def channels(self) -> list[CopiedChannel]:
         return list(self._channels.values())
 
-    def messages(self) -> Iterator[CopiedMessage]:
+    def messages(self) -> Iterator[CopiedMessage | CopiedChunk]:
         sequence: dict[int, int] = {}
         for connection, time_ns, data in self._reader.messages():
             channel = self._channels[self._connection_key(connection)]
@@ -228,6 +322,7 @@ class _BagLog(CopiedLog):
             number,
             connection.topic,
             "cdr",
+            self._schema_ids[connection.msgtype],
             connection.msgtype,
             "ros2msg",
             text.encode(),

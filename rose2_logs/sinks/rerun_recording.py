@@ -8,6 +8,7 @@ import socket
 import subprocess
 import sys
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -17,24 +18,22 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from rose2_logs.errors import OutputError
-from rose2_logs.occupancy import FloatArray, GridGeometry, known_window
+from rose2_logs.occupancy import FloatArray
 from rose2_logs.sinks.palette import track_colour
 from rose2_logs.sinks.rerun_blueprint import COVERAGE_UNIT, corners_of, make_blueprint
-from rose2_logs.sinks.ros_messages import label_point, outer_rings
+from rose2_logs.sinks.rerun_columns import Entry, Label, Scalar, Strips
+from rose2_logs.sinks.rerun_layers import CHUNK_BYTES, Layers
+from rose2_logs.sinks.rerun_pictures import MapPictures
+from rose2_logs.sinks.ros_messages import outer_rings
 from rose2_logs.sinks.sink import RunInfo
 from rose2_logs.tracking.frames import RoomEvent, TrackedSnapshot
 
 logger = logging.getLogger(__name__)
 
-FILL_OPACITY = 0.6
-"""Share of a room's colour in its cells: the map shows through."""
-UNKNOWN_SHADE = 205
-"""Grey of unknown cells, as map_server draws them."""
 LAYER_STEP_M = 0.01
 """Layers lie this far above each other, so that none flickers through another."""
 OUTLINE_POINTS, WALL_POINTS, LINE_POINTS = 2.0, 1.5, 0.75
 """Widths of lines in points of the screen, which stay readable at any zoom."""
-TIMELINES = ("message_log_time", "ros2_timestamp", "snapshot", "coverage")
 FLUSH_TIMEOUT_S = 60.0
 VIEWER_PORT = 9876
 """Where Rerun's viewer listens unless told otherwise."""
@@ -45,8 +44,9 @@ class RerunRecording:
     """Sink that writes a ``.rrd`` with its layout, or shows the run in an open viewer, or both.
 
     Timelines are ``message_log_time`` and ``ros2_timestamp`` (as in Rerun's own MCAP importer), ``snapshot``,
-    and ``coverage`` in steps of 1e-4. Rooms stand under ``/world/rooms/TRACK``, their areas under
-    ``/run/area/TRACK``; they are cleared when their track is lost.
+    and ``coverage``, the greatest so far, in steps of 1e-4. Rooms stand under ``/world/rooms/TRACK``, their
+    areas under ``/run/area/TRACK``; they are cleared when their track is lost. What has not changed since the
+    snapshot before is not logged again.
 
     Parameters
     ----------
@@ -78,8 +78,12 @@ class RerunRecording:
         # The same log gives the same recording id, so that a second run replaces the first in a viewer.
         fingerprint = str(self._info.provenance.get("sha256", self._info.log_path.name))
         self._recording = rr.RecordingStream(
-            "rose2_logs", recording_id=f"{self._info.log_path.stem}-{fingerprint[:16]}", send_properties=True
+            "rose2_logs",
+            recording_id=f"{self._info.log_path.stem}-{fingerprint[:16]}",
+            send_properties=True,
         )
+        # A live viewer shows each snapshot at once.
+        self._layers = Layers(self._recording, 0 if self._live else CHUNK_BYTES)
         sinks: list[rr.FileSink | rr.GrpcSink] = []
         if self._part is not None:
             try:
@@ -96,23 +100,25 @@ class RerunRecording:
         self._recording.log("/world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
         self._recording.log("/run/coverage", rr.SeriesLines(names="coverage", widths=2), static=True)
         self._recording.log("/run/rooms", rr.SeriesLines(names="rooms", widths=2), static=True)
+        self._style_lines("/world/doorways", 2 * OUTLINE_POINTS, (230, 90, 20))
+        self._style_lines("/world/walls", WALL_POINTS, (40, 40, 40))
+        self._style_lines("/world/lines", LINE_POINTS, (60, 110, 230))
+        self._style_lines("/world/edges", LINE_POINTS)
         return self
 
     def write(self, frame: TrackedSnapshot) -> None:
         """Log one snapshot at all its times."""
         recording, snapshot = self._recording, frame.snapshot
-        recording.set_time("message_log_time", timestamp=np.datetime64(snapshot.log_time_ns, "ns"))
-        recording.set_time("ros2_timestamp", timestamp=np.datetime64(snapshot.stamp_ns, "ns"))
-        recording.set_time("snapshot", sequence=snapshot.index)
-        recording.set_time("coverage", sequence=round(frame.coverage / COVERAGE_UNIT))
+        coverage = round(frame.coverage / COVERAGE_UNIT)
+        self._layers.begin(snapshot.log_time_ns, snapshot.stamp_ns, snapshot.index, coverage)
         self._log_map(frame)
         self._log_rooms(frame)
         self._log_structure(frame)
-        recording.log("/run/coverage", rr.Scalars(frame.coverage))
-        recording.log("/run/rooms", rr.Scalars(len(frame.track_ids)))
+        self._layers.add("/run/coverage", Scalar(frame.coverage))
+        self._layers.add("/run/rooms", Scalar(len(frame.track_ids)))
         for event in frame.events:
             if event.kind != "continued":
-                recording.log("/events", rr.TextLog(event_text(event), level=_event_level(event)))
+                self._layers.add("/events", Entry(event_text(event), _event_level(event)))
         if self._frames == 0:
             # A live viewer shows the layout from the beginning; the file gets the final one.
             recording.send_blueprint(make_blueprint(self._low, self._high))
@@ -124,6 +130,7 @@ class RerunRecording:
     ) -> None:
         try:
             if kind is None:
+                self._layers.flush()
                 self._recording.log(
                     "/summary", rr.TextDocument(self._summary(), media_type="text/markdown"), static=True
                 )
@@ -153,96 +160,68 @@ class RerunRecording:
             logger.warning("the Rerun viewer does not answer any more; the run goes on without it")
 
     def _log_map(self, frame: TrackedSnapshot) -> None:
-        cells, geometry = frame.snapshot.cells, frame.analysis.geometry
-        window = known_window(cells >= 0)
-        corner = np.array([[window[1].start, window[0].start], [window[1].stop, window[0].stop]], float)
-        box = geometry.grid_to_world(
-            np.array([corner[0], corner[1], [corner[0, 0], corner[1, 1]], [corner[1, 0], corner[0, 1]]])
-            * geometry.resolution_m
-        )
-        low, high = corners_of(box)
+        pictures = MapPictures(frame)
+        low, high = corners_of(pictures.corners_m)
         self._low, self._high = np.minimum(self._low, low), np.maximum(self._high, high)
-        # Unknown is 255 as an unsigned byte, which is what the RViz colours expect.
-        grid = cells[window].view(np.uint8)
-        self._recording.log(
-            "/world/map",
-            _grid_map(grid, geometry, window, 0, colormap=rr.components.Colormap.RvizMap),
-        )
-        labels = frame.analysis.rooms.labels[window]
-        plain = _shades(cells[window])
-        colours = np.array([(0, 0, 0), *(track_colour(track) for track in frame.track_ids)], float)
-        painted = FILL_OPACITY * colours[labels] + (1 - FILL_OPACITY) * plain
-        fills = np.where((labels > 0)[..., None], painted, plain).astype(np.uint8)
-        self._recording.log("/world/room_fills", _grid_map(fills, geometry, window, 1))
+        self._layers.show("/world/map", pictures.map(0.0))
+        self._layers.show("/world/room_fills", pictures.rooms(LAYER_STEP_M))
         if frame.analysis.structure is not None:
-            faint = 255 - (255 - plain) / 4
-            clean = np.where(frame.analysis.structure.clean[window][..., None], (150, 0, 60), faint)
-            self._recording.log("/world/clean_map", _grid_map(clean.astype(np.uint8), geometry, window, 2))
+            clean = pictures.clean_map(frame.analysis.structure.clean, 2 * LAYER_STEP_M)
+            self._layers.show("/world/clean_map", clean)
 
     def _log_rooms(self, frame: TrackedSnapshot) -> None:
-        recording, rooms = self._recording, frame.analysis.rooms
+        rooms = frame.analysis.rooms
         for track in sorted(self._shown - set(frame.track_ids)):
-            recording.log(f"/world/rooms/{track}", rr.Clear(recursive=True))
-            recording.log(f"/run/area/{track}", rr.Clear(recursive=False))
+            self._layers.clear(f"/world/rooms/{track}")
+            self._layers.clear(f"/run/area/{track}")
         self._shown = set(frame.track_ids)
-        for number, track in enumerate(frame.track_ids, start=1):
-            colour = track_colour(track)
+        points = _lifted(np.nan_to_num(rooms.label_points_m), 6).tolist()
+        for number, track in enumerate(frame.track_ids):
             if track not in self._begun:
-                self._begun[track] = frame.snapshot.index
-                recording.log(
-                    f"/run/area/{track}", rr.SeriesLines(colors=[colour], names=f"room {track}"), static=True
-                )
-            shape, area = rooms.polygons[number - 1], float(rooms.areas_m2[number - 1])
-            dark = tuple(int(value * 0.6) for value in colour)
-            recording.log(
-                f"/world/rooms/{track}",
-                rr.LineStrips3D(
-                    [_lifted(ring, 3) for ring in outer_rings(shape)],
-                    colors=[dark],
-                    radii=rr.components.Radius.ui_points(OUTLINE_POINTS),
-                ),
-            )
-            recording.log(
-                f"/world/rooms/{track}/label",
-                rr.Points3D(
-                    _lifted(np.array([label_point(shape)]), 6),
-                    labels=[f"{track}: {area:.0f} m²"],
-                    colors=[(255, 255, 255)],
-                    radii=rr.components.Radius.ui_points(1.0),
-                    show_labels=True,
-                ),
-            )
-            recording.log(f"/run/area/{track}", rr.Scalars(area))
+                self._begin_track(track, frame.snapshot.index)
+            shape, area = rooms.polygons[number], float(rooms.areas_m2[number])
+            self._layers.show(f"/world/rooms/{track}", _strips(outer_rings(shape), 3))
+            x, y, z = points[number]
+            self._layers.show(f"/world/rooms/{track}/label", Label((x, y, z), f"{track}: {area:.0f} m²"))
+            self._layers.add(f"/run/area/{track}", Scalar(area))
+
+    def _begin_track(self, track: int, index: int) -> None:
+        """Log what stays the same for a track."""
+        self._begun[track] = index
+        colour = track_colour(track)
+        dark = tuple(int(value * 0.6) for value in colour)
+        self._style_lines(f"/world/rooms/{track}", OUTLINE_POINTS, dark)
+        label = rr.Points3D.from_fields(
+            colors=[(255, 255, 255)], radii=rr.components.Radius.ui_points(1.0), show_labels=True
+        )
+        self._recording.log(f"/world/rooms/{track}/label", label, static=True)
+        name = rr.SeriesLines(colors=[colour], names=f"room {track}")
+        self._recording.log(f"/run/area/{track}", name, static=True)
+
+    def _style_lines(self, path: str, width: float, colour: tuple[int, ...] | None = None) -> None:
+        """Log the width in points of the screen of all lines of a path, and their colour if it is one."""
+        style = rr.LineStrips3D.from_fields(
+            radii=rr.components.Radius.ui_points(width), colors=None if colour is None else [colour]
+        )
+        self._recording.log(path, style, static=True)
 
     def _log_structure(self, frame: TrackedSnapshot) -> None:
         analysis = frame.analysis
         doors = np.array([door.ends_m for door in analysis.rooms.doorways]).reshape(-1, 4)
-        self._log_lines("/world/doorways", doors, 5, (230, 90, 20), 2 * OUTLINE_POINTS)
+        self._log_lines("/world/doorways", doors, 5)
         if analysis.walls is not None:
-            self._log_lines("/world/walls", analysis.walls.segments_m, 4, (40, 40, 40), WALL_POINTS)
-            self._log_lines("/world/lines", analysis.walls.lines_m, 4, (60, 110, 230), LINE_POINTS)
+            self._log_lines("/world/walls", analysis.walls.segments_m, 4)
+            self._log_lines("/world/lines", analysis.walls.lines_m, 4)
         if analysis.floor_plan is not None:
             weight = analysis.floor_plan.edge_weight[:, None]
             colours = (weight * (220, 30, 30) + (1 - weight) * (60, 190, 90)).astype(np.uint8)
-            self._log_lines("/world/edges", analysis.floor_plan.edges_m, 4, colours, LINE_POINTS)
+            self._log_lines("/world/edges", analysis.floor_plan.edges_m, 4, colours)
 
     def _log_lines(
-        self,
-        path: str,
-        ends_m: FloatArray,
-        layer: int,
-        colours: tuple[int, int, int] | NDArray[np.uint8],
-        width: float,
+        self, path: str, ends_m: FloatArray, layer: int, colours: NDArray[np.uint8] | None = None
     ) -> None:
-        strips = list(_lifted(ends_m.reshape(-1, 2), layer).reshape(-1, 2, 3))
-        self._recording.log(
-            path,
-            rr.LineStrips3D(
-                strips,
-                colors=colours if isinstance(colours, np.ndarray) else [colours],
-                radii=rr.components.Radius.ui_points(width),
-            ),
-        )
+        points = _lifted(ends_m.reshape(-1, 2), layer)
+        self._layers.show(path, Strips(points, np.full(len(ends_m), 2, np.int32), colours))
 
     def _summary(self) -> str:
         info = self._info
@@ -310,39 +289,12 @@ def _event_level(event: RoomEvent) -> str:
     return str(level)
 
 
-def _shades(cells: NDArray[np.int8]) -> FloatArray:
-    """Grey (H, W, 3) of each cell: white free, black occupied, grey unknown."""
-    shade = np.where(cells < 0, UNKNOWN_SHADE, 255 * (1 - np.minimum(cells, 100) / 100.0))
-    return np.repeat(shade[..., None], 3, axis=2)
-
-
-def _grid_map(
-    pixels: NDArray[np.uint8],
-    geometry: GridGeometry,
-    window: tuple[slice, slice],
-    layer: int,
-    colormap: rr.components.Colormap | None = None,
-) -> rr.GridMap:
-    """Part of a grid as Rerun draws it: its pictures begin at the top, a grid at its origin."""
-    corner = np.array([window[1].start, window[0].start]) * geometry.resolution_m
-    x, y = geometry.grid_to_world(corner).tolist()
-    half = geometry.yaw_rad / 2
-    return rr.GridMap(
-        data=np.ascontiguousarray(np.flipud(pixels)).tobytes(),
-        format=rr.components.ImageFormat(
-            width=pixels.shape[1],
-            height=pixels.shape[0],
-            color_model="L" if pixels.ndim == 2 else "RGB",
-            channel_datatype="U8",
-        ),
-        cell_size=geometry.resolution_m,
-        translation=[x, y, layer * LAYER_STEP_M],
-        quaternion=rr.Quaternion(xyzw=[0.0, 0.0, float(np.sin(half)), float(np.cos(half))]),
-        colormap=colormap,
-        draw_order=float(layer),
-    )
-
-
-def _lifted(points_m: FloatArray, layer: int) -> FloatArray:
+def _lifted(points_m: FloatArray, layer: int) -> NDArray[np.float32]:
     """Points (K, 2) as (K, 3) at a layer's height."""
-    return np.column_stack([points_m, np.full(len(points_m), layer * LAYER_STEP_M)])
+    return np.column_stack([points_m, np.full(len(points_m), layer * LAYER_STEP_M)]).astype(np.float32)
+
+
+def _strips(rings: Sequence[FloatArray], layer: int) -> Strips:
+    """Closed rings at a layer's height."""
+    points = _lifted(np.concatenate([np.zeros((0, 2)), *rings]), layer)
+    return Strips(points, np.array([len(ring) for ring in rings], np.int32))

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from rose2_logs.occupancy import UNKNOWN, GridGeometry
+from rose2_logs.occupancy import UNKNOWN, FloatArray
+from rose2_logs.sinks.cdr import CdrWriter
 from rose2_logs.sinks.palette import track_colour
 from rose2_logs.tracking.frames import TrackedSnapshot
 
@@ -38,12 +40,12 @@ FILL_OPACITY = 0.45
 LABEL_HEIGHT_M = 0.5
 OUTLINE_WIDTH_M = 0.06
 LINE_WIDTH_M = 0.03
-LABEL_TOLERANCE_M = 0.05
-"""A label lies at the deepest point of its room to this."""
 TOUCH_M = 1e-3
 """How much wider a shape is drawn that cannot be triangulated as it is: far below a cell."""
 ADD, DELETE_ALL = 0, 3
-LINE_STRIP, LINE_LIST, TEXT, TRIANGLES = 4, 5, 9, 11
+LINE_LIST, TEXT, TRIANGLES = 5, 9, 11
+NO_TURN = (0.0, 0.0, 0.0, 1.0)
+"""Quaternion x, y, z, w."""
 
 
 def ros2_typestore(extra: Mapping[str, Any] | None = None) -> Typestore:
@@ -72,178 +74,164 @@ class MessageMaker:
 
     def __init__(self) -> None:
         self._store = ros2_typestore()
+        self._triangles: dict[bytes, FloatArray] = {}
 
     def definition(self, message_type: str) -> bytes:
         """Text of a type's definition with all it is made of, as MCAP's ros2msg schema."""
         return self._store.generate_msgdef(message_type, ros_version=2)[0].encode()
 
-    def source_map(self, frame: TrackedSnapshot) -> bytes:
+    def source_map(self, frame: TrackedSnapshot) -> bytearray:
         """Make the map itself, for inputs that are no log of messages."""
-        return self._grid(frame, frame.snapshot.cells)
+        return _grid(frame, frame.snapshot.cells)
 
-    def segmented_map(self, frame: TrackedSnapshot) -> bytes:
+    def segmented_map(self, frame: TrackedSnapshot) -> bytearray:
         """Make the segmented map: rooms as 1..98, occupied 100, other free cells 0, unknown -1."""
         values = np.array([0, *(1 + (track - 1) % HIGHEST_VALUE for track in frame.track_ids)], np.int8)
-        cells = values[frame.analysis.rooms.labels]
-        rest = frame.analysis.rooms.labels == 0
-        cells[rest] = np.where(frame.snapshot.cells < 0, UNKNOWN, frame.snapshot.cells)[rest]
-        return self._grid(frame, cells)
+        labels = frame.analysis.rooms.labels
+        return _grid(frame, np.where(labels == 0, np.maximum(frame.snapshot.cells, UNKNOWN), values[labels]))
 
-    def clean_map(self, frame: TrackedSnapshot) -> bytes | None:
+    def clean_map(self, frame: TrackedSnapshot) -> bytearray | None:
         """Make the clean map: 100 where structure, 0 where free or clutter, -1 unknown; None without one."""
         structure = frame.analysis.structure
         if structure is None:
             return None
-        cells = np.where(frame.snapshot.cells < 0, UNKNOWN, 0).astype(np.int8)
-        cells[structure.clean] = 100
-        return self._grid(frame, cells)
+        known = np.clip(frame.snapshot.cells, UNKNOWN, 0)
+        return _grid(frame, np.where(structure.clean, np.int8(100), known))
 
-    def rooms(self, frame: TrackedSnapshot) -> bytes:
+    def rooms(self, frame: TrackedSnapshot) -> bytearray:
         """Make the rooms message, by ascending track."""
-        types = self._store.types
-        point = types["geometry_msgs/msg/Point"]
         rooms, tracks = frame.analysis.rooms, frame.track_ids
-        made = []
-        for number in sorted(range(1, len(rooms) + 1), key=lambda number: tracks[number - 1]):
+        message = CdrWriter()
+        message.header(frame.snapshot.stamp_ns, frame.analysis.geometry.frame_id)
+        message.numbers("d", frame.coverage)
+        message.numbers("I", len(rooms))
+        points = np.nan_to_num(rooms.label_points_m).tolist()
+        for track, number in sorted(zip(tracks, range(1, len(rooms) + 1), strict=True)):
             shape = rooms.polygons[number - 1]
-            x, y = label_point(shape)
-            made.append(
-                types["rose2_msgs/msg/Room"](
-                    track=tracks[number - 1],
-                    area=float(rooms.areas_m2[number - 1]),
-                    predicted_area=float(shape.area),
-                    label_point=point(x=x, y=y, z=0.0),
-                    outline=[self._polygon(ring) for ring in outer_rings(shape)],
-                    neighbours=np.array(
-                        sorted(tracks[other - 1] for other in rooms.neighbours(number)), np.uint32
-                    ),
-                )
-            )
-        message = types[ROOMS_TYPE](header=self._header(frame), coverage=frame.coverage, rooms=made)
-        return self._serialised(message, ROOMS_TYPE)
+            message.numbers("I", track)
+            message.numbers("d", float(rooms.areas_m2[number - 1]), shape.area, *points[number - 1], 0.0)
+            rings = outer_rings(shape)
+            message.numbers("I", len(rings))
+            for ring in rings:
+                # The last corner of a ring repeats the first; a ROS polygon closes by itself.
+                message.points(ring[:-1], np.float32)
+            neighbours = sorted(tracks[other - 1] for other in rooms.neighbours(number))
+            message.sequence(np.array(neighbours, np.uint32))
+        return message.message()
 
-    def markers(self, frame: TrackedSnapshot) -> bytes:
+    def markers(self, frame: TrackedSnapshot) -> bytearray:
         """Make the markers: all old ones deleted, then fills, outlines, labels, walls, lines, doorways."""
         analysis, rooms = frame.analysis, frame.analysis.rooms
-        made = [self._marker(frame, "", 0, TRIANGLES, action=DELETE_ALL)]
-        for track, shape in sorted(
-            zip(frame.track_ids, rooms.polygons, strict=True), key=lambda pair: pair[0]
-        ):
+        made = [Marker("", 0, TRIANGLES, action=DELETE_ALL)]
+        points = np.nan_to_num(rooms.label_points_m).tolist()
+        triangles: dict[bytes, FloatArray] = {}
+        for track, number in sorted(zip(frame.track_ids, range(len(rooms)), strict=True)):
+            shape = rooms.polygons[number]
             red, green, blue = (value / 255 for value in track_colour(track))
-            corners = triangle_corners(shape)
             fill, line = (red, green, blue, FILL_OPACITY), (red * 0.7, green * 0.7, blue * 0.7, 1.0)
-            made.append(self._marker(frame, "rooms", track, TRIANGLES, corners, fill, 1.0))
-            for number, ring in enumerate(outer_rings(shape)):
-                name = "outlines" if number == 0 else f"outlines {number}"
-                made.append(self._marker(frame, name, track, LINE_STRIP, ring, line, OUTLINE_WIDTH_M))
-            label = self._marker(
-                frame,
-                "labels",
-                track,
-                TEXT,
-                colour=(0.0, 0.0, 0.0, 1.0),
-                width_m=LABEL_HEIGHT_M,
-                text=f"{track}\n{shape.area:.0f} m2",
-            )
-            label.pose.position.x, label.pose.position.y = label_point(shape)
-            made.append(label)
+            # Many a shape is that of the map before, and large ones take long to triangulate.
+            if (corners := self._triangles.get(key := shape.wkb)) is None:
+                corners = triangle_corners(shape)
+            triangles[key] = corners
+            x, y = points[number]
+            made += [
+                Marker("rooms", track, TRIANGLES, corners, fill),
+                Marker("outlines", track, LINE_LIST, ring_segments(shape), line, OUTLINE_WIDTH_M),
+                Marker(
+                    "labels",
+                    track,
+                    TEXT,
+                    colour=(0.0, 0.0, 0.0, 1.0),
+                    width_m=LABEL_HEIGHT_M,
+                    text=f"{track}\n{shape.area:.0f} m2",
+                    position_m=(x, y),
+                ),
+            ]
+        self._triangles = triangles
         if analysis.walls is not None:
             walls, lines = analysis.walls.segments_m.reshape(-1, 2), analysis.walls.lines_m.reshape(-1, 2)
-            made.append(
-                self._marker(frame, "walls", 0, LINE_LIST, walls, (0.1, 0.1, 0.1, 1.0), OUTLINE_WIDTH_M)
-            )
-            made.append(
-                self._marker(frame, "lines", 0, LINE_LIST, lines, (0.2, 0.4, 0.9, 0.35), LINE_WIDTH_M)
-            )
+            made.append(Marker("walls", 0, LINE_LIST, walls, (0.1, 0.1, 0.1, 1.0), OUTLINE_WIDTH_M))
+            made.append(Marker("lines", 0, LINE_LIST, lines, (0.2, 0.4, 0.9, 0.35), LINE_WIDTH_M))
         doors = np.array([door.ends_m for door in rooms.doorways]).reshape(-1, 2)
-        made.append(
-            self._marker(frame, "doorways", 0, LINE_LIST, doors, (0.9, 0.3, 0.1, 1.0), OUTLINE_WIDTH_M)
-        )
-        kind = "visualization_msgs/msg/MarkerArray"
-        return self._serialised(self._store.types[kind](markers=made), kind)
-
-    def _serialised(self, message: Any, kind: str) -> bytes:
-        return bytes(self._store.serialize_cdr(message, kind))
-
-    def _header(self, frame: TrackedSnapshot) -> Any:
-        types, geometry = self._store.types, frame.analysis.geometry
-        seconds, nanoseconds = divmod(frame.snapshot.stamp_ns, 10**9)
-        stamp = types["builtin_interfaces/msg/Time"](sec=seconds, nanosec=nanoseconds)
-        return types["std_msgs/msg/Header"](stamp=stamp, frame_id=geometry.frame_id)
-
-    def _grid(self, frame: TrackedSnapshot, cells: NDArray[np.int8]) -> bytes:
-        types, geometry = self._store.types, frame.analysis.geometry
-        header = self._header(frame)
-        info = types["nav_msgs/msg/MapMetaData"](
-            map_load_time=header.stamp,
-            resolution=geometry.resolution_m,
-            width=geometry.shape[1],
-            height=geometry.shape[0],
-            origin=self._pose(geometry),
-        )
-        kind = "nav_msgs/msg/OccupancyGrid"
-        data = np.ascontiguousarray(cells, np.int8).ravel()
-        return self._serialised(types[kind](header=header, info=info, data=data), kind)
-
-    def _pose(self, geometry: GridGeometry | None = None) -> Any:
-        types = self._store.types
-        (x, y), yaw = (geometry.origin_xy_m, geometry.yaw_rad) if geometry else ((0.0, 0.0), 0.0)
-        return types["geometry_msgs/msg/Pose"](
-            position=types["geometry_msgs/msg/Point"](x=x, y=y, z=0.0),
-            orientation=types["geometry_msgs/msg/Quaternion"](
-                x=0.0, y=0.0, z=float(np.sin(yaw / 2)), w=float(np.cos(yaw / 2))
-            ),
-        )
-
-    def _polygon(self, ring: NDArray[np.float64]) -> Any:
-        types = self._store.types
-        corner = types["geometry_msgs/msg/Point32"]
-        # The last corner of a ring repeats the first; a ROS polygon closes by itself.
-        corners = [corner(x=x, y=y, z=0.0) for x, y in ring[:-1].tolist()]
-        return types["geometry_msgs/msg/Polygon"](points=corners)
-
-    def _marker(
-        self,
-        frame: TrackedSnapshot,
-        namespace: str,
-        number: int,
-        kind: int,
-        points: NDArray[np.float64] | None = None,
-        colour: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0),
-        width_m: float = 1.0,
-        *,
-        action: int = ADD,
-        text: str = "",
-    ) -> Any:
-        types = self._store.types
-        point, rgba = types["geometry_msgs/msg/Point"], types["std_msgs/msg/ColorRGBA"]
-        corners = [] if points is None else [point(x=x, y=y, z=0.0) for x, y in points.tolist()]
-        return types["visualization_msgs/msg/Marker"](
-            header=self._header(frame),
-            ns=namespace,
-            id=number,
-            type=kind,
-            action=action,
-            pose=self._pose(),
-            scale=types["geometry_msgs/msg/Vector3"](x=width_m, y=width_m, z=width_m),
-            color=rgba(r=colour[0], g=colour[1], b=colour[2], a=colour[3]),
-            lifetime=types["builtin_interfaces/msg/Duration"](sec=0, nanosec=0),
-            frame_locked=False,
-            points=corners,
-            colors=[],
-            texture_resource="",
-            texture=types["sensor_msgs/msg/CompressedImage"](
-                header=self._header(frame), format="", data=np.zeros(0, np.uint8)
-            ),
-            uv_coordinates=[],
-            text=text,
-            mesh_resource="",
-            mesh_file=types["visualization_msgs/msg/MeshFile"](filename="", data=np.zeros(0, np.uint8)),
-            mesh_use_embedded_materials=False,
-        )
+        made.append(Marker("doorways", 0, LINE_LIST, doors, (0.9, 0.3, 0.1, 1.0), OUTLINE_WIDTH_M))
+        message = CdrWriter()
+        message.numbers("I", len(made))
+        for marker in made:
+            marker.write(message, frame.snapshot.stamp_ns, analysis.geometry.frame_id)
+        return message.message()
 
 
-def triangle_corners(shape: BaseGeometry) -> NDArray[np.float64]:
+@dataclass(frozen=True, eq=False)
+class Marker:
+    """What differs between the markers of a map: the fields of a visualization_msgs/Marker.
+
+    Attributes
+    ----------
+    ns, number : str, int
+        Namespace and id.
+    kind : int
+        Its type.
+    points_m : (N, 2) float
+        World metres.
+    colour : (float, float, float, float)
+        Red, green, blue, opacity in [0, 1].
+    width_m : float
+        Scale: the width of lines, the height of text.
+    action : int
+        To add it or to delete all.
+    text : str
+        What it says.
+    position_m : (float, float)
+        Where the text stands.
+    """
+
+    ns: str
+    number: int
+    kind: int
+    points_m: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
+    colour: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+    width_m: float = 1.0
+    action: int = ADD
+    text: str = ""
+    position_m: tuple[float, float] = (0.0, 0.0)
+
+    def write(self, message: CdrWriter, stamp_ns: int, frame_id: str) -> None:
+        """Append the marker, with the stamp and frame of its map."""
+        message.header(stamp_ns, frame_id)
+        message.string(self.ns)
+        message.numbers("i", self.number, self.kind, self.action)
+        message.numbers("d", *self.position_m, 0.0, *NO_TURN, *[self.width_m] * 3)
+        message.numbers("f", *self.colour)
+        message.numbers("i", 0, 0)  # lifetime: for ever
+        message.numbers("B", 0)  # frame_locked
+        message.points(self.points_m)
+        message.numbers("I", 0)  # colors
+        message.string("")  # texture_resource
+        message.header(stamp_ns, frame_id)  # texture: an empty picture
+        message.string("")
+        message.numbers("I", 0, 0)  # data of the texture, uv_coordinates
+        message.string(self.text)
+        message.string("")  # mesh_resource
+        message.string("")  # mesh_file: its name and data
+        message.numbers("I", 0)
+        message.numbers("B", 0)  # mesh_use_embedded_materials
+
+
+def _grid(frame: TrackedSnapshot, cells: NDArray[np.int8]) -> bytearray:
+    """Make a nav_msgs/OccupancyGrid with the stamp and the geometry of the map."""
+    geometry, stamp_ns = frame.analysis.geometry, frame.snapshot.stamp_ns
+    message = CdrWriter()
+    message.header(stamp_ns, geometry.frame_id)
+    message.time(stamp_ns)  # map_load_time
+    message.numbers("f", geometry.resolution_m)
+    message.numbers("I", geometry.shape[1], geometry.shape[0])
+    half = geometry.yaw_rad / 2
+    message.numbers("d", *geometry.origin_xy_m, 0.0, 0.0, 0.0, float(np.sin(half)), float(np.cos(half)))
+    message.sequence(cells.astype(np.int8, copy=False).ravel())
+    return message.message()
+
+
+def triangle_corners(shape: BaseGeometry) -> FloatArray:
     """Corners (3 K, 2) of triangles that fill a shape, world metres.
 
     GEOS fails on some outlines of cells in which a ring touches itself at a corner; a hair wider they touch
@@ -259,18 +247,15 @@ def triangle_corners(shape: BaseGeometry) -> NDArray[np.float64]:
     return np.concatenate([np.zeros((0, 2)), *(corners.reshape(-1, 2) for corners in triangles)])
 
 
-def outer_rings(shape: BaseGeometry) -> list[NDArray[np.float64]]:
+def outer_rings(shape: BaseGeometry) -> list[FloatArray]:
     """Closed outer rings (K, 2) of the polygons of a shape, world metres."""
-    return [
-        shapely.get_coordinates(shapely.get_exterior_ring(part))
-        for part in shapely.get_parts(shape)
-        if part.geom_type == "Polygon"
-    ]
+    parts = shapely.get_parts(shape)
+    rings = shapely.get_exterior_ring(parts[shapely.get_type_id(parts) == shapely.GeometryType.POLYGON])
+    points, ring = shapely.get_coordinates(rings, return_index=True)
+    return np.split(points, np.flatnonzero(np.diff(ring)) + 1) if len(points) else []
 
 
-def label_point(shape: BaseGeometry) -> tuple[float, float]:
-    """Deepest point of a shape; the origin for an empty one."""
-    if shape.is_empty:
-        return 0.0, 0.0
-    x, y = shapely.get_coordinates(shapely.maximum_inscribed_circle(shape, tolerance=LABEL_TOLERANCE_M))[0]
-    return float(x), float(y)
+def ring_segments(shape: BaseGeometry) -> FloatArray:
+    """Ends (2 N, 2) of the segments that the outer rings of a shape are made of, world metres."""
+    ends = [np.repeat(ring, 2, axis=0)[1:-1] for ring in outer_rings(shape)]
+    return np.concatenate([np.zeros((0, 2)), *ends])

@@ -49,6 +49,8 @@ class RunTotals:
         Maps that were analysed.
     invalid : int
         Maps that could not be analysed and were left out.
+    unchanged : int
+        Maps with the free and occupied cells of the one before, whose analysis was taken over.
     rooms_last : int
         Rooms of the last snapshot.
     tracks : int
@@ -69,6 +71,7 @@ class RunTotals:
 
     snapshots: int = 0
     invalid: int = 0
+    unchanged: int = 0
     rooms_last: int = 0
     tracks: int = 0
     coverage_first: float = 0.0
@@ -154,6 +157,7 @@ def write_summary(
         "results": {
             "snapshots": totals.snapshots,
             "invalid_maps": totals.invalid,
+            "unchanged_maps": totals.unchanged,
             "first_log_time_ns": totals.first_log_time_ns,
             "last_log_time_ns": totals.last_log_time_ns,
             "coverage_first": totals.coverage_first,

@@ -5,19 +5,13 @@ from __future__ import annotations
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 from rose2_logs.sinks.hindsight_tables import write_hindsight
 from rose2_logs.sinks.parquet_table import ParquetTable, Row
 from rose2_logs.tracking.frames import TrackedSnapshot
 from rose2_logs.tracking.hindsight import Hindsight
 from rose2_logs.tracking.lives import Moment, RoomLives, evidence_of
-
-if TYPE_CHECKING:
-    from shapely.geometry.base import BaseGeometry
-
-POINT_TOLERANCE_M = 0.05
-"""A label's point is the deepest of its room to this; one cell of usual maps."""
 
 
 class Tables:
@@ -138,8 +132,9 @@ def _snapshot_row(frame: TrackedSnapshot, moment: Moment) -> Row:
 def _room_rows(frame: TrackedSnapshot) -> list[Row]:
     rooms, tracks = frame.analysis.rooms, frame.track_ids
     rows = []
+    points = rooms.label_points_m.tolist()
     for number, (track, polygon) in enumerate(zip(tracks, rooms.polygons, strict=True), start=1):
-        x, y = _label_point(polygon)
+        x, y = (None, None) if polygon.is_empty else points[number - 1]
         wall_share, frontier_m = evidence_of(frame, number - 1)
         rows.append(
             {
@@ -156,16 +151,6 @@ def _room_rows(frame: TrackedSnapshot) -> list[Row]:
             }
         )
     return sorted(rows, key=lambda row: row["track"])
-
-
-def _label_point(polygon: BaseGeometry) -> tuple[float | None, float | None]:
-    import shapely
-
-    if polygon.is_empty:
-        return None, None
-    radius = shapely.maximum_inscribed_circle(polygon, tolerance=POINT_TOLERANCE_M)
-    x, y = shapely.get_coordinates(radius)[0].tolist()
-    return x, y
 
 
 def _event_rows(frame: TrackedSnapshot) -> list[Row]:

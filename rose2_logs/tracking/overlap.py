@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 
 from rose2_logs.occupancy import FloatArray
 
+DIRECT_LABELS = 1000
+"""Labels up to this one are counted as they are: their table of pairs stays below the size of a map."""
+
 
 @dataclass(frozen=True, eq=False)
 class Overlap:
@@ -60,20 +63,30 @@ def overlap_of(first: NDArray[np.integer], second: NDArray[np.integer]) -> Overl
     """
     if first.shape != second.shape:
         raise ValueError(f"label arrays of different shape: {first.shape} and {second.shape}")
-    first_ids, first_index = _compact(first)
-    second_ids, second_index = _compact(second)
-    rows, columns = len(first_ids) + 1, len(second_ids) + 1
-    cells = np.bincount(first_index * columns + second_index, minlength=rows * columns)
+    (first_ids, first_index), (second_ids, second_index) = _numbered(first), _numbered(second)
+    rows, columns = len(first_ids), len(second_ids)
+    cells = np.bincount((first_index * columns + second_index).ravel(), minlength=rows * columns)
     table: FloatArray = cells.reshape(rows, columns).astype(np.float64)
-    return Overlap(first_ids, second_ids, table.sum(axis=1)[1:], table.sum(axis=0)[1:], table[1:, 1:])
+    first_size, second_size = table.sum(axis=1), table.sum(axis=0)
+    first_size[0] = second_size[0] = 0
+    occur = np.flatnonzero(first_size), np.flatnonzero(second_size)
+    return Overlap(
+        first_ids[occur[0]],
+        second_ids[occur[1]],
+        first_size[occur[0]],
+        second_size[occur[1]],
+        table[np.ix_(*occur)],
+    )
 
 
-def _compact(labels: NDArray[np.integer]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Labels that occur without 0, and for each cell (flat) 0 for none or 1 + the position of its label."""
-    flat = labels.ravel()
-    counts = np.bincount(flat, minlength=1)
-    counts[0] = 0
+def _numbered(labels: NDArray[np.integer]) -> tuple[NDArray[np.intp], NDArray[np.integer]]:
+    """Labels, 0 the first of them, and for each cell the position of its label; some may not occur."""
+    highest = int(labels.max(initial=0))
+    if highest <= DIRECT_LABELS:
+        return np.arange(highest + 1), labels.astype(np.int32, copy=False)
+    counts = np.bincount(labels.ravel())
+    counts[0] = 1
     ids = np.flatnonzero(counts)
     index = np.zeros(len(counts), np.intp)
-    index[ids] = np.arange(1, len(ids) + 1)
-    return ids, index[flat]
+    index[ids] = np.arange(len(ids))
+    return ids, index[labels]

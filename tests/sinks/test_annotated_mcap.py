@@ -2,25 +2,29 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import subprocess
 import sys
+import tracemalloc
 from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pytest
-import shapely
 from mcap.reader import make_reader
-from mcap.writer import Writer
+from mcap.writer import CompressionType, Writer
 from rosbags.highlevel import AnyReader
 from saved_maps import save_run
 
 from rose2_logs.errors import OutputError
-from rose2_logs.floor_plan.rooms import outline
-from rose2_logs.run import RunOptions, analyse_log
-from rose2_logs.sinks.annotated_mcap import ADDED, ATTACHMENT, METADATA
-from rose2_logs.sinks.ros_messages import triangle_corners
+from rose2_logs.readers import open_log
+from rose2_logs.run import RunOptions, analyse_log, start_workers, tracked_snapshots
+from rose2_logs.sinks.annotated_mcap import ADDED, ATTACHMENT, METADATA, AnnotatedMcap
+from rose2_logs.sinks.sink import RunInfo
+from rose2_logs.sinks.summary import RunTotals
 
 PROJECT = Path(__file__).parents[2]
 SHARED = PROJECT.parent / "shared" / "bags"
@@ -170,17 +174,129 @@ def test_channels_of_other_encodings_attachments_and_empty_channels_are_kept(tmp
         assert {"site", METADATA} <= {record.name for record in reader.iter_metadata()}
 
 
-def test_triangles_fill_any_outline_of_cells():
-    rng = np.random.default_rng(3)
-    for _ in range(60):
-        shape = outline(rng.random((14, 14)) < rng.uniform(0.3, 0.9), 0.05)
-        corners = triangle_corners(shape).reshape(-1, 3, 2)
-        area = shapely.area(shapely.polygons(corners)).sum()
-        assert area == pytest.approx(shape.area, rel=0.05)
-
-
 def test_an_annotated_log_is_not_annotated_again_and_nothing_is_left_behind(tmp_path):
     once = annotate(save_run(tmp_path / "run"), tmp_path / "out")
     with pytest.raises(OutputError, match="holds /rose2/"):
         annotate(once, tmp_path / "again")
     assert not [file for file in (tmp_path / "again").rglob("*") if file.is_file()]
+
+
+@dataclass(frozen=True)
+class ChunkedLog:
+    """A log of 20 chunks; the raw bytes of those without a map and of those with one."""
+
+    path: Path
+    without_map: list[bytes]
+    with_map: list[bytes]
+
+
+def chunked_log(
+    path: Path,
+    compression: CompressionType = CompressionType.ZSTD,
+    maps_in: Sequence[int] = (5, 6, 18),
+) -> ChunkedLog:
+    """Write 20 chunks of two notes, the second so long that it ends the chunk, some with a map between."""
+    with LOGS["sample mcap"].open("rb") as source, path.open("w+b") as target:
+        kind, channel, first = next(make_reader(source).iter_messages(topics=["/map"]))
+        cells = bytearray(first.data)
+        writer = Writer(target, chunk_size=2 * len(cells), compression=compression)
+        writer.start("ros2", "test")
+        note = writer.register_channel("/note", "json", writer.register_schema("note", "jsonschema", b"{}"))
+        schema = writer.register_schema(kind.name, kind.encoding, kind.data)
+        grid = writer.register_channel("/map", "cdr", schema, channel.metadata)
+        for number in range(20):
+            time = 100 * (number + 1)
+            writer.add_message(note, time, b"%d" % number, time, number)
+            if number in maps_in:
+                cells[-1 - number] = 100
+                writer.add_message(grid, time + 50, bytes(cells), time + 50, number)
+            writer.add_message(note, time + 90, b" " * (2 * len(cells)), time + 90, number)
+        writer.finish()
+        raw = []
+        target.seek(0)
+        for chunk in make_reader(target).get_summary().chunk_indexes:
+            target.seek(chunk.chunk_start_offset)
+            raw.append(target.read(chunk.chunk_length))
+    return ChunkedLog(
+        path,
+        [chunk for number, chunk in enumerate(raw) if number not in maps_in],
+        [raw[number] for number in maps_in],
+    )
+
+
+def raw_messages(path: Path) -> list[tuple]:
+    """Every message outside the added topics, in the order of the file, checksums verified."""
+    with path.open("rb") as file:
+        return [
+            (c.topic, m.log_time, m.publish_time, m.sequence, m.data)
+            for _, c, m in make_reader(file, validate_crcs=True).iter_messages(log_time_order=False)
+            if c.topic not in ADDED
+        ]
+
+
+@pytest.mark.parametrize("compression", CompressionType)
+def test_chunks_without_a_map_are_copied_as_they_are(tmp_path, compression):
+    """Compressed as they were; the others are written again, so that what was found stands by log time."""
+    log = chunked_log(tmp_path / "run.mcap", compression)
+    path = annotate(log.path, tmp_path / "out")
+    written = path.read_bytes()
+    assert all(written.count(chunk) == 1 for chunk in log.without_map)
+    assert not any(chunk in written for chunk in log.with_map)
+    assert raw_messages(path) == raw_messages(log.path)
+    with path.open("rb") as file:
+        reader = make_reader(file)
+        times = [message.log_time for _, _, message in reader.iter_messages(log_time_order=False)]
+        assert times == sorted(times)
+        summary = reader.get_summary()
+        counts = Counter(c.topic for _, c, _ in reader.iter_messages())
+        assert counts == {"/note": 40, "/map": 3, **dict.fromkeys(ADDED, 3)}
+        told = {
+            summary.channels[each].topic: n for each, n in summary.statistics.channel_message_counts.items()
+        }
+        assert told == counts
+        assert summary.statistics.message_count == sum(counts.values())
+        span = (summary.statistics.message_start_time, summary.statistics.message_end_time)
+        assert span == (times[0], times[-1])
+
+
+def test_a_damaged_chunk_stays_as_it_is(tmp_path):
+    """What nothing is added to is not looked into: nothing is lost that a repair could bring back."""
+    log = chunked_log(tmp_path / "run.mcap")
+    damaged = bytearray(log.without_map[3])
+    damaged[-20] ^= 0xFF
+    log.path.write_bytes(log.path.read_bytes().replace(log.without_map[3], bytes(damaged)))
+    path = annotate(log.path, tmp_path / "out")
+    assert bytes(damaged) in path.read_bytes()
+
+
+def test_nothing_is_kept_of_chunks_that_were_taken_apart(tmp_path):
+    """Memory does not grow with the log: after 18 chunks with a map it is what it was after two."""
+    log = chunked_log(tmp_path / "run.mcap", maps_in=range(20))
+    options = RunOptions()
+    with open_log(log.path) as reader, start_workers(options) as workers:
+        totals = RunTotals()
+        frame = next(tracked_snapshots(reader, reader.last(), workers, options.parameters, totals))
+        times = [snapshot.log_time_ns for snapshot in reader.snapshots()]
+    info = RunInfo(log.path, "/map", "rose2", options.parameters, {}, {})
+    held = []
+    tracemalloc.start()
+    try:
+        with AnnotatedMcap(tmp_path / "out.mcap", info) as sink:
+            for time in times:
+                snapshot = dataclasses.replace(frame.snapshot, log_time_ns=time)
+                sink.write(dataclasses.replace(frame, snapshot=snapshot))
+                held.append(tracemalloc.get_traced_memory()[0])
+    finally:
+        tracemalloc.stop()
+    assert held[-1] - held[1] < frame.snapshot.cells.nbytes
+
+
+def test_a_log_without_an_index_is_copied_message_by_message(tmp_path):
+    """As one is that was cut off: what is whole goes over, with an index this time."""
+    log = chunked_log(tmp_path / "run.mcap")
+    cut = log.path.read_bytes()
+    cut = cut[: cut.index(log.with_map[-1]) + len(log.with_map[-1]) + 5]
+    log.path.write_bytes(cut)
+    path = annotate(log.path, tmp_path / "out")
+    whole = chunked_log(tmp_path / "whole.mcap")
+    assert raw_messages(path) == raw_messages(whole.path)[: 19 * 2 + 3]

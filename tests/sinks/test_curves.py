@@ -51,3 +51,23 @@ def test_a_run_of_one_map_is_drawn():
     image = draw_along("one", [RunPoint("m", 1.0, scores)])
     assert image.shape == (2 * HEIGHT_PX, WIDTH_PX, 3)
     assert len(pixels_of(image, LINE_COLOURS[2]))
+
+
+def test_powers_of_ten_lie_evenly_on_a_logarithmic_axis():
+    """1 to 10000 over 0.1 to 1000: the curve is the diagonal, its middle in the middle."""
+    y = np.array([1.0, 100.0, 10000.0])
+    image = draw_curves([Curve("up", y / 10, y)], "t", "x", log_x=True, log_y=True)
+    places = pixels_of(image, LINE_COLOURS[0])
+    middle = places[np.abs(places[:, 1] - (LEFT_PX + WIDTH_PX - RIGHT_PX) / 2) < 2]
+    assert middle[:, 0].mean() == pytest.approx((TOP_PX + HEIGHT_PX - BOTTOM_PX) / 2, abs=3)
+    assert places[:, 0].max() == pytest.approx(HEIGHT_PX - BOTTOM_PX, abs=5)
+
+
+def test_points_that_are_not_joined_stand_alone():
+    """Two dots at the ends, nothing between them."""
+    ends = np.array([0.0, 100.0])
+    image = draw_curves([Curve("dots", ends, ends, is_joined=False)], "t", "x", (0.0, 100.0))
+    columns = pixels_of(image, LINE_COLOURS[0])[:, 1]
+    assert len(columns)
+    middle = (LEFT_PX + WIDTH_PX - RIGHT_PX) / 2
+    assert np.abs(columns - middle).min() > middle / 2

@@ -1,0 +1,123 @@
+"""Values handed from process to process: large arrays through memory that both map, the rest as a pickle.
+
+Through a pipe, the arrays of one map would be copied four times in pieces of some kilobytes.
+"""
+
+from __future__ import annotations
+
+import mmap
+import pickle
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rose2_logs.errors import Rose2LogsError
+
+SHARED_MEMORY = Path("/dev/shm")
+"""Where Linux keeps files in memory; elsewhere they are in the folder for temporary files."""
+LARGE_BYTES = 1 << 16
+"""Arrays from this size on go through shared memory: the capacity of a pipe."""
+ALIGNMENT_BYTES = 64
+"""Arrays begin at multiples of it, as numpy and OpenCV like them."""
+
+
+class ParcelError(Rose2LogsError):
+    """There is no room for what is handed over."""
+
+
+@dataclass(frozen=True)
+class Parcel:
+    """A value on its way.
+
+    Attributes
+    ----------
+    pickled : bytes
+        All but the large arrays.
+    file : str, optional
+        Holds the large arrays; it goes when the parcel is opened.
+    spans : tuple of (int, int)
+        Where each of them begins and ends in the file.
+    """
+
+    pickled: bytes
+    file: str | None = None
+    spans: tuple[tuple[int, int], ...] = ()
+
+
+@contextmanager
+def parcel_folders() -> Iterator[tuple[str, ...]]:
+    """Give folders for parcels, the best one first; what was not taken out goes with them."""
+    with ExitStack() as stack:
+        places = [str(SHARED_MEMORY)] if SHARED_MEMORY.is_dir() else []
+        made = []
+        for place in (*places, tempfile.gettempdir()):
+            with suppress(OSError):
+                made.append(stack.enter_context(tempfile.TemporaryDirectory(prefix="rose2_logs_", dir=place)))
+        yield tuple(made)
+
+
+def pack(value: Any, folders: Sequence[str]) -> Parcel:
+    """Make a parcel of a picklable value; its large arrays go to the first folder that has room for them.
+
+    Raises
+    ------
+    ParcelError
+        If none has.
+    """
+    arrays: list[memoryview] = []
+
+    def keep_in_pickle(buffer: pickle.PickleBuffer) -> bool:
+        if (raw := buffer.raw()).nbytes < LARGE_BYTES:
+            return True
+        arrays.append(raw)
+        return False
+
+    pickled = pickle.dumps(value, protocol=5, buffer_callback=keep_in_pickle)
+    if not arrays:
+        return Parcel(pickled)
+    spans, end = [], 0
+    for array in arrays:
+        begin = end + -end % ALIGNMENT_BYTES
+        end = begin + array.nbytes
+        spans.append((begin, end))
+    why: OSError | None = None
+    for folder in folders:
+        try:
+            return Parcel(pickled, _written(arrays, spans, folder), tuple(spans))
+        except OSError as error:
+            why = error
+    raise ParcelError(
+        f"no room for {end / 1e6:.0f} MB in {' or '.join(folders) or tempfile.gettempdir()}: {why}; "
+        "free some space or use one worker"
+    )
+
+
+def _written(arrays: Sequence[memoryview], spans: Sequence[tuple[int, int]], folder: str) -> str:
+    """Write arrays to a new file in a folder and return its name."""
+    # Written, not mapped: where shared memory is full, writing tells so and touching a map would kill.
+    with tempfile.NamedTemporaryFile(dir=folder, delete=False, buffering=0) as file:
+        try:
+            for array, (begin, _) in zip(arrays, spans, strict=True):
+                file.seek(begin)
+                left = array
+                while left:
+                    left = left[file.write(left) :]
+        except BaseException:
+            Path(file.name).unlink()
+            raise
+    return file.name
+
+
+def unpack(parcel: Parcel) -> Any:
+    """Take a value out of its parcel, once; its arrays stay in the mapped memory as long as they live."""
+    if parcel.file is None:
+        return pickle.loads(parcel.pickled)
+    with Path(parcel.file).open("rb") as file:
+        mapped = memoryview(mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_COPY))
+    # On Windows a file that is mapped stays; it goes with its folder.
+    with suppress(OSError):
+        Path(parcel.file).unlink()
+    return pickle.loads(parcel.pickled, buffers=[mapped[begin:end] for begin, end in parcel.spans])

@@ -1,0 +1,85 @@
+"""Cells of a map as the pictures of a recording: their pixels, painted by tables of colours."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+
+from rose2_logs.occupancy import FloatArray, GridGeometry, known_window
+from rose2_logs.sinks.palette import track_colour
+from rose2_logs.sinks.rerun_columns import Picture
+from rose2_logs.tracking.frames import TrackedSnapshot
+
+FILL_OPACITY = 0.6
+"""Share of a room's colour in its cells: the map shows through."""
+CLEAN_COLOUR = (150, 0, 60)
+UNKNOWN_SHADE = 205
+"""Grey of unknown cells, as map_server draws them."""
+
+
+class MapPictures:
+    """The known part of one map, painted in several ways.
+
+    Attributes
+    ----------
+    corners_m : (4, 2) float
+        World corners of the known part.
+    """
+
+    def __init__(self, frame: TrackedSnapshot) -> None:
+        self._frame = frame
+        geometry, (rows, columns) = frame.analysis.geometry, known_window(frame.snapshot.cells >= 0)
+        # A picture begins at its top, a grid at its origin.
+        self._part = (slice(rows.stop - 1, rows.start - 1 if rows.start else None, -1), columns)
+        # As an unsigned byte unknown is 255, which is what the RViz colours expect.
+        self._cells = np.ascontiguousarray(frame.snapshot.cells[self._part]).view(np.uint8)
+        corner = np.array([columns.start, rows.start]) * geometry.resolution_m
+        x, y = geometry.grid_to_world(corner).tolist()
+        self._place = GridGeometry(
+            geometry.resolution_m, (x, y), geometry.yaw_rad, geometry.frame_id, self._cells.shape
+        )
+        self.corners_m = self._place.corners_m()
+
+    def map(self, height_m: float) -> Picture:
+        """Draw the map as RViz does, at a height in the world."""
+        return self._picture(self._cells, height_m, rr.components.Colormap.RvizMap)
+
+    def rooms(self, height_m: float) -> Picture:
+        """Draw the map with each room in the colour of its track."""
+        shades = _shades()
+        colours = np.array([track_colour(track) for track in self._frame.track_ids], float).reshape(-1, 1, 3)
+        painted = FILL_OPACITY * colours + (1 - FILL_OPACITY) * shades
+        labels = self._frame.analysis.rooms.labels[self._part]
+        return self._picture(self._painted(labels, [shades, *painted]), height_m)
+
+    def clean_map(self, clean: NDArray[np.bool_], height_m: float) -> Picture:
+        """Draw the map faintly with the cells of a mask (H, W) over it."""
+        faint = 255 - (255 - _shades()) / 4
+        colours = [faint, np.full_like(faint, CLEAN_COLOUR)]
+        return self._picture(self._painted(clean[self._part], colours), height_m)
+
+    def _painted(
+        self, labels: NDArray[np.integer] | NDArray[np.bool_], colours: Iterable[FloatArray]
+    ) -> NDArray[np.uint8]:
+        """Pixels (H, W, 4): for each label 0..K one table (256, 3) of the colour of each value of a cell."""
+        opaque = [np.pad(table, ((0, 0), (0, 1)), constant_values=255).astype(np.uint8) for table in colours]
+        # A pixel as one number is looked up several times faster than as four.
+        table = np.concatenate(opaque).view(np.uint32).ravel()
+        pixels: NDArray[np.uint8] = table[labels.astype(np.int32) * 256 + self._cells].view(np.uint8)
+        return pixels.reshape(*self._cells.shape, 4)
+
+    def _picture(
+        self, pixels: NDArray[np.uint8], height_m: float, colormap: rr.components.Colormap | None = None
+    ) -> Picture:
+        place = self._place
+        return Picture(pixels, place.resolution_m, (*place.origin_xy_m, height_m), place.yaw_rad, colormap)
+
+
+def _shades() -> FloatArray:
+    """Grey (256, 3) of each value of a cell as an unsigned byte: white free, black occupied, grey unknown."""
+    values = np.arange(256, dtype=np.uint8).view(np.int8)
+    shade = np.where(values < 0, UNKNOWN_SHADE, 255 * (1 - np.minimum(values, 100) / 100.0))
+    return np.repeat(shade[:, None], 3, axis=1)

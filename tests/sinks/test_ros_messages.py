@@ -1,0 +1,119 @@
+"""The messages of the annotated MCAP, byte for byte what rosbags' own serializer makes of the same fields."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapely
+from drawn_maps import office, snapshot
+
+from rose2_logs.floor_plan.rooms import outline
+from rose2_logs.parameters import Parameters, TrackingParameters
+from rose2_logs.pipeline import METHODS, analyse
+from rose2_logs.sinks.ros_messages import (
+    ROOMS_TYPE,
+    MessageMaker,
+    outer_rings,
+    ring_segments,
+    ros2_typestore,
+    triangle_corners,
+)
+from rose2_logs.tracking.frames import TrackedSnapshot
+from rose2_logs.tracking.tracker import RoomTracker
+
+GRID = "nav_msgs/msg/OccupancyGrid"
+KINDS = {
+    "markers": "visualization_msgs/msg/MarkerArray",
+    "rooms": ROOMS_TYPE,
+    "segmented_map": GRID,
+    "clean_map": GRID,
+    "source_map": GRID,
+}
+
+
+@pytest.fixture(scope="module", params=METHODS[:2])
+def frame(request) -> TrackedSnapshot:
+    """The drawn office turned, moved and half unknown, with structure and without."""
+    cells, _ = office(turn_rad=0.2, clutter=8)
+    cells[:, 170:] = -1
+    taken = snapshot(cells, origin_xy_m=(-3.25, 7.5), yaw_rad=0.7)
+    analysis = analyse(taken, Parameters(), request.param)
+    ids, events = RoomTracker(TrackingParameters()).update(taken, analysis)
+    assert len(ids) >= 2
+    return TrackedSnapshot(taken, analysis, 0.5, ids, events)
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_each_message_is_what_another_serializer_writes(frame: TrackedSnapshot, name: str):
+    """Read by rosbags and written again, every byte comes back: fields, alignment, lengths."""
+    store = ros2_typestore()
+    written = getattr(MessageMaker(), name)(frame)
+    if written is None:
+        assert (name, frame.analysis.structure) == ("clean_map", None)
+        return
+    message = store.deserialize_cdr(written, KINDS[name])
+    assert bytes(store.serialize_cdr(message, KINDS[name])) == written
+
+
+def test_the_fields_stand_where_they_belong(frame: TrackedSnapshot):
+    store, maker, rooms = ros2_typestore(), MessageMaker(), frame.analysis.rooms
+    grid = store.deserialize_cdr(maker.segmented_map(frame), GRID)
+    geometry = frame.analysis.geometry
+    assert (grid.info.height, grid.info.width) == geometry.shape
+    assert grid.info.resolution == pytest.approx(geometry.resolution_m)
+    assert (grid.info.origin.position.x, grid.info.origin.position.y) == geometry.origin_xy_m
+    assert 2 * np.arctan2(grid.info.origin.orientation.z, grid.info.origin.orientation.w) == pytest.approx(
+        0.7
+    )
+    cells = np.asarray(grid.data).reshape(geometry.shape)
+    for number, track in enumerate(frame.track_ids, start=1):
+        assert (cells[rooms.labels == number] == track).all()
+    outside = rooms.labels == 0
+    np.testing.assert_array_equal(cells[outside], frame.snapshot.cells[outside])
+
+    told = store.deserialize_cdr(maker.rooms(frame), ROOMS_TYPE)
+    assert told.coverage == 0.5
+    assert (told.header.stamp.nanosec, told.header.frame_id) == (2, "map")
+    for room in told.rooms:
+        number = frame.track_ids.index(room.track)
+        assert room.area == rooms.areas_m2[number]
+        shape = rooms.polygons[number]
+        assert shape.contains(shapely.Point(room.label_point.x, room.label_point.y))
+        corners = [(point.x, point.y) for point in room.outline[0].points]
+        assert shapely.Polygon(corners).area == pytest.approx(shapely.Polygon(shape.exterior).area, rel=1e-3)
+
+    markers = store.deserialize_cdr(maker.markers(frame), KINDS["markers"]).markers
+    by_name = {(marker.ns, marker.id): marker for marker in markers}
+    assert markers[0].action == 3
+    for track, shape in zip(frame.track_ids, rooms.polygons, strict=True):
+        fill, line = by_name["rooms", track], by_name["outlines", track]
+        corners = np.array([(point.x, point.y) for point in fill.points]).reshape(-1, 3, 2)
+        assert shapely.area(shapely.polygons(corners)).sum() == pytest.approx(shape.area)
+        ends = np.array([(point.x, point.y) for point in line.points]).reshape(-1, 2, 2)
+        assert np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum() == pytest.approx(shape.exterior.length)
+        assert by_name["labels", track].text.startswith(f"{track}\n")
+
+
+def test_a_shape_that_stays_gives_the_same_triangles_again(frame: TrackedSnapshot):
+    """Those of the map before are used again, and nothing of the message differs."""
+    maker = MessageMaker()
+    assert maker.markers(frame) == maker.markers(frame) == MessageMaker().markers(frame)
+
+
+def test_rings_of_shapes_with_parts_and_holes():
+    """Each part gives its outer ring, holes none, an empty shape nothing."""
+    square = shapely.box(0, 0, 3, 3).difference(shapely.box(1, 1, 2, 2))
+    both = shapely.union_all([square, shapely.box(5, 0, 6, 1)])
+    assert sorted(len(ring) for ring in outer_rings(both)) == [5, 5]
+    assert ring_segments(both).shape == (16, 2)
+    assert outer_rings(shapely.Polygon()) == []
+    assert ring_segments(shapely.Polygon()).shape == (0, 2)
+
+
+def test_triangles_fill_any_outline_of_cells():
+    rng = np.random.default_rng(3)
+    for _ in range(60):
+        shape = outline(rng.random((14, 14)) < rng.uniform(0.3, 0.9), 0.05)
+        corners = triangle_corners(shape).reshape(-1, 3, 2)
+        area = shapely.area(shapely.polygons(corners)).sum()
+        assert area == pytest.approx(shape.area, rel=0.05)
