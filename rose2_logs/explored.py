@@ -133,6 +133,20 @@ def block_side(resolution_m: float, cells: int, parameters: OccupancyParameters)
     return max(1, finer, larger)
 
 
+def coarser_for_its_size(
+    geometry: GridGeometry, analysed_resolution_m: float, parameters: OccupancyParameters
+) -> str | None:
+    """Say that a map was analysed coarser than it is because it is large; None if it was not."""
+    usual = max(geometry.resolution_m, parameters.working_resolution_m) * (1 + 1e-9)
+    if analysed_resolution_m <= usual:
+        return None
+    return (
+        f"more than {parameters.analysed_max_cells} explored cells: analysed at "
+        f"{analysed_resolution_m:.3g} m instead of {geometry.resolution_m:.3g} m; "
+        "occupancy.analysed_max_cells sets the limit"
+    )
+
+
 def _blocks(mask: BoolArray, side: int) -> BoolArray:
     """View (H, side, W, side) of a mask filled up to whole blocks."""
     height, width = (-mask.shape[0] % side), (-mask.shape[1] % side)

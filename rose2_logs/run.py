@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rose2_logs.errors import InvalidMapError, OutputError
+from rose2_logs.explored import coarser_for_its_size
 from rose2_logs.occupancy import UNKNOWN, OccupancySnapshot, classify
 from rose2_logs.parameters import OccupancyParameters, Parameters
 from rose2_logs.pipeline import SnapshotAnalysis, analyse
@@ -215,6 +216,7 @@ def tracked_snapshots(
     final_free_m2 = free_area_m2(last, parameters.occupancy)
     tracker = RoomTracker(parameters.tracking, parameters.occupancy)
     layout = LayoutFollower()
+    said = False
     is_same = partial(is_same_to_analysis, parameters=parameters.occupancy)
     for snapshot, found in workers.map(reader.snapshots(), is_same):
         if isinstance(found, InvalidMapError):
@@ -222,6 +224,10 @@ def tracked_snapshots(
             logger.warning("snapshot %d is left out: %s", snapshot.index, found)
             continue
         analysis, evidence = found
+        note = coarser_for_its_size(snapshot.geometry, analysis.resolution_m, parameters.occupancy)
+        if note is not None and not said:
+            logger.warning("snapshot %d and those of its size: %s", snapshot.index, note)
+            said = True
         if analysis.index != snapshot.index:
             analysis = analysis.again_for(snapshot)
             totals.unchanged += 1

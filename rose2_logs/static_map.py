@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,6 +14,7 @@ import numpy as np
 import shapely
 
 from rose2_logs.errors import LogError, OutputError, ParameterError
+from rose2_logs.explored import coarser_for_its_size
 from rose2_logs.occupancy import OccupancySnapshot
 from rose2_logs.parameters import Parameters
 from rose2_logs.pipeline import SnapshotAnalysis, analyse
@@ -21,6 +23,8 @@ from rose2_logs.rooms import RoomMap
 from rose2_logs.sinks.label_image import write_image, write_label_image
 from rose2_logs.sinks.picture import draw_rooms
 from rose2_logs.sinks.summary import write_json
+
+logger = logging.getLogger(__name__)
 
 IMAGES = (".png", ".pgm", ".bmp")
 
@@ -74,6 +78,9 @@ def segment_map(
         raise OutputError(f"{existing[0]}: exists already; choose another folder or pass --overwrite")
     snapshot = read_static_map(map_file, resolution_m)
     analysis = analyse(snapshot, parameters, method)
+    note = coarser_for_its_size(snapshot.geometry, analysis.resolution_m, parameters.occupancy)
+    if note is not None:
+        logger.warning("%s: %s", map_file, note)
     write_label_image(files[0], np.flipud(analysis.rooms.labels))
     write_json(files[1], floor_plan_geojson(analysis))
     write_image(files[2], draw_rooms(snapshot, analysis))

@@ -13,6 +13,7 @@ import pytest
 from saved_maps import FREE, WALL, save_map, save_run, two_rooms
 
 from rose2_logs.errors import OutputError
+from rose2_logs.parameters import Parameters
 from rose2_logs.provenance import fingerprint, log_files
 from rose2_logs.readers import Selection
 from rose2_logs.run import TABLES, RunOptions, analyse_log, log_stem
@@ -106,6 +107,18 @@ def test_a_map_that_did_not_change_is_not_analysed_again(tmp_path: Path, monkeyp
     each = analyse_log(folder, tmp_path / "each", options)
     assert (each.totals.snapshots, each.totals.unchanged) == (5, 0)
     assert table_bytes(tmp_path / "out") == table_bytes(tmp_path / "each")
+
+
+def test_a_run_of_large_maps_says_once_that_they_are_analysed_coarser(run: Path, tmp_path: Path, caplog):
+    small = {"occupancy": {"analysed_max_cells": 20_000}}
+    options = dataclasses.replace(TABLES_ONLY, parameters=Parameters().replaced(small))
+    analyse_log(run / "maps", tmp_path, options)
+    said = [record.getMessage() for record in caplog.records if "20000 explored cells" in record.getMessage()]
+    assert len(said) == 1
+    assert "analysed at 0.1 m instead of 0.05 m" in said[0]
+    snapshots = pq.read_table(tmp_path / "snapshots.parquet").to_pandas()
+    assert snapshots["analysed_resolution_m"].iloc[-1] == 0.1
+    assert (snapshots["resolution_m"] == 0.05).all()
 
 
 def test_progress_ends_at_one(run: Path, tmp_path: Path):

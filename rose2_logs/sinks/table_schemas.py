@@ -75,6 +75,10 @@ _SNAPSHOTS_ALONG: dict[str, tuple[pa.DataType, str]] = {
     "repeats_before": (pa.int32(), "identical maps dropped since the snapshot before"),
     "frame_id": (pa.string(), "name of the world frame"),
     "resolution_m": (pa.float64(), "side of a cell, metres"),
+    "analysed_resolution_m": (
+        pa.float64(),
+        "side of the cells that the map was analysed in, metres: larger for maps that are very fine or large",
+    ),
     "origin_x_m": (pa.float64(), "world x of the grid's origin, metres"),
     "origin_y_m": (pa.float64(), "world y of the grid's origin, metres"),
     "yaw_rad": (pa.float64(), "rotation of the grid in the world, radians counter-clockwise"),

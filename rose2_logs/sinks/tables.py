@@ -115,6 +115,7 @@ def _snapshot_row(frame: TrackedSnapshot, moment: Moment) -> Row:
         "repeats_before": snapshot.repeats_before,
         "frame_id": geometry.frame_id,
         "resolution_m": geometry.resolution_m,
+        "analysed_resolution_m": frame.analysis.resolution_m,
         "origin_x_m": geometry.origin_xy_m[0],
         "origin_y_m": geometry.origin_xy_m[1],
         "yaw_rad": geometry.yaw_rad,
