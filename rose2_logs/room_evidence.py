@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
+from shapely.geometry.base import BaseGeometry
 
 from rose2_logs.explored import ExploredPart
 from rose2_logs.occupancy import UNKNOWN, BoolArray, FloatArray, GridGeometry, OccupancySnapshot, known_window
@@ -62,15 +63,32 @@ def _wall_shares(snapshot: OccupancySnapshot, rooms: RoomMap, parameters: Occupa
     )
     shares = np.full(len(rooms), np.nan)
     for number, polygon in enumerate(rooms.polygons):
-        outline = polygon.boundary
-        if outline.is_empty:
+        points = _points_along(polygon, OUTLINE_STEP_M)
+        if len(points) == 0:
             continue
-        distances = np.arange(0.0, outline.length, OUTLINE_STEP_M)
-        points = shapely.get_coordinates(shapely.line_interpolate_point(outline, distances))
         row, column = np.moveaxis(grid.world_to_cell(points), -1, 0)
         inside = (row >= 0) & (row < near.shape[0]) & (column >= 0) & (column < near.shape[1])
         shares[number] = np.count_nonzero(near[row[inside], column[inside]]) / len(points)
     return shares
+
+
+def _points_along(polygon: BaseGeometry, step_m: float) -> FloatArray:
+    """Points (N, 2) every so many metres along the rings of a shape, one ring after the other.
+
+    As shapely interpolates along its boundary, which looks for each point from the beginning.
+    """
+    corners, ring = shapely.get_coordinates(shapely.get_rings(shapely.get_parts(polygon)), return_index=True)
+    if len(corners) == 0:
+        return np.zeros((0, 2))
+    sides = corners[1:] - corners[:-1]
+    lengths = np.where(ring[1:] == ring[:-1], np.hypot(*sides.T), 0.0)
+    ends = np.cumsum(lengths)
+    distances = np.arange(0.0, ends[-1], step_m)
+    distances = distances[distances < ends[-1]]
+    side = np.searchsorted(ends, distances, "right")
+    share = (distances - (ends - lengths)[side]) / lengths[side]
+    points: FloatArray = corners[side] + share[:, None] * sides[side]
+    return points
 
 
 def _within(mask: BoolArray, reach_cells: float) -> BoolArray:
