@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 ROWS_PER_GROUP = 2000
 """Rows held back until they are written as one row group: some hundred kilobytes with polygons."""
+ROWS_PER_BATCH = 100
+"""Rows held as Python objects, which take several times as much, until they become a batch of Arrow's."""
 COMPRESSION = "zstd"
 
 Row = dict[str, Any]
@@ -41,6 +43,7 @@ class ParquetTable:
         self._path = path
         self._schema = schema
         self._rows: list[Row] = []
+        self._batches: list[pa.RecordBatch] = []
         self._writer: pq.ParquetWriter | None = None
 
     def __enter__(self) -> Self:
@@ -60,16 +63,26 @@ class ParquetTable:
             If the file cannot be written.
         """
         self._rows += rows
-        if len(self._rows) >= ROWS_PER_GROUP:
+        if len(self._rows) >= ROWS_PER_BATCH:
+            self._pack()
+        if sum(batch.num_rows for batch in self._batches) >= ROWS_PER_GROUP:
             self._flush()
+
+    def _pack(self) -> None:
+        import pyarrow as pa
+
+        self._batches.append(pa.RecordBatch.from_pylist(self._rows, self._schema))
+        self._rows = []
 
     def _flush(self) -> None:
         import pyarrow as pa
 
-        if self._writer is not None and self._rows:
+        if self._rows:
+            self._pack()
+        if self._writer is not None and self._batches:
             with writing(self._path):
-                self._writer.write_table(pa.Table.from_pylist(self._rows, self._schema))
-            self._rows.clear()
+                self._writer.write_table(pa.Table.from_batches(self._batches).combine_chunks())
+            self._batches = []
 
     def close(self) -> None:
         """Write the last rows; the part can be read from now on.

@@ -15,7 +15,7 @@ import rerun as rr
 
 from rose2_logs.sinks.rerun_columns import LayerKind, columns_of
 
-CHUNK_BYTES = 1 << 16
+CHUNK_BYTES = 1 << 15
 """Rows of an entity are written together from this size on: their chunk's overhead is some percent of it."""
 ROW_BYTES = 200
 """About what a row takes while it waits, besides its arrays."""

@@ -139,6 +139,7 @@ def test_every_column_says_what_it_is(tmp_path: Path):
 def test_row_groups_are_written_along_the_way_and_twice_the_same(tmp_path: Path, monkeypatch):
     """Memory does not grow: rows leave in groups. The same run gives the same bytes."""
     monkeypatch.setattr(parquet_table, "ROWS_PER_GROUP", 2)
+    monkeypatch.setattr(parquet_table, "ROWS_PER_BATCH", 1)
     write(tmp_path / "a")
     write(tmp_path / "b")
     assert pq.ParquetFile(tmp_path / "a" / "events.parquet").num_row_groups == 3

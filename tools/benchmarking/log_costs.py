@@ -24,7 +24,6 @@ from rose2_logs.run import RunOptions, start_workers, tracked_snapshots
 from rose2_logs.sinks.sink import RunInfo, Sink
 from rose2_logs.sinks.summary import RunTotals
 
-STARTS = 5
 MESSAGE_BYTES = 1 << 20
 """Of the log to copy: about a picture or a cloud of points."""
 
@@ -79,7 +78,7 @@ class CopyTimes:
 
 @dataclass(frozen=True)
 class StartTimes:
-    """A command that does little, from its start to its end; median and least of `STARTS`."""
+    """A command that does little, from its start to its end: the median and the least of some times."""
 
     command: str
     wall_s: float
@@ -180,13 +179,13 @@ def _write_noise(log: Path, sample: Path, size_bytes: int) -> None:
         writer.finish()  # type: ignore[no-untyped-call]
 
 
-def start_times(logs: Sequence[Path]) -> list[StartTimes]:
+def start_times(logs: Sequence[Path], repeats: int) -> list[StartTimes]:
     """Time ``--help`` and ``info`` of small logs."""
     commands = [["--help"], *(["info", str(log)] for log in logs)]
     times = []
     for arguments in commands:
         walls = []
-        for _ in range(STARTS):
+        for _ in range(repeats):
             start = time.perf_counter()
             subprocess.run(
                 [sys.executable, "-m", "rose2_logs", *arguments], stdout=subprocess.DEVNULL, check=True

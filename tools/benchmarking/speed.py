@@ -63,6 +63,10 @@ class Amount:
         Lengths of the logs.
     copied_bytes, looked_at_bytes : int
         Size of the log that is copied, and of that which ``info`` looks at.
+    maps_looked_at : int
+        Maps in the latter.
+    starts : int
+        How often each small command is started.
     """
 
     maps_per_group: int | None
@@ -72,11 +76,12 @@ class Amount:
     snapshots: tuple[int, ...]
     copied_bytes: int
     looked_at_bytes: int
-    maps_looked_at: int = 720
+    maps_looked_at: int
+    starts: int
 
 
-FULL = Amount(None, 5, 3, (1, 4, 16, 64), (10, 100, 1000), 512_000_000, 10_000_000_000)
-QUICK = Amount(2, 1, 1, (1, 4), (4, 8), 64_000_000, 10_000_000_000, 100)
+FULL = Amount(None, 5, 3, (1, 4, 16, 64), (10, 100, 1000), 512_000_000, 10_000_000_000, 720, 7)
+QUICK = Amount(2, 1, 1, (1, 4), (4, 8), 64_000_000, 10_000_000_000, 100, 3)
 
 
 @dataclass(frozen=True)
@@ -181,7 +186,7 @@ def measure_speed(options: SpeedOptions) -> Speed:
                 outputs.append(sink_costs(log, parameters, folder / log.name))
             say("copying, starting, looking at a log")
             copy = copy_times(options.logs[0], amount.copied_bytes, folder)
-            starts = start_times(options.logs)
+            starts = start_times(options.logs, amount.starts)
             look = look_times(options.logs[0], amount.looked_at_bytes, amount.maps_looked_at, folder)
     return Speed(
         facts,

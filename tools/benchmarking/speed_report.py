@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarking.log_costs import STARTS
 from benchmarking.map_times import MapTimes
 from benchmarking.markdown import table
 from benchmarking.scaling import LogTimes, TileTimes
@@ -236,7 +235,7 @@ def _around(speed: Speed) -> list[str]:
         lines += [
             "## Starting up",
             "",
-            *table(["command", f"median of {STARTS}, s", "least, s"], rows),
+            *table(["command", "median s", "least s"], rows),
         ]
     if speed.look is not None:
         look = speed.look
