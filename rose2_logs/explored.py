@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 import shapely
@@ -11,6 +12,8 @@ from shapely.geometry.base import BaseGeometry
 
 from rose2_logs.occupancy import BoolArray, FloatArray, GridGeometry, classify, known_window
 from rose2_logs.parameters import OccupancyParameters
+
+Scalar = TypeVar("Scalar", bound=np.generic)
 
 NEIGHBOURS = ((0, -1), (0, 1), (-1, 0), (1, 0), (-1, -1), (-1, 1), (1, -1), (1, 1))
 """Where a coarse cell without a room looks for one: cells with a common side first."""
@@ -47,11 +50,7 @@ class ExploredPart:
         cls, cells: NDArray[np.int8], geometry: GridGeometry, parameters: OccupancyParameters
     ) -> ExploredPart:
         """Take the explored part of a canvas (H, W) of occupancy in percent, -1 for unknown."""
-        free, occupied = classify(
-            cells,
-            occupied_min_percent=parameters.occupied_min_percent,
-            free_max_percent=parameters.free_max_percent,
-        )
+        free, occupied = classify(cells, parameters)
         window = known_window(free | occupied)
         free, occupied = free[window], occupied[window]
         factor = block_side(geometry.resolution_m, free.size, parameters)
@@ -84,7 +83,7 @@ class ExploredPart:
         """Shapely geometry in the world."""
         return shapely.transform(geometry, self.points)
 
-    def cells(self, values: NDArray[np.generic], where: BoolArray | None = None) -> NDArray[np.generic]:
+    def cells(self, values: NDArray[Scalar], where: BoolArray | None = None) -> NDArray[Scalar]:
         """Values of blocks over the whole canvas, zero outside the window and where not `where`."""
         full = np.zeros(self.geometry.shape, values.dtype)
         part = full[self.window]
@@ -111,7 +110,7 @@ class ExploredPart:
         part[self.known_free] = self._unblocked(labels)[self.known_free]
         return full
 
-    def _unblocked(self, values: NDArray[np.generic]) -> NDArray[np.generic]:
+    def _unblocked(self, values: NDArray[Scalar]) -> NDArray[Scalar]:
         if self.factor == 1:
             return values
         height, width = self.known_free.shape

@@ -96,12 +96,7 @@ def _topic_facts(source: MessageSource, topic: str) -> TopicFacts:
 
 
 def _map_facts(snapshot: OccupancySnapshot) -> MapFacts:
-    thresholds = OccupancyParameters()
-    free, _ = classify(
-        snapshot.cells,
-        occupied_min_percent=thresholds.occupied_min_percent,
-        free_max_percent=thresholds.free_max_percent,
-    )
+    free, _ = classify(snapshot.cells, OccupancyParameters())
     geometry = snapshot.geometry
     free_m2 = float(free.sum()) * geometry.cell_area_m2
     return MapFacts(snapshot.log_time_ns, geometry.shape, geometry.resolution_m, geometry.frame_id, free_m2)

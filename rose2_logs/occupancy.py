@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rose2_logs.errors import InvalidMapError
+from rose2_logs.parameters import OccupancyParameters
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -50,6 +51,13 @@ class GridGeometry:
             raise InvalidMapError(
                 f"the map's origin {self.origin_xy_m}, yaw {self.yaw_rad} is not made of finite numbers"
             )
+
+    def part(self, window: tuple[slice, slice], block: int = 1) -> GridGeometry:
+        """Return where a part of the grid lies: its rows and columns, in blocks of so many cells a side."""
+        rows, columns = window
+        x, y = self.grid_to_world(np.array([columns.start, rows.start]) * self.resolution_m).tolist()
+        shape = (-(-(rows.stop - rows.start) // block), -(-(columns.stop - columns.start) // block))
+        return replace(self, resolution_m=self.resolution_m * block, origin_xy_m=(x, y), shape=shape)
 
     @property
     def cell_area_m2(self) -> float:
@@ -135,25 +143,24 @@ class OccupancySnapshot:
         object.__setattr__(self, "cells", cells)
 
 
-def classify(
-    cells: NDArray[np.int8], *, occupied_min_percent: float, free_max_percent: float
-) -> tuple[BoolArray, BoolArray]:
+def classify(cells: NDArray[np.int8], parameters: OccupancyParameters) -> tuple[BoolArray, BoolArray]:
     """Masks of the free and of the occupied cells.
 
     Parameters
     ----------
     cells : (H, W) int8
         -1 unknown, 0..100 occupancy in percent.
-    occupied_min_percent, free_max_percent : float
-        Cells above the first are occupied, known cells below the second are free (map_server's convention).
+    parameters : OccupancyParameters
+        Cells above `occupied_min_percent` are occupied, known cells below `free_max_percent` are free
+        (map_server's convention).
 
     Returns
     -------
     free, occupied : (H, W) bool
         Cells between the two thresholds are in neither.
     """
-    free = (cells >= 0) & (cells < free_max_percent)
-    occupied = cells > occupied_min_percent
+    free = (cells >= 0) & (cells < parameters.free_max_percent)
+    occupied = cells > parameters.occupied_min_percent
     return free, occupied
 
 

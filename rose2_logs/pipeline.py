@@ -108,7 +108,7 @@ def analyse(snapshot: OccupancySnapshot, parameters: Parameters, method: str = "
     watch = _StopWatch()
     geometry = snapshot.geometry
     # The baselines' parameters count cells, so they take the map as it is.
-    occupancy = parameters.occupancy if method == "rose2" else parameters.occupancy.unblocked()
+    occupancy = parameters.occupancy.unblocked() if method in BASELINES else parameters.occupancy
     explored = ExploredPart.of(snapshot.cells, geometry, occupancy)
     resolution, free, occupied = explored.resolution_m, explored.free, explored.occupied
     free_m2 = explored.free_area_m2
@@ -253,14 +253,12 @@ def _room_map(
 
 
 def _structure(found: RoseResult, explored: ExploredPart) -> Structure:
-    score = explored.cells(found.score, explored.known_occupied)
-    clean = explored.cells(found.clean, explored.known_occupied)
     return Structure(
         directions_rad=np.mod(found.directions_rad + explored.geometry.yaw_rad, np.pi),
         strengths=found.strengths,
-        score=score.astype(np.float32, copy=False),
+        score=explored.cells(found.score, explored.known_occupied),
         threshold=found.threshold,
-        clean=clean.astype(bool, copy=False),
+        clean=explored.cells(found.clean, explored.known_occupied),
     )
 
 

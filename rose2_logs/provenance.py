@@ -11,6 +11,7 @@ from typing import Any
 
 from rose2_logs import __version__
 from rose2_logs.errors import LogError
+from rose2_logs.readers.discovery import MAP_ENDINGS
 
 PACKAGES = (
     "numpy",
@@ -50,7 +51,7 @@ def log_files(path: Path) -> tuple[Path, ...]:
 
 
 def _image_of(file: Path) -> tuple[Path, ...]:
-    if file.suffix.lower() not in (".yaml", ".yml"):
+    if file.suffix.lower() not in MAP_ENDINGS:
         return ()
     import yaml
 

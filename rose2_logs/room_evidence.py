@@ -9,7 +9,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from rose2_logs.explored import ExploredPart
-from rose2_logs.occupancy import UNKNOWN, BoolArray, FloatArray, GridGeometry, OccupancySnapshot, known_window
+from rose2_logs.occupancy import UNKNOWN, BoolArray, FloatArray, OccupancySnapshot, known_window
 from rose2_logs.parameters import OccupancyParameters
 from rose2_logs.rooms import RoomMap
 
@@ -56,11 +56,7 @@ def room_evidence(
 def _wall_shares(snapshot: OccupancySnapshot, rooms: RoomMap, parameters: OccupancyParameters) -> FloatArray:
     explored = ExploredPart.of(snapshot.cells, snapshot.geometry, parameters)
     near = _within(explored.occupied, WALL_REACH_M / explored.resolution_m)
-    corner = np.array([explored.window[1].start, explored.window[0].start]) * snapshot.geometry.resolution_m
-    x, y = snapshot.geometry.grid_to_world(corner).tolist()
-    grid = GridGeometry(
-        explored.resolution_m, (x, y), snapshot.geometry.yaw_rad, snapshot.geometry.frame_id, near.shape
-    )
+    grid = snapshot.geometry.part(explored.window, explored.factor)
     shares = np.full(len(rooms), np.nan)
     for number, polygon in enumerate(rooms.polygons):
         points = _points_along(polygon, OUTLINE_STEP_M)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
-from rose2_logs.occupancy import FloatArray, GridGeometry
+from rose2_logs.occupancy import FloatArray, GridGeometry, label_sizes
 
 LABEL_TOLERANCE_M = 0.05
 """A label's point is the deepest of its room to this: one cell of usual maps."""
@@ -78,7 +78,7 @@ class RoomMap:
         geometry : GridGeometry
             Where they lie.
         """
-        cells = np.bincount(labels.ravel(), minlength=1)[1:]
+        cells = label_sizes(labels, int(labels.max(initial=0)))[1:]
         areas = cells.astype(np.float64) * geometry.cell_area_m2
         return cls(geometry, labels, (Polygon(),) * len(cells), areas)
 

@@ -12,7 +12,6 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rose2_logs.errors import InvalidMapError, OutputError
 from rose2_logs.explored import coarser_for_its_size
@@ -21,6 +20,7 @@ from rose2_logs.parameters import OccupancyParameters, Parameters
 from rose2_logs.pipeline import SnapshotAnalysis, analyse
 from rose2_logs.provenance import fingerprint, software_versions
 from rose2_logs.readers import Selection, inspect_log, open_log
+from rose2_logs.readers.discovery import stem_of
 from rose2_logs.readers.log import LogReader
 from rose2_logs.room_evidence import RoomEvidence, room_evidence
 from rose2_logs.sinks.sink import RunInfo, Sink
@@ -95,12 +95,9 @@ OnSnapshot = Callable[[TrackedSnapshot, float], None]
 
 def log_stem(path: Path) -> str:
     """Name for the results of a log: its name without its format's ending; of a pattern, its folder's."""
-    name = path.resolve().name
-    if any(sign in name for sign in "*?["):
-        name = path.resolve().parent.name
-    for ending in (".mcap", ".bag", ".db3", ".yaml", ".yml"):
-        name = name.removesuffix(ending)
-    return name
+    path = path.resolve()
+    is_pattern = any(sign in path.name for sign in "*?[")
+    return stem_of(path.parent.name if is_pattern else path.name)
 
 
 def seconds_into_log(path: Path, start_s: float | None, end_s: float | None) -> tuple[int | None, int | None]:
@@ -248,7 +245,7 @@ def is_same_to_analysis(
         return False
     changed = before.cells != now.cells
     kind_before, kind_now = (
-        np.stack([*_classified(cells[changed], parameters), cells[changed] == UNKNOWN])
+        np.stack([*classify(cells[changed], parameters), cells[changed] == UNKNOWN])
         for cells in (before.cells, now.cells)
     )
     return np.array_equal(kind_before, kind_now)
@@ -256,19 +253,8 @@ def is_same_to_analysis(
 
 def free_area_m2(snapshot: OccupancySnapshot, parameters: OccupancyParameters) -> float:
     """Known free area of a map in square metres."""
-    free, _ = _classified(snapshot.cells, parameters)
+    free, _ = classify(snapshot.cells, parameters)
     return float(free.sum()) * snapshot.geometry.cell_area_m2
-
-
-def _classified(
-    cells: NDArray[np.int8], parameters: OccupancyParameters
-) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Masks of the free and of the occupied cells."""
-    return classify(
-        cells,
-        occupied_min_percent=parameters.occupied_min_percent,
-        free_max_percent=parameters.free_max_percent,
-    )
 
 
 def _analyse_or_refuse(

@@ -19,14 +19,13 @@ from rose2_logs.occupancy import OccupancySnapshot
 from rose2_logs.parameters import Parameters
 from rose2_logs.pipeline import SnapshotAnalysis, analyse
 from rose2_logs.readers import open_log
+from rose2_logs.readers.discovery import IMAGE_ENDINGS
 from rose2_logs.rooms import RoomMap
 from rose2_logs.sinks.label_image import write_image, write_label_image
 from rose2_logs.sinks.picture import draw_rooms
 from rose2_logs.sinks.summary import write_json
 
 logger = logging.getLogger(__name__)
-
-IMAGES = (".png", ".pgm", ".bmp")
 
 
 @dataclass(frozen=True)
@@ -91,7 +90,7 @@ def read_static_map(map_file: Path, resolution_m: float | None = None) -> Occupa
     """Read a saved map; an image without a ``.yaml`` needs its resolution."""
     if not map_file.is_file():
         raise LogError(f"{map_file}: there is no such file")
-    is_bare = map_file.suffix.lower() in IMAGES and not map_file.with_suffix(".yaml").exists()
+    is_bare = map_file.suffix.lower() in IMAGE_ENDINGS and not map_file.with_suffix(".yaml").exists()
     if is_bare and resolution_m is None:
         raise ParameterError(f"{map_file}: no .yaml lies beside it; pass --resolution METRES_PER_CELL")
     if not is_bare and resolution_m is not None:

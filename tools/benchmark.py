@@ -26,7 +26,6 @@ true rooms, the found ones, and what is wrong. That of speed is DIR/speed.md wit
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from pathlib import Path
 
@@ -47,6 +46,7 @@ from benchmarking.speed_report import write_speed_report
 from rose2_logs.errors import Rose2LogsError
 from rose2_logs.parameters import load_parameters
 from rose2_logs.pipeline import METHODS
+from rose2_logs.sinks.summary import write_json
 
 SHARED_CASES = Path(__file__).parents[2] / "shared" / "benchmark" / "cases.json"
 """The room segmentation benchmark's place beside the project."""
@@ -176,10 +176,9 @@ def _sensitivity(options: argparse.Namespace) -> int:
     variants = make_variants(parameters, options.parameters)
     buildings = buildings_of(cases, options.buildings)
     measured = measure_sensitivity(cases, METHODS[0], variants, buildings, options.workers, sys.stderr.write)
-    options.output.mkdir(parents=True, exist_ok=True)
-    (options.output / "report.json").write_text(json.dumps(sensitivity_as_json(measured), indent=1))
+    write_json(options.output / "report.json", sensitivity_as_json(measured))
     report = options.output / "report.md"
-    report.write_text(sensitivity_report(measured))
+    report.write_text(sensitivity_report(measured), encoding="utf-8")
     print(report)
     return 0
 

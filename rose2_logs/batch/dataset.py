@@ -6,14 +6,15 @@ import csv
 import json
 import os
 import shutil
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
 
-from rose2_logs.errors import OutputError
+from rose2_logs.batch.folders import LOGS_FOLDER
+from rose2_logs.files import part_of, replacing, writing
 from rose2_logs.run import SUMMARY, TABLES
 
 TABLES_FOLDER = "tables"
@@ -59,13 +60,13 @@ def publish_tables(out: Path, name: str) -> None:
         If they cannot be written.
     """
     for table in TABLES:
-        source = out / "logs" / name / f"{table}.parquet"
+        source = out / LOGS_FOLDER / name / f"{table}.parquet"
         target = out / TABLES_FOLDER / table / f"{PARTITION}={name}" / f"{table}.parquet"
-        with _writing(target):
+        with writing(target):
             if _is_same(source, target):
                 continue
             target.parent.mkdir(parents=True, exist_ok=True)
-            part = target.with_name(f".{target.name}.part")
+            part = part_of(target)
             part.unlink(missing_ok=True)
             try:
                 os.link(source, part)
@@ -85,13 +86,13 @@ def withdraw_tables(out: Path, names: Sequence[str]) -> None:
     wanted = {f"{PARTITION}={name}" for name in names}
     for partition in (out / TABLES_FOLDER).glob(f"*/{PARTITION}=*"):
         if partition.name not in wanted:
-            with _writing(partition):
+            with writing(partition):
                 shutil.rmtree(partition)
 
 
 def summary_row(out: Path, name: str) -> Row:
     """Sum up the results of a finished log; one whose summary somebody damaged counts as failed."""
-    path = out / "logs" / name / SUMMARY
+    path = out / LOGS_FOLDER / name / SUMMARY
     try:
         kept = json.loads(path.read_text(encoding="utf-8"))
         results = kept["results"]
@@ -142,9 +143,9 @@ def write_summary_tables(out: Path, rows: Sequence[Mapping[str, Any]]) -> tuple[
     ]
     table = pa.Table.from_pylist([dict(row) for row in rows], pa.schema(fields))
     paths = (out / f"{SUMMARY_NAME}.parquet", out / f"{SUMMARY_NAME}.csv")
-    with _replacing(paths[0]) as part:
+    with replacing(paths[0]) as part:
         pq.write_table(table, part, compression="zstd")
-    with _replacing(paths[1]) as part, part.open("w", encoding="utf-8", newline="") as file:
+    with replacing(paths[1]) as part, part.open("w", encoding="utf-8", newline="") as file:
         writer = csv.DictWriter(file, list(SUMMARY_COLUMNS), lineterminator="\n")
         writer.writeheader()
         writer.writerows(rows)
@@ -156,23 +157,3 @@ def _is_same(source: Path, target: Path) -> bool:
         one, other = source.stat(), target.stat()
         return (one.st_size, one.st_mtime_ns) == (other.st_size, other.st_mtime_ns)
     return False
-
-
-@contextmanager
-def _replacing(path: Path) -> Iterator[Path]:
-    """Give a path to write to, which takes the place of another when it is whole."""
-    part = path.with_name(f".{path.name}.part")
-    with _writing(path):
-        try:
-            yield part
-            part.replace(path)
-        finally:
-            part.unlink(missing_ok=True)
-
-
-@contextmanager
-def _writing(path: Path) -> Iterator[None]:
-    try:
-        yield
-    except OSError as error:
-        raise OutputError(f"{path}: cannot be written: {error}") from error

@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 
 from rose2_logs.batch.location import Location
-from rose2_logs.readers.discovery import MAP_ENDINGS, STORAGE_ENDINGS
+from rose2_logs.readers.discovery import stem_of
 
 LONGEST_BYTES = 120
 """File systems take names of 255 bytes; endings and ``log=`` come on top."""
@@ -66,13 +66,6 @@ def assign_names(
         new = [log for log in new if log not in names]
         level += 1
     return names
-
-
-def stem_of(name: str) -> str:
-    """Name of a log without its format's ending."""
-    for ending in (*STORAGE_ENDINGS, *MAP_ENDINGS):
-        name = name.removesuffix(ending)
-    return name
 
 
 def _candidate(log: Location, level: int) -> str:

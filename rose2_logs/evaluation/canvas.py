@@ -42,11 +42,7 @@ def _walls(snapshot: OccupancySnapshot, parameters: OccupancyParameters) -> Floa
     """Blurred occupied cells (H, W)."""
     from scipy.ndimage import gaussian_filter
 
-    _, occupied = classify(
-        snapshot.cells,
-        occupied_min_percent=parameters.occupied_min_percent,
-        free_max_percent=parameters.free_max_percent,
-    )
+    _, occupied = classify(snapshot.cells, parameters)
     blurred: FloatArray = gaussian_filter(occupied.astype(np.float64), WALL_SIGMA_CELLS)
     return blurred
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rose2_logs.occupancy import FloatArray
+from rose2_logs.tracking.matching import assign
 
 MATCH_IOU = 0.5
 """A found and a true room are the same from this overlap on: the gate of the MOTChallenge benchmarks."""
@@ -139,12 +140,6 @@ def _most_pairs(
     weight: FloatArray, allowed: NDArray[np.bool_], count_first: bool = True
 ) -> list[tuple[int, int]]:
     """Pair rows with columns: as many allowed pairs as can be, of the greatest weight, or by weight alone."""
-    from scipy.optimize import linear_sum_assignment
-
-    if not allowed.any():
-        return []
     # One more pair outweighs whatever the others may lose.
-    bonus = min(weight.shape) * float(weight.max()) if count_first else 0.0
-    rows, columns = linear_sum_assignment(np.where(allowed, weight + bonus, 0.0), maximize=True)
-    chosen = allowed[rows, columns]
-    return list(zip(rows[chosen].tolist(), columns[chosen].tolist(), strict=True))
+    bonus = min(weight.shape) * float(weight.max(initial=0.0)) if count_first else 0.0
+    return assign(weight + bonus, allowed)

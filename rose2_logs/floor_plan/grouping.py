@@ -7,8 +7,6 @@ from collections import defaultdict
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_matrix
-from sklearn.cluster import DBSCAN
 
 from rose2_logs.floor_plan.evidence import EdgeEvidence
 from rose2_logs.occupancy import FloatArray
@@ -58,6 +56,10 @@ def group_faces(
 
 def _join_by_dbscan(groups: _Groups, parameters: FloorPlanParameters) -> None:
     """Join faces by DBSCAN with the weight of the edges between them as their distance (paper, III-C)."""
+    # Takes longer to import than a map to analyse, and this is not the usual way of joining.
+    from scipy.sparse import csr_matrix
+    from sklearn.cluster import DBSCAN
+
     count = len(groups.alive)
     pairs = [
         (a, b, border[1] / (border[0] + border[1]))

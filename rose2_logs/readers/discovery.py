@@ -16,6 +16,13 @@ ANNOTATED_ENDING = ".rose2.mcap"
 BAG_DESCRIPTION = "metadata.yaml"
 
 
+def stem_of(name: str) -> str:
+    """Name of a log without its format's ending."""
+    for ending in (*STORAGE_ENDINGS, *MAP_ENDINGS):
+        name = name.removesuffix(ending)
+    return name
+
+
 def logs_among(files: Iterable[str], folder_name: str) -> list[str]:
     """Find the logs in a folder by the names of its files.
 

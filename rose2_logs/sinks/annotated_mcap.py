@@ -13,6 +13,7 @@ from typing import IO, Self
 from mcap.exceptions import McapError
 
 from rose2_logs.errors import OutputError
+from rose2_logs.files import part_of
 from rose2_logs.sinks.mcap_input import (
     DAMAGE,
     LATCHED_QOS,
@@ -65,7 +66,7 @@ class AnnotatedMcap:
 
     def __init__(self, path: Path, info: RunInfo) -> None:
         self._path = path
-        self._part = path.with_name(f".{path.name}.part")
+        self._part = part_of(path)
         self._info = info
         self._file: IO[bytes] | None = None
 

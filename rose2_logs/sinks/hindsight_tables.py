@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from rose2_logs.sinks.parquet_table import ParquetTable, Row, writing
+from rose2_logs.files import writing
+from rose2_logs.sinks.parquet_table import ParquetTable, Row
 from rose2_logs.tracking.alignment import RigidMotion
 from rose2_logs.tracking.hindsight import Hindsight, RoomRows, look_back
 from rose2_logs.tracking.lives import Moment, RoomLife, RoomLives

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rose2_logs.errors import OutputError
+from rose2_logs.files import replacing
 
 MAX_8_BIT, MAX_16_BIT = 255, 65535
 
@@ -44,11 +45,5 @@ def write_image(path: Path, pixels: NDArray[np.uint8] | NDArray[np.uint16]) -> N
     """
     from PIL import Image
 
-    part = path.with_name(f".{path.name}.part")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+    with replacing(path) as part:
         Image.fromarray(pixels).save(part, format="PNG")
-        part.replace(path)
-    except OSError as error:
-        part.unlink(missing_ok=True)
-        raise OutputError(f"{path}: cannot be written: {error}") from error

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
-from rose2_logs.errors import OutputError
+from rose2_logs.files import part_of, writing
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -39,7 +37,7 @@ class ParquetTable:
     """
 
     def __init__(self, path: Path, schema: pa.Schema, part: Path | None = None) -> None:
-        self.part = part or path.with_name(f".{path.name}.part")
+        self.part = part or part_of(path)
         self._path = path
         self._schema = schema
         self._rows: list[Row] = []
@@ -119,12 +117,3 @@ class ParquetTable:
             self._close_writer()
         finally:
             self.part.unlink(missing_ok=True)
-
-
-@contextmanager
-def writing(path: Path) -> Iterator[None]:
-    """Name a file in the error of whatever cannot be written."""
-    try:
-        yield
-    except OSError as error:
-        raise OutputError(f"{path}: cannot be written: {error}") from error

@@ -8,7 +8,7 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from rose2_logs.occupancy import FloatArray, GridGeometry, known_window
+from rose2_logs.occupancy import FloatArray, known_window
 from rose2_logs.sinks.palette import track_colour
 from rose2_logs.sinks.rerun_columns import Picture
 from rose2_logs.tracking.frames import TrackedSnapshot
@@ -31,16 +31,12 @@ class MapPictures:
 
     def __init__(self, frame: TrackedSnapshot) -> None:
         self._frame = frame
-        geometry, (rows, columns) = frame.analysis.geometry, known_window(frame.snapshot.cells >= 0)
+        rows, columns = known_window(frame.snapshot.cells >= 0)
         # A picture begins at its top, a grid at its origin.
         self._part = (slice(rows.stop - 1, rows.start - 1 if rows.start else None, -1), columns)
         # As an unsigned byte unknown is 255, which is what the RViz colours expect.
         self._cells = np.ascontiguousarray(frame.snapshot.cells[self._part]).view(np.uint8)
-        corner = np.array([columns.start, rows.start]) * geometry.resolution_m
-        x, y = geometry.grid_to_world(corner).tolist()
-        self._place = GridGeometry(
-            geometry.resolution_m, (x, y), geometry.yaw_rad, geometry.frame_id, self._cells.shape
-        )
+        self._place = frame.analysis.geometry.part((rows, columns))
         self.corners_m = self._place.corners_m()
 
     def map(self, height_m: float) -> Picture:

@@ -18,6 +18,7 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from rose2_logs.errors import OutputError
+from rose2_logs.files import part_of, writing
 from rose2_logs.occupancy import FloatArray
 from rose2_logs.sinks.palette import track_colour
 from rose2_logs.sinks.rerun_blueprint import COVERAGE_UNIT, corners_of, make_blueprint
@@ -65,7 +66,7 @@ class RerunRecording:
 
     def __init__(self, path: Path | None, info: RunInfo, *, live: bool = False) -> None:
         self._path = path
-        self._part = path.with_name(f".{path.name}.part") if path else None
+        self._part = part_of(path) if path else None
         self._info = info
         self._live = live
         self._viewer_answers = live
@@ -86,10 +87,8 @@ class RerunRecording:
         self._layers = Layers(self._recording, 0 if self._live else CHUNK_BYTES)
         sinks: list[rr.FileSink | rr.GrpcSink] = []
         if self._part is not None:
-            try:
+            with writing(self._part.parent):
                 self._part.parent.mkdir(parents=True, exist_ok=True)
-            except OSError as error:
-                raise OutputError(f"{self._part.parent}: cannot be written: {error}") from error
             sinks.append(rr.FileSink(str(self._part)))
         if self._live:
             _open_viewer()
@@ -139,10 +138,8 @@ class RerunRecording:
             self._flush()
             self._recording.disconnect()
             if kind is None and self._path is not None and self._part is not None:
-                try:
+                with writing(self._path):
                     self._part.replace(self._path)
-                except OSError as failure:
-                    raise OutputError(f"{self._path}: cannot be written: {failure}") from failure
         finally:
             if self._part is not None:
                 self._part.unlink(missing_ok=True)

@@ -11,7 +11,7 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-from rose2_logs.errors import OutputError
+from rose2_logs.files import replacing
 from rose2_logs.sinks.sink import RunInfo
 from rose2_logs.tracking.frames import TrackedSnapshot
 from rose2_logs.tracking.hindsight import Hindsight
@@ -218,11 +218,5 @@ def write_json(path: Path, value: Any) -> None:
     OutputError
         If the file cannot be written.
     """
-    part = path.with_name(f".{path.name}.part")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+    with replacing(path) as part:
         part.write_text(json.dumps(value, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
-        part.replace(path)
-    except OSError as error:
-        part.unlink(missing_ok=True)
-        raise OutputError(f"{path}: cannot be written: {error}") from error

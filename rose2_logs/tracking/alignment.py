@@ -149,11 +149,7 @@ class MapAligner:
 
 def _wall_points(snapshot: OccupancySnapshot, parameters: OccupancyParameters) -> FloatArray:
     """World centres (N, 2) of the occupied cells beside free ones: the faces of walls."""
-    free, occupied = classify(
-        snapshot.cells,
-        occupied_min_percent=parameters.occupied_min_percent,
-        free_max_percent=parameters.free_max_percent,
-    )
+    free, occupied = classify(snapshot.cells, parameters)
     return snapshot.geometry.cell_centres(*np.nonzero(occupied & _beside(free)))
 
 

@@ -133,9 +133,7 @@ def cut_out_rooms(
             shapes.append(None)
             continue
         mask = labels[place] == number
-        corner = np.array([place[1].start, place[0].start]) * geometry.resolution_m
-        x, y = geometry.grid_to_world(corner).tolist()
-        cut = dataclasses.replace(geometry, origin_xy_m=(x, y), shape=mask.shape)
+        cut = geometry.part(place)
         shapes.append(RegionShape(cut, np.packbits(mask), float(mask.sum()) * cut.cell_area_m2))
     return tuple(shapes)
 

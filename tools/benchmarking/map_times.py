@@ -117,11 +117,7 @@ def time_map(map_: MapToTime, parameters: Parameters, methods: Sequence[str], re
     snapshot = map_.read()
     decode_s = float(np.median([timed(map_.read)[1].cpu_s for _ in range(repeats)]))
     seconds, stages, analysis = time_analysis(snapshot, parameters, repeats)
-    free, occupied = classify(
-        snapshot.cells,
-        occupied_min_percent=parameters.occupancy.occupied_min_percent,
-        free_max_percent=parameters.occupancy.free_max_percent,
-    )
+    free, occupied = classify(snapshot.cells, parameters.occupancy)
     window = known_window(free | occupied)
     explored = np.ascontiguousarray(occupied[window])
     floor(explored)

@@ -79,7 +79,7 @@ def load_published(path: Path = PUBLISHED_FILE) -> Published:
     ParameterError
         If the file cannot be read or names a figure that does not exist.
     """
-    data = _load(path)
+    data = load_toml(path)
     try:
         groups = data.get("groups", {})
         return Published(
@@ -99,7 +99,7 @@ def load_ablations(path: Path = ABLATIONS_FILE) -> tuple[Ablation, ...]:
     ParameterError
         If the file cannot be read, an entry lacks something, or names a method that does not exist.
     """
-    data = _load(path)
+    data = load_toml(path)
     try:
         ablations = tuple(
             Ablation(entry["name"], entry["sentence"], entry.get("method", METHODS[0]), tuple(entry["set"]))
@@ -113,7 +113,14 @@ def load_ablations(path: Path = ABLATIONS_FILE) -> tuple[Ablation, ...]:
     return ablations
 
 
-def _load(path: Path) -> dict[str, Any]:
+def load_toml(path: Path) -> dict[str, Any]:
+    """Read a file of the tool.
+
+    Raises
+    ------
+    ParameterError
+        If it cannot be read.
+    """
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import fnmatch
-import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarking.markdown import bold, difference, percent, table
+from benchmarking.references import load_toml
 from rose2_logs.errors import ParameterError
 from rose2_logs.evaluation.benchmark import evaluate_cases
 from rose2_logs.evaluation.cases import Case
@@ -128,10 +128,10 @@ def buildings_of(cases: Sequence[Case], path: Path = BUILDINGS_FILE) -> tuple[st
     ParameterError
         If the file cannot be read or an entry lacks something.
     """
+    entries = load_toml(path).get("building", [])
     try:
-        entries = tomllib.loads(path.read_text(encoding="utf-8")).get("building", [])
         patterns = [(pattern, entry["name"]) for entry in entries for pattern in entry["maps"]]
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, KeyError, TypeError) as error:
+    except (KeyError, TypeError) as error:
         raise ParameterError(f"{path}: not a list of buildings: {error!r}") from error
     return tuple(_building(f"{case.group}/{case.name}", patterns) for case in cases)
 

@@ -1,0 +1,48 @@
+"""Files that are whole or absent: written hidden beside their name and renamed at the end."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from rose2_logs.errors import OutputError
+
+
+def part_of(path: Path) -> Path:
+    """Return where a file is written until it is whole: hidden, in the folder where it will stand."""
+    return path.with_name(f".{path.name}.part")
+
+
+@contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Name a file in the error of whatever cannot be written.
+
+    Raises
+    ------
+    OutputError
+        Instead of an OSError within.
+    """
+    try:
+        yield
+    except OSError as error:
+        raise OutputError(f"{path}: cannot be written: {error}") from error
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """Give a path to write to, which takes the place of another when all went well; its folder is made.
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written.
+    """
+    part = part_of(path)
+    with writing(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            yield part
+            part.replace(path)
+        finally:
+            part.unlink(missing_ok=True)
