@@ -18,7 +18,7 @@ from rose2_logs.batch.task import LogOutcome, LogTask, Progress, analyse_task
 from rose2_logs.run import TABLES
 
 TIMEOUT_S = 90.0
-SLOW = tuple(range(116, 222, 8))
+SLOW = tuple(range(116, 222, 4))
 """Of how many columns the maps of a log know, that takes long enough to be caught while it is analysed."""
 
 Found = TypeVar("Found")

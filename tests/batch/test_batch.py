@@ -152,8 +152,8 @@ def test_a_batch_that_is_killed_leaves_whole_results_and_goes_on(tmp_path, monke
     """Its workers end with it; what was done is not done again."""
     logs, out = make_logs(tmp_path / "logs"), tmp_path / "out"
     process = start_batch(logs, "-o", out, "--workers", 2)
-    wait_for(lambda: list(out.glob("logs/*")))
     worker = wait_for(lambda: worker_of(out, "slow"))
+    wait_for(lambda: list(out.glob("logs/*")))
     process.kill()
     finish(process)
     wait_for(lambda: not is_running(worker))
