@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeVar
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from rose2_logs.occupancy import BoolArray, FloatArray, GridGeometry, classify, known_window
+from rose2_logs.occupancy import (
+    BoolArray,
+    CanvasPart,
+    FloatArray,
+    GridGeometry,
+    Scalar,
+    classify,
+    known_window,
+)
 from rose2_logs.parameters import OccupancyParameters
-
-Scalar = TypeVar("Scalar", bound=np.generic)
 
 NEIGHBOURS = ((0, -1), (0, 1), (-1, 0), (1, 0), (-1, -1), (-1, 1), (1, -1), (1, 1))
 """Where a coarse cell without a room looks for one: cells with a common side first."""
@@ -50,9 +55,12 @@ class ExploredPart:
         cls, cells: NDArray[np.int8], geometry: GridGeometry, parameters: OccupancyParameters
     ) -> ExploredPart:
         """Take the explored part of a canvas (H, W) of occupancy in percent, -1 for unknown."""
-        free, occupied = classify(cells, parameters)
+        # Cells of neither kind may surround the others; masks of a large canvas are not held for them.
+        known = known_window(cells >= 0)
+        free, occupied = classify(cells[known], parameters)
         window = known_window(free | occupied)
-        free, occupied = free[window], occupied[window]
+        free, occupied = free[window].copy(), occupied[window].copy()
+        window = _within(known, window)
         factor = block_side(geometry.resolution_m, free.size, parameters)
         if factor == 1:
             return cls(geometry, window, 1, free, occupied, free, occupied)
@@ -83,14 +91,12 @@ class ExploredPart:
         """Shapely geometry in the world."""
         return shapely.transform(geometry, self.points)
 
-    def cells(self, values: NDArray[Scalar], where: BoolArray | None = None) -> NDArray[Scalar]:
-        """Values of blocks over the whole canvas, zero outside the window and where not `where`."""
-        full = np.zeros(self.geometry.shape, values.dtype)
-        part = full[self.window]
-        part[...] = self._unblocked(values)
-        if where is not None:
-            part[~where] = 0
-        return full
+    def occupied_cells(self, values: NDArray[Scalar]) -> CanvasPart[Scalar]:
+        """Values of blocks as values of the canvas's occupied cells, zero elsewhere."""
+        cells = self._unblocked(values)
+        if self.factor > 1:
+            cells[~self.known_occupied] = 0
+        return CanvasPart(self.geometry.shape, self.window, cells)
 
     def labels(self, labels: NDArray[np.int32]) -> NDArray[np.int32]:
         """Labels of blocks as labels of the canvas's free cells.
@@ -144,6 +150,15 @@ def coarser_for_its_size(
         f"{analysed_resolution_m:.3g} m instead of {geometry.resolution_m:.3g} m; "
         "occupancy.analysed_max_cells sets the limit"
     )
+
+
+def _within(outer: tuple[slice, slice], inner: tuple[slice, slice]) -> tuple[slice, slice]:
+    """Rows and columns of a canvas of a window's window."""
+    rows, columns = (
+        slice(whole.start + part.start, whole.start + part.stop)
+        for whole, part in zip(outer, inner, strict=True)
+    )
+    return rows, columns
 
 
 def _blocks(mask: BoolArray, side: int) -> BoolArray:

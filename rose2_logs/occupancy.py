@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from rose2_logs.parameters import OccupancyParameters
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
+Scalar = TypeVar("Scalar", bound=np.generic)
 UNKNOWN = -1
 COUNTED_AT_ONCE = 2**16
 """Cells whose labels are counted at once."""
@@ -143,6 +145,31 @@ class OccupancySnapshot:
         object.__setattr__(self, "cells", cells)
 
 
+@dataclass(frozen=True, eq=False)
+class CanvasPart(Generic[Scalar]):
+    """Values of the cells of a window of a canvas; those outside are zero and not kept.
+
+    Attributes
+    ----------
+    shape : (int, int)
+        Of the canvas (H, W).
+    window : (slice, slice)
+        Rows and columns of the canvas.
+    values : (h, w)
+        Values of the window's cells.
+    """
+
+    shape: tuple[int, int]
+    window: tuple[slice, slice]
+    values: NDArray[Scalar]
+
+    def whole(self) -> NDArray[Scalar]:
+        """Values (H, W) of the whole canvas."""
+        canvas = np.zeros(self.shape, self.values.dtype)
+        canvas[self.window] = self.values
+        return canvas
+
+
 def classify(cells: NDArray[np.int8], parameters: OccupancyParameters) -> tuple[BoolArray, BoolArray]:
     """Masks of the free and of the occupied cells.
 
@@ -188,6 +215,13 @@ def distinct_labels(labels: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDA
     starts = np.flatnonzero(np.concatenate([[True], flat[1:] != flat[:-1]]))
     values, index = np.unique(flat[starts], return_index=True)
     return values.astype(np.int64), starts[index]
+
+
+def renumbered(labels: NDArray[np.int32], number: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Return ``number[labels]``, the image with new numbers, written over the old ones to save memory."""
+    for rows in np.array_split(labels, max(1, labels.size // COUNTED_AT_ONCE)):
+        rows[...] = number[rows]
+    return labels
 
 
 def label_sizes(labels: NDArray[np.integer], count: int) -> NDArray[np.int64]:

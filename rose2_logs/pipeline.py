@@ -24,7 +24,14 @@ from rose2_logs.floor_plan.rooms import (
     settle_borders,
 )
 from rose2_logs.floor_plan.stage import FloorPlanResult, make_floor_plan
-from rose2_logs.occupancy import GridGeometry, OccupancySnapshot, distinct_labels, label_sizes
+from rose2_logs.occupancy import (
+    BoolArray,
+    GridGeometry,
+    OccupancySnapshot,
+    distinct_labels,
+    label_sizes,
+    renumbered,
+)
 from rose2_logs.parameters import Parameters
 from rose2_logs.rooms import Doorway, RoomMap
 from rose2_logs.rose.stage import RoseResult, find_structure
@@ -165,7 +172,8 @@ def analyse(snapshot: OccupancySnapshot, parameters: Parameters, method: str = "
         parameters.topology,
     )
     watch.lap("topology")
-    rooms, room_of_face = _finished_rooms(labels, plan, explored, parameters)
+    labels, shapes, room_of_face = _finished_rooms(labels, plan, free, resolution, parameters)
+    rooms = _room_map(labels, shapes, explored, parameters)
     watch.lap("rooms")
     return analysis(
         rooms=rooms,
@@ -189,19 +197,22 @@ class _StopWatch:
 
 
 def _finished_rooms(
-    labels: NDArray[np.int32], plan: FloorPlanResult, explored: ExploredPart, parameters: Parameters
-) -> tuple[RoomMap, NDArray[np.int32]]:
-    """Rooms with what was left out, straight borders and shapes; and the room of each face."""
-    resolution = explored.resolution_m
-    unsettled = adopt_left_out(labels, explored.free, resolution, parameters.floor_plan)
-    labels = settle_borders(unsettled, resolution, parameters.floor_plan.border_strip_m)
+    labels: NDArray[np.int32],
+    plan: FloorPlanResult,
+    free: BoolArray,
+    resolution_m: float,
+    parameters: Parameters,
+) -> tuple[NDArray[np.int32], list[BaseGeometry], NDArray[np.int32]]:
+    """Labels (H, W) of the rooms with straight borders, their shapes, and the room of each face."""
+    unsettled = adopt_left_out(labels, free, resolution_m, parameters.floor_plan)
+    labels = settle_borders(unsettled, resolution_m, parameters.floor_plan.border_strip_m)
     number = number_rooms(
-        labels, int(unsettled.max(initial=0)), parameters.floor_plan.room_min_area_m2, resolution
+        labels, int(unsettled.max(initial=0)), parameters.floor_plan.room_min_area_m2, resolution_m
     )
-    labels = number[labels]
+    labels = renumbered(labels, number)
     # Which faces are a room's is told by the labels before their borders settled.
-    room_of_face, shapes = _room_shapes(plan, number[unsettled], labels, resolution, parameters)
-    return _room_map(labels, shapes, explored, parameters), room_of_face
+    room_of_face, shapes = _room_shapes(plan, renumbered(unsettled, number), labels, resolution_m, parameters)
+    return labels, shapes, room_of_face
 
 
 def _room_shapes(
@@ -215,9 +226,10 @@ def _room_shapes(
     count = int(labels.max(initial=0))
     group_count = int(plan.group.max(initial=0)) + 1
     fits = (count + 1) * group_count < 2**31
-    pairs, _ = distinct_labels(
-        unsettled * (np.int32(group_count) if fits else np.int64(group_count)) + plan.labels
-    )
+    pair_of_cell = unsettled * (np.int32(group_count) if fits else np.int64(group_count))
+    pair_of_cell += plan.labels
+    pairs, _ = distinct_labels(pair_of_cell)
+    del pair_of_cell
     rooms, groups = np.divmod(pairs, group_count)
     # A group that was split, or lost cells to a split, has no faces of its own any more.
     rooms, groups = rooms[rooms > 0], groups[rooms > 0]
@@ -256,9 +268,9 @@ def _structure(found: RoseResult, explored: ExploredPart) -> Structure:
     return Structure(
         directions_rad=np.mod(found.directions_rad + explored.geometry.yaw_rad, np.pi),
         strengths=found.strengths,
-        score=explored.cells(found.score, explored.known_occupied),
+        scores=explored.occupied_cells(found.score),
         threshold=found.threshold,
-        clean=explored.cells(found.clean, explored.known_occupied),
+        clean_cells=explored.occupied_cells(found.clean),
     )
 
 

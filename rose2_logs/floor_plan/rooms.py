@@ -90,7 +90,9 @@ def adopt_left_out(
     contacts = contacts.reshape(count, rooms)
     room = contacts.argmax(1).astype(np.int32)
     room[contacts.max(1) * resolution_m < parameters.join_min_open_m] = 0
-    return np.where(left_out, room[piece], labels)
+    adopted = labels.copy()
+    adopted[left_out] = room[piece[left_out]]
+    return adopted
 
 
 def settle_borders(labels: NDArray[np.int32], resolution_m: float, strip_m: float) -> NDArray[np.int32]:

@@ -37,7 +37,11 @@ def structure_score(
         along = spectrum.frequency_x * np.float32(np.cos(direction)) + spectrum.frequency_y * np.float32(
             np.sin(direction)
         )
-        gain = np.exp(-2 * (np.pi * sigma_along * along) ** 2)
+        # In place, for these are the largest arrays of the analysis.
+        along *= np.pi * sigma_along
+        np.square(along, out=along)
+        along *= -2
+        gain = np.exp(along, out=along)
         np.maximum(score, spectrum.filtered(gain, occupied.shape), out=score)
     score[~occupied] = 0
     return np.clip(score, 0, 1, out=score)

@@ -34,8 +34,10 @@ class Spectrum:
 
     def filtered(self, gain: NDArray[np.float32], size: tuple[int, int]) -> NDArray[np.float32]:
         """Transform back what a gain of the half plane's shape leaves, cut to `size` cells."""
-        image: NDArray[np.float32] = fft.irfft2(self.values * gain, s=self.shape)
-        return image[: size[0], : size[1]]
+        # One axis after the other, so that rows that are cut off are not transformed.
+        columns = fft.ifft(self.values * gain, axis=0, overwrite_x=True)[: size[0]]
+        image: NDArray[np.float32] = fft.irfft(columns, self.shape[1], axis=1, overwrite_x=True)
+        return image[:, : size[1]]
 
 
 def compute_spectrum(occupied: BoolArray, resolution_m: float, parameters: SpectrumParameters) -> Spectrum:
@@ -47,7 +49,9 @@ def compute_spectrum(occupied: BoolArray, resolution_m: float, parameters: Spect
     """
     margin = int(np.ceil(2 * parameters.structure_length_m / resolution_m))
     shape = tuple(fft.next_fast_len(side + margin, real=True) for side in occupied.shape)
-    values = fft.rfft2(_walls_of_one_thickness(occupied, resolution_m, parameters.wall_sigma_m), s=shape)
+    walls = _walls_of_one_thickness(occupied, resolution_m, parameters.wall_sigma_m)
+    # One axis after the other, so that rows of zeros are not transformed.
+    values = fft.fft(fft.rfft(walls, shape[1], axis=1), shape[0], axis=0)
     frequency_x = fft.rfftfreq(shape[1], resolution_m).astype(np.float32)[None, :]
     frequency_y = fft.fftfreq(shape[0], resolution_m).astype(np.float32)[:, None]
     return Spectrum(values, frequency_x, frequency_y, (shape[0], shape[1]))
@@ -56,10 +60,10 @@ def compute_spectrum(occupied: BoolArray, resolution_m: float, parameters: Spect
 def _walls_of_one_thickness(occupied: BoolArray, resolution_m: float, sigma_m: float) -> NDArray[np.float32]:
     """Blur the occupied cells, scaled so that a straight wall one cell thick is 1 and cut off there."""
     sigma = max(sigma_m / resolution_m, 0.5)
-    blurred = cv2.GaussianBlur(occupied.astype(np.float32), (0, 0), sigma, borderType=cv2.BORDER_CONSTANT)
-    thin_wall = 1 / (np.sqrt(2 * np.pi) * sigma)
-    capped: NDArray[np.float32] = np.minimum(blurred / np.float32(thin_wall), 1)
-    return capped
+    walls: NDArray[np.float32] = occupied.astype(np.float32)
+    cv2.GaussianBlur(walls, (0, 0), sigma, dst=walls, borderType=cv2.BORDER_CONSTANT)
+    walls /= np.float32(1 / (np.sqrt(2 * np.pi) * sigma))
+    return np.minimum(walls, 1, out=walls)
 
 
 def angular_energy(spectrum: Spectrum, parameters: SpectrumParameters) -> FloatArray:
@@ -85,7 +89,7 @@ def angular_energy(spectrum: Spectrum, parameters: SpectrumParameters) -> FloatA
     across = np.arange(bins) * np.pi / bins - np.pi / 2
     magnitude = np.fft.fftshift(np.abs(spectrum.values), axes=0)
     polar = cv2.remap(
-        magnitude.astype(np.float32),
+        magnitude,
         (np.outer(np.cos(across), radius) / step_x).astype(np.float32),
         (np.outer(np.sin(across), radius) / step_y + len(magnitude) // 2).astype(np.float32),
         cv2.INTER_LINEAR,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rose2_logs.occupancy import BoolArray, FloatArray
+from rose2_logs.occupancy import BoolArray, CanvasPart, FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,16 +20,24 @@ class Structure:
         Directions of walls in [0, pi), world frame, strongest first.
     strengths : (D,) float
         Share of the spectrum's energy that each direction holds.
-    score : (H, W) float32
-        Structure score of each occupied cell in [0, 1]; 0 elsewhere.
     threshold : float
         Cells with at least this score make the clean map.
-    clean : (H, W) bool
-        The clean map: occupied cells that belong to the structure.
+    scores, clean_cells : CanvasPart
+        What `score` and `clean` hold, of the explored part alone.
     """
 
     directions_rad: FloatArray
     strengths: FloatArray
-    score: NDArray[np.float32]
     threshold: float
-    clean: BoolArray
+    scores: CanvasPart[np.float32]
+    clean_cells: CanvasPart[np.bool_]
+
+    @property
+    def score(self) -> NDArray[np.float32]:
+        """Structure score (H, W) of each occupied cell in [0, 1]; 0 elsewhere."""
+        return self.scores.whole()
+
+    @property
+    def clean(self) -> BoolArray:
+        """The clean map (H, W): occupied cells that belong to the structure."""
+        return self.clean_cells.whole()

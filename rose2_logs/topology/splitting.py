@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import find_objects
@@ -33,39 +35,69 @@ def split_rooms(
     """
     labels = labels.copy()
     clear = clearance_m(walls, resolution_m)
-    lines = STRtree(linestrings(lines_m.reshape(-1, 2, 2)))
-    normals, offsets = _as_normals(lines_m)
+    lines = _Lines.of(lines_m)
     number = int(labels.max(initial=0))
     pending = [
         (room, window, 0) for room, window in enumerate(find_objects(labels), start=1) if window is not None
     ]
     while pending:
         room, window, rounds = pending.pop()
-        inside = labels[window] == room
-        part = parts_of_room(inside, clear[window], resolution_m, parameters)
-        size = np.bincount(part.ravel())[1:] * resolution_m**2
-        # The two largest parts are divided first; the rest follow in later rounds.
-        largest = np.argsort(-size, kind="stable")[:2]
-        if len(largest) < 2 or size[largest[1]] < parameters.split_min_area_m2:
-            continue
-        corner = np.array([window[1].start, window[0].start], np.float32)
-        row, column = np.nonzero(inside)
-        points = np.empty((len(row), 2), np.float32)
-        points[:, 0], points[:, 1] = column, row
-        points += corner + 0.5
-        points *= resolution_m
-        of_cell = part[row, column]
-        one, two = points[of_cell == largest[0] + 1], points[of_cell == largest[1] + 1]
-        near = np.sort(lines.query(box(*points.min(0), *points.max(0)), predicate="intersects"))
-        candidates = [(normals[near], offsets[near]), _between(one, two, directions_rad)]
-        beyond = _cut(points, one, two, candidates, parameters.split_min_purity)
+        beyond = _beyond_cut(
+            labels[window] == room, window, clear, lines, directions_rad, resolution_m, parameters
+        )
         if beyond is None:
             continue
         number += 1
-        labels[window][row[beyond], column[beyond]] = number
+        labels[window][beyond] = number
         if rounds + 1 < parameters.max_rounds:
             pending += [(room, window, rounds + 1), (number, window, rounds + 1)]
     return labels
+
+
+@dataclass(frozen=True, eq=False)
+class _Lines:
+    """The representative lines: normals (L, 2) and offsets (L,), and a tree to find those that meet a box."""
+
+    normals: FloatArray
+    offsets: FloatArray
+    tree: STRtree
+
+    @classmethod
+    def of(cls, ends_m: FloatArray) -> _Lines:
+        return cls(*_as_normals(ends_m), STRtree(linestrings(ends_m.reshape(-1, 2, 2))))
+
+    def near(self, points: NDArray[np.float32]) -> tuple[FloatArray, FloatArray]:
+        """Normals and offsets of the lines that meet the box around some points."""
+        found = np.sort(self.tree.query(box(*points.min(0), *points.max(0)), predicate="intersects"))
+        return self.normals[found], self.offsets[found]
+
+
+def _beyond_cut(
+    inside: BoolArray,
+    window: tuple[slice, slice],
+    clear: NDArray[np.float32],
+    lines: _Lines,
+    directions_rad: FloatArray,
+    resolution_m: float,
+    parameters: TopologyParameters,
+) -> tuple[NDArray[np.intp], NDArray[np.intp]] | None:
+    """Rows and columns of the cells beyond the cut through a room, in its window; None if it stays whole."""
+    part = parts_of_room(inside, clear[window], resolution_m, parameters)
+    size = np.bincount(part.ravel())[1:] * resolution_m**2
+    # The two largest parts are divided first; the rest follow in later rounds.
+    largest = np.argsort(-size, kind="stable")[:2]
+    if len(largest) < 2 or size[largest[1]] < parameters.split_min_area_m2:
+        return None
+    row, column = np.nonzero(inside)
+    points = np.empty((len(row), 2), np.float32)
+    points[:, 0], points[:, 1] = column, row
+    points += np.array([window[1].start, window[0].start], np.float32) + 0.5
+    points *= resolution_m
+    of_cell = part[row, column]
+    one, two = points[of_cell == largest[0] + 1], points[of_cell == largest[1] + 1]
+    candidates = [lines.near(points), _between(one, two, directions_rad)]
+    beyond = _cut(points, one, two, candidates, parameters.split_min_purity)
+    return None if beyond is None else (row[beyond], column[beyond])
 
 
 def _cut(

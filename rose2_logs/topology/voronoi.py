@@ -90,12 +90,22 @@ def _basins(
     inside: BoolArray, clear: NDArray[np.float32], resolution_m: float, reach_m: float
 ) -> NDArray[np.int32]:
     """Divide a room (H, W) at the valleys between the summits of its clearance; basins 1.., 0 outside."""
+    # The watershed makes larger copies of what it is given, so that nothing else shall hold on to it.
+    basin: NDArray[np.int32] = watershed(  # type: ignore[no-untyped-call]
+        -clear, _summits(inside, clear, resolution_m, reach_m), mask=inside
+    )
+    return basin
+
+
+def _summits(
+    inside: BoolArray, clear: NDArray[np.float32], resolution_m: float, reach_m: float
+) -> NDArray[np.int32]:
+    """Number (H, W) from 1 the cells that are the clearest of their room as far as `reach_m`."""
     width = 2 * max(1, round(reach_m / resolution_m)) + 1
     height = np.where(inside, clear, -1)
     summits = inside & (height == cv2.dilate(height, np.ones((width, width), np.uint8)))
-    markers, _ = ndimage.label(summits, np.ones((3, 3)))
-    basin: NDArray[np.int32] = watershed(-clear, markers, mask=inside)  # type: ignore[no-untyped-call]
-    return basin
+    markers: NDArray[np.int32] = ndimage.label(summits, np.ones((3, 3)))[0]
+    return markers
 
 
 def _passages(
@@ -107,10 +117,11 @@ def _passages(
         ((slice(None), slice(None, -1)), (slice(None), slice(1, None))),
         ((slice(None, -1), slice(None)), (slice(1, None), slice(None))),
     ):
-        a, b = basin[first].astype(np.int64), basin[second].astype(np.int64)
-        meet = (a != b) & (a > 0) & (b > 0)
-        keys.append(np.minimum(a, b)[meet] * count + np.maximum(a, b)[meet])
-        widths.append(np.minimum(clear[first], clear[second])[meet])
+        meet = basin[first] != basin[second]
+        meet &= (basin[first] > 0) & (basin[second] > 0)
+        a, b = basin[first][meet].astype(np.int64), basin[second][meet].astype(np.int64)
+        keys.append(np.minimum(a, b) * count + np.maximum(a, b))
+        widths.append(np.minimum(clear[first][meet], clear[second][meet]))
     pairs, index = np.unique(np.concatenate(keys), return_inverse=True)
     widest = np.zeros(len(pairs))
     np.maximum.at(widest, index, np.concatenate(widths))

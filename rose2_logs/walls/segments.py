@@ -84,8 +84,10 @@ def detect_segments(
     members : (H, W) bool
         The cells on segments.
     """
-    row, column = np.nonzero(clean)
-    points: FloatArray = np.column_stack([column, row]).astype(float) * resolution_m + resolution_m / 2
+    cell = np.flatnonzero(clean)
+    points = np.column_stack(np.divmod(cell, clean.shape[1])[::-1]).astype(float)
+    points *= resolution_m
+    points += resolution_m / 2
     members = np.zeros(clean.shape, bool)
     longest = np.zeros(len(points))
     best = np.zeros(len(points), np.int32)
@@ -104,7 +106,7 @@ def detect_segments(
             keep = runs.covered & (runs.end - runs.start >= min_length_m)
             rows.append(np.column_stack([runs.strip, runs.offset, runs.start, runs.end])[keep])
             on_run = own[runs.point[keep[runs.run]]]
-            members[row[on_run], column[on_run]] = True
+            members.ravel()[cell[on_run]] = True
         of_strip = np.concatenate(rows)
         of_strip = of_strip[np.lexsort((of_strip[:, 2], of_strip[:, 0]))]
         of_strip[:, 0] = number
@@ -139,12 +141,12 @@ def _straight_runs(
     c, s = np.cos(angle), np.sin(angle)
     x, y = points.T
     along, across = x * c + y * s, y * c - x * s
-    cell = np.floor(across / resolution_m).astype(np.int64)
+    cell = np.floor(across / resolution_m).astype(np.int32)
     by_place = np.argsort(along, kind="stable")
     for shift in (0, 1):
         strip = (cell + shift) // 2
         # Small integers are sorted by radix.
-        rank = (strip - strip.min()).astype(np.uint16 if np.ptp(strip) < 2**16 else np.int64)
+        rank = (strip - strip.min()).astype(np.uint16 if np.ptp(strip) < 2**16 else np.int32)
         point = by_place[np.argsort(rank[by_place], kind="stable")]
         position, strip = along[point], strip[point]
         gap = position[1:] - position[:-1]
