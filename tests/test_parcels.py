@@ -17,8 +17,8 @@ from rose2_logs.pipeline import SnapshotAnalysis, analyse
 
 def test_an_analysis_comes_out_as_it_went_in(tmp_path: Path):
     """Its large arrays through the file, which is gone once it is opened; all else in the pickle."""
-    cells, _ = office(turn_rad=0.3, clutter=5)
-    made = analyse(snapshot(cells), Parameters())
+    cells, _ = office(turn_rad=0.3, clutter=5, resolution_m=0.03)
+    made = analyse(snapshot(cells, 0.03), Parameters())
     parcel = pack(made, [str(tmp_path)])
     assert made.structure is not None
     assert len(parcel.pickled) < made.rooms.labels.nbytes / 4
@@ -28,8 +28,8 @@ def test_an_analysis_comes_out_as_it_went_in(tmp_path: Path):
     assert found.structure is not None
     for one, other in (
         (made.rooms.labels, found.rooms.labels),
-        (made.structure.score, found.structure.score),
-        (made.structure.clean, found.structure.clean),
+        (made.structure.scores.values, found.structure.scores.values),
+        (made.structure.clean_cells.values, found.structure.clean_cells.values),
     ):
         assert one.dtype == other.dtype
         np.testing.assert_array_equal(one, other)

@@ -8,6 +8,7 @@ import os
 import platform
 import threading
 import time
+import tracemalloc
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -71,6 +72,16 @@ def peak_memory(function: Callable[[], object]) -> int | None:
         return None
     function()
     return _status_bytes("self", "VmHWM") - before
+
+
+def peak_allocated(function: Callable[[], object]) -> int:
+    """Bytes that Python and numpy hold at the peak of a call, its result included."""
+    tracemalloc.start()
+    try:
+        function()
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
 
 
 def bytes_read(function: Callable[[], object]) -> int | None:

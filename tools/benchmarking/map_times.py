@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 from scipy import fft
 
-from benchmarking.gauges import peak_memory, timed
+from benchmarking.gauges import peak_allocated, peak_memory, timed
 from rose2_logs.evaluation.cases import Case
 from rose2_logs.occupancy import BoolArray, OccupancySnapshot, classify, known_window
 from rose2_logs.parameters import Parameters
@@ -60,7 +60,9 @@ class MapTimes:
     methods_s : dict of str to float
         The analysis by other methods.
     peak_bytes : int or None
-        Memory above the map, its result included.
+        Memory that the process takes above the map, its result included, and what its allocators hold back.
+    arrays_bytes : int
+        Most bytes that Python and numpy held at once, the result included.
     """
 
     group: str
@@ -74,6 +76,7 @@ class MapTimes:
     floor_s: float
     methods_s: dict[str, float]
     peak_bytes: int | None
+    arrays_bytes: int
 
     @property
     def whole_s(self) -> float:
@@ -138,6 +141,7 @@ def time_map(map_: MapToTime, parameters: Parameters, methods: Sequence[str], re
         floor_s,
         others,
         peak_memory(partial(analyse, snapshot, parameters)),
+        peak_allocated(partial(analyse, snapshot, parameters)),
     )
 
 

@@ -70,6 +70,7 @@ def _groups(speed: Speed) -> list[str]:
         members = _of(speed.maps, group)
         whole = [times.whole_s for times in members]
         peaks = [times.peak_bytes / times.explored_cells for times in members if times.peak_bytes is not None]
+        arrays = [times.arrays_bytes / times.explored_cells for times in members]
         others = [np.median([times.methods_s[name] for times in members]) for name in METHODS[1:]]
         summary.append(
             [
@@ -78,6 +79,7 @@ def _groups(speed: Speed) -> list[str]:
                 f"{max(whole):.3f}",
                 f"{np.median([times.over_floor for times in members]):.1f}",
                 *(f"{value:.3f}" for value in others),
+                f"{np.median(arrays):.0f} / {max(arrays):.0f}",
                 f"{np.median(peaks):.0f} / {max(peaks):.0f}" if peaks else "",
             ]
         )
@@ -99,11 +101,14 @@ def _groups(speed: Speed) -> list[str]:
         "over floor",
         *METHODS[1:],
         "bytes a cell, median / most",
+        "of the process",
     ]
     return [
         "## Each map",
         "",
-        "The analysis by the other methods in seconds, medians.",
+        "The analysis by the other methods in seconds, medians. Memory above the map, for each explored "
+        "cell: the most that arrays and objects take at once, and how far the process grows, with what "
+        "libraries and allocators hold, some megabytes whatever the map's size.",
         "",
         *table(head, summary),
         "### By stage, median milliseconds",
@@ -260,7 +265,7 @@ def _maps(speed: Speed) -> list[str]:
             f"{times.whole_s:.3f}",
             *(f"{1000 * seconds:.0f}" for seconds in times.stages_s.values()),
             f"{times.over_floor:.1f}",
-            "" if times.peak_bytes is None else f"{times.peak_bytes / times.explored_cells:.0f}",
+            f"{times.arrays_bytes / times.explored_cells:.0f}",
         ]
         for times in speed.maps
     ]
