@@ -7,17 +7,37 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from rose2_logs.baselines.distance import segment_distance
-from rose2_logs.baselines.morphological import segment_morphological
-from rose2_logs.baselines.voronoi import segment_voronoi
 from rose2_logs.floor_plan.rooms import number_rooms
 from rose2_logs.occupancy import BoolArray
 from rose2_logs.parameters import Parameters
 
-BASELINES: dict[str, Callable[[BoolArray, float, Parameters], NDArray[np.int32]]] = {
-    "morphological": lambda free, resolution_m, p: segment_morphological(free, resolution_m, p.morphological),
-    "distance": lambda free, resolution_m, p: segment_distance(free, resolution_m, p.distance),
-    "voronoi": lambda free, resolution_m, p: segment_voronoi(free, resolution_m, p.voronoi, p.voronoi_merge),
+Labels = NDArray[np.int32]
+
+# Each is imported when it is asked for: most runs need none, and what they import takes its time.
+
+
+def _morphological(free: BoolArray, resolution_m: float, parameters: Parameters) -> Labels:
+    from rose2_logs.baselines.morphological import segment_morphological
+
+    return segment_morphological(free, resolution_m, parameters.morphological)
+
+
+def _distance(free: BoolArray, resolution_m: float, parameters: Parameters) -> Labels:
+    from rose2_logs.baselines.distance import segment_distance
+
+    return segment_distance(free, resolution_m, parameters.distance)
+
+
+def _voronoi(free: BoolArray, resolution_m: float, parameters: Parameters) -> Labels:
+    from rose2_logs.baselines.voronoi import segment_voronoi
+
+    return segment_voronoi(free, resolution_m, parameters.voronoi, parameters.voronoi_merge)
+
+
+BASELINES: dict[str, Callable[[BoolArray, float, Parameters], Labels]] = {
+    "morphological": _morphological,
+    "distance": _distance,
+    "voronoi": _voronoi,
 }
 """Segmentation of free cells, side of a cell and all parameters into labels, by the method's name."""
 
