@@ -49,6 +49,7 @@ def find_structure(
     spectrum = compute_spectrum(occupied, resolution_m, parameters)
     directions, strengths = dominant_directions(angular_energy(spectrum, parameters), parameters)
     score = structure_score(spectrum, occupied, directions, parameters)
+    del spectrum  # as large as the rest of the stage needs
     supported = supported_cells(score, occupied, resolution_m, parameters)
     threshold = clean_threshold(
         score, supported, free_m2, lambda clean: count_walls(clean, directions), parameters
