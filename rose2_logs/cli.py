@@ -22,6 +22,7 @@ from rose2_logs.cli_options import (
     Debug,
     End,
     Every,
+    Layers,
     MaxSnapshots,
     Method,
     MinChange,
@@ -31,6 +32,7 @@ from rose2_logs.cli_options import (
     Start,
     Topic,
     Workers,
+    chosen_layers,
     resolve_parameters,
     state,
 )
@@ -123,6 +125,7 @@ def analyze(
     ] = False,
     no_rrd: NoRecording = False,
     no_mcap: NoAnnotatedLog = False,
+    layers: Layers = "all",
     debug: Debug = False,
 ) -> None:
     """Find and follow the rooms in all maps of a log; write recording, annotated MCAP and tables."""
@@ -133,6 +136,7 @@ def analyze(
 
     keep_freed_memory()
     parameters = resolve_parameters(config, settings, method)
+    shown = chosen_layers(layers)
     names = [log_stem(log) for log in logs]
     if twice := {name for name in names if names.count(name) > 1}:
         raise ParameterError(f"several logs are named {min(twice)}: analyze them to different folders")
@@ -147,6 +151,7 @@ def analyze(
                 method=method,
                 workers=workers,
                 recording=not no_rrd,
+                layers=shown,
                 annotated_log=not no_mcap,
                 live=live,
                 overwrite=overwrite,

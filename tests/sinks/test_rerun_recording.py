@@ -133,7 +133,7 @@ def test_a_viewer_that_is_closed_along_the_way_does_not_stop_the_run(tmp_path, m
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
-    monkeypatch.setattr("rose2_logs.sinks.rerun_recording.VIEWER_PORT", port)
+    monkeypatch.setattr("rose2_logs.sinks.rerun_viewer.VIEWER_PORT", port)
     monkeypatch.setenv("PATH", f"{BIN}:/usr/bin:/bin")
     monkeypatch.setenv("HOME", str(tmp_path))
     seen = []
@@ -159,7 +159,7 @@ def test_live_without_a_viewer_or_a_screen_says_what_to_do(tmp_path, monkeypatch
     # A port of its own: the one of the viewers may be in use by another test.
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
-        monkeypatch.setattr("rose2_logs.sinks.rerun_recording.VIEWER_PORT", probe.getsockname()[1])
+        monkeypatch.setattr("rose2_logs.sinks.rerun_viewer.VIEWER_PORT", probe.getsockname()[1])
     options = RunOptions(selection=Selection(max_snapshots=1), annotated_log=False, live=True)
     with pytest.raises(OutputError, match="no Rerun viewer is open"):
         analyse_log(PROJECT / "sample_logs" / "office.mcap", tmp_path / "out", options)
@@ -167,7 +167,7 @@ def test_live_without_a_viewer_or_a_screen_says_what_to_do(tmp_path, monkeypatch
 
 
 def test_a_shift_of_the_map_is_told_in_metres_and_degrees():
-    from rose2_logs.sinks.rerun_recording import event_text
+    from rose2_logs.sinks.event_text import event_text
 
     motion = RigidMotion((3.0, 4.0), (0.204, -0.05), np.deg2rad(1.2))
     text = event_text(RoomEvent("shifted", 5, MAP_TRACK, motion=motion))
