@@ -126,6 +126,12 @@ def analyze(
     no_rrd: NoRecording = False,
     no_mcap: NoAnnotatedLog = False,
     layers: Layers = "all",
+    bag: Annotated[
+        bool,
+        typer.Option(
+            "--bag", help="Also write metadata.yaml: `ros2 bag play OUT/NAME` then plays the annotated MCAP."
+        ),
+    ] = False,
     debug: Debug = False,
 ) -> None:
     """Find and follow the rooms in all maps of a log; write recording, annotated MCAP and tables."""
@@ -137,6 +143,8 @@ def analyze(
     keep_freed_memory()
     parameters = resolve_parameters(config, settings, method)
     shown = chosen_layers(layers)
+    if bag and no_mcap:
+        raise ParameterError("--bag is about the annotated MCAP: leave --no-mcap out")
     names = [log_stem(log) for log in logs]
     if twice := {name for name in names if names.count(name) > 1}:
         raise ParameterError(f"several logs are named {min(twice)}: analyze them to different folders")
@@ -153,6 +161,7 @@ def analyze(
                 recording=not no_rrd,
                 layers=shown,
                 annotated_log=not no_mcap,
+                bag=bag,
                 live=live,
                 overwrite=overwrite,
             )

@@ -27,6 +27,7 @@ from rose2_logs.room_evidence import RoomEvidence, room_evidence
 from rose2_logs.sinks.sink import RECORDING_LAYERS, RunInfo, Sink
 from rose2_logs.sinks.summary import RunTotals, write_summary
 from rose2_logs.sinks.tables import Tables
+from rose2_logs.sinks.viewer_layouts import bag_metadata_path, foxglove_path, rviz_path
 from rose2_logs.tracking.frames import TrackedSnapshot, map_motion
 from rose2_logs.tracking.layout_change import LayoutFollower
 from rose2_logs.tracking.lives import Moment
@@ -58,6 +59,8 @@ class RunOptions:
         ``if __name__ == "__main__"``, as each of them imports it.
     recording, annotated_log : bool
         Whether to write the Rerun recording and the annotated MCAP. The tables are always written.
+    bag : bool
+        Whether the folder becomes a bag of ROS 2 that holds the annotated MCAP.
     layers : tuple of str
         Those of `RECORDING_LAYERS` that the recording gets.
     live : bool
@@ -75,6 +78,7 @@ class RunOptions:
     workers: int = 1
     recording: bool = True
     annotated_log: bool = True
+    bag: bool = False
     layers: tuple[str, ...] = RECORDING_LAYERS
     live: bool = False
     overwrite: bool = False
@@ -301,7 +305,10 @@ def _planned_files(folder: Path, stem: str, options: RunOptions) -> dict[str, Pa
     if options.recording:
         files["recording"] = folder / f"{stem}.rrd"
     if options.annotated_log:
-        files["annotated_log"] = folder / f"{stem}.rose2.mcap"
+        log = folder / f"{stem}.rose2.mcap"
+        files |= {"annotated_log": log, "foxglove": foxglove_path(log), "rviz": rviz_path(log)}
+        if options.bag:
+            files["bag"] = bag_metadata_path(log)
     files |= {name: folder / f"{name}.parquet" for name in TABLES}
     return files | {"summary": folder / SUMMARY}
 
@@ -317,5 +324,5 @@ def _make_sinks(planned: dict[str, Path], info: RunInfo, options: RunOptions, ta
     if options.annotated_log:
         from rose2_logs.sinks.annotated_mcap import AnnotatedMcap
 
-        sinks.append(AnnotatedMcap(planned["annotated_log"], info))
+        sinks.append(AnnotatedMcap(planned["annotated_log"], info, is_bag=options.bag))
     return sinks

@@ -14,6 +14,7 @@ from rose2_logs.errors import OutputError
 from rose2_logs.files import part_of, writing
 from rose2_logs.sinks import rerun_viewer
 from rose2_logs.sinks.event_text import event_text
+from rose2_logs.sinks.extent import Extent
 from rose2_logs.sinks.palette import track_colour
 from rose2_logs.sinks.rerun_blueprint import COVERAGE_UNIT, make_blueprint
 from rose2_logs.sinks.rerun_columns import Entry, Scalar
@@ -85,6 +86,7 @@ class RerunRecording:
         self._viewer_answers = live
         self._shown: set[int] = set()
         self._known: set[int] = set()
+        self._extent = Extent()
         self._frames = 0
         self._lives = RoomLives() if tables is None else tables.lives
 
@@ -120,6 +122,7 @@ class RerunRecording:
         coverage = round(frame.coverage / COVERAGE_UNIT)
         self._layers.begin(snapshot.log_time_ns, snapshot.stamp_ns, snapshot.index, coverage)
         self._world.log(frame)
+        self._extent.add(frame)
         self._lanes.add(self._layers.now, frame.track_ids)
         self._log_curves(frame)
         for event in frame.events:
@@ -158,7 +161,7 @@ class RerunRecording:
                 self._part.unlink(missing_ok=True)
 
     def _send_blueprint(self) -> None:
-        blueprint = make_blueprint(self._world.low_m, self._world.high_m, self._wanted)
+        blueprint = make_blueprint(self._extent.low_m, self._extent.high_m, self._wanted)
         self._recording.send_blueprint(blueprint)
 
     def _flush(self) -> None:

@@ -56,11 +56,6 @@ class World:
         For what stays the same over the run.
     wanted : collection of str
         Those of `sink.RECORDING_LAYERS` that are to be written.
-
-    Attributes
-    ----------
-    low_m, high_m : (2,) float
-        Corners of all rooms' shapes so far, world metres; rays that leave through windows do not count.
     """
 
     def __init__(self, layers: Layers, recording: rr.RecordingStream, wanted: Collection[str]) -> None:
@@ -71,7 +66,6 @@ class World:
         self._known: set[int] = set()
         self._named: set[int] = set()
         self._pose: FloatArray | None = None
-        self.low_m, self.high_m = np.full(2, np.inf), np.full(2, -np.inf)
         recording.log("/world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
         for path, width, colour in (
             (DOORWAYS, DOOR_POINTS, DOOR_COLOUR),
@@ -102,8 +96,6 @@ class World:
 
     def _log_pictures(self, frame: TrackedSnapshot) -> None:
         pictures = MapPictures(frame)
-        if not len(frame.track_ids) and not self._known:
-            self._grow(pictures.corners_m)
         self._layers.show(MAP, pictures.map(_height_m(MAP)))
         self._layers.show(FILLS, pictures.rooms(_height_m(FILLS)))
         structure = frame.analysis.structure
@@ -148,8 +140,6 @@ class World:
                 self._known.add(track)
                 self._begin_track(track)
             rings = outer_rings(rooms.polygons[number])
-            for ring in rings:
-                self._grow(ring)
             self._layers.show(f"{ROOMS}/{track}", _rings(rings))
             x, y, z = points[number]
             text = f"Room {track}, {rooms.areas_m2[number]:.0f} m²"
@@ -207,10 +197,6 @@ class World:
             colors=[(255, 255, 255)], radii=rr.components.Radius.ui_points(0.5), show_labels=True
         )
         self._recording.log(path, label, static=True)
-
-    def _grow(self, points_m: FloatArray) -> None:
-        self.low_m = np.minimum(self.low_m, points_m.min(axis=0))
-        self.high_m = np.maximum(self.high_m, points_m.max(axis=0))
 
 
 def _height_m(path: str) -> float:
