@@ -51,7 +51,7 @@ Layers = Annotated[
     typer.Option(
         metavar="NAMES",
         help="What the recording gets besides map, rooms and doorways: all, none, or some of "
-        "predicted,path,clean_map,score,spectrum,segments,lines,faces,voronoi.",
+        "predicted, path, clean_map, score, spectrum, segments, lines, faces, voronoi, between commas.",
     ),
 ]
 NoAnnotatedLog = Annotated[bool, typer.Option("--no-mcap", help="Write no annotated MCAP.")]
