@@ -39,19 +39,19 @@ class Shot:
         The PNG to write.
     coverage : float
         Where along the run, 0 to 1.
-    tab : str, optional
-        Name of a view to bring to the front.
+    tabs : tuple of str
+        Names of views to bring to the front.
     is_view : bool
-        Whether to show that view alone instead of the whole window.
+        Whether to show the first of them alone instead of the whole window.
     """
 
     picture: Path
     coverage: float = 1.0
-    tab: str | None = None
+    tabs: tuple[str, ...] = ()
     is_view: bool = False
 
 
-def take(recording: Path, shots: Sequence[Shot], port: int = PORT) -> list[str]:
+def take(recording: Path, shots: Sequence[Shot], port: int = PORT, settle_s: float = SETTLE_S) -> list[str]:
     """Take pictures of a recording and return what the viewer finds wrong with it.
 
     Raises
@@ -66,10 +66,10 @@ def take(recording: Path, shots: Sequence[Shot], port: int = PORT) -> list[str]:
         viewer.open(str(recording.resolve()))
         _wait_until_loaded(viewer)
         for shot in shots:
-            view = None if shot.tab is None else _bring_to_front(viewer, shot.tab)
+            views = _bring_to_front(viewer, shot.tabs)
             viewer.set_time("coverage", sequence=round(shot.coverage / COVERAGE_UNIT), play_state="paused")
-            time.sleep(SETTLE_S)
-            shot.picture.write_bytes(viewer.take_screenshot(view if shot.is_view else None))
+            time.sleep(settle_s)
+            shot.picture.write_bytes(viewer.take_screenshot(views[0] if shot.is_view else None))
             problems += _reports(viewer)
         problems += [
             f"{entry.level}: {entry.message}"
@@ -89,18 +89,22 @@ def _wait_until_loaded(viewer: ViewerClient) -> None:
     raise RuntimeError(f"the recording did not load within {LOAD_TIMEOUT_S:.0f} s")
 
 
-def _bring_to_front(viewer: ViewerClient, name: str) -> str:
-    """Make a view the active one of its tabs; return its id."""
-    found = [str(view.view_id) for view in viewer.get_state().views if view.name == name]
-    if not found:
-        raise RuntimeError(f"the recording has no view {name!r}")
+def _bring_to_front(viewer: ViewerClient, names: Sequence[str]) -> list[str]:
+    """Make each of some views the active one of its tabs; return their ids."""
+    if not names:
+        return []
+    ids = {view.name: str(view.view_id) for view in viewer.get_state().views}
+    if missing := [name for name in names if name not in ids]:
+        raise RuntimeError(f"the recording has no view {missing[0]!r}")
+    chosen = [ids[name] for name in names]
     blueprint: dict[str, Any] = viewer.get_blueprint(of="recording").blueprint
     for parts in blueprint.values():
         container = parts.get("ContainerBlueprint", {})
-        if f"view/{found[0]}" in container.get("contents", []):
-            container["active_tab"] = f"view/{found[0]}"
+        for view in chosen:
+            if f"view/{view}" in container.get("contents", []):
+                container["active_tab"] = f"view/{view}"
     viewer.set_blueprint(blueprint, of="recording")
-    return found[0]
+    return chosen
 
 
 def _reports(viewer: ViewerClient) -> list[str]:
@@ -115,10 +119,12 @@ def main() -> int:
     parser.add_argument("recording", type=Path, help="the .rrd file")
     parser.add_argument("picture", type=Path, help="the PNG to write")
     parser.add_argument("--coverage", type=float, default=1.0, help="where along the run, 0 to 1 (default 1)")
-    parser.add_argument("--tab", help="name of a view to bring to the front")
-    parser.add_argument("--view", action="store_true", help="that view alone, not the whole window")
+    parser.add_argument("--tab", action="append", default=[], help="name of a view to bring to the front")
+    parser.add_argument("--view", action="store_true", help="the first of these alone, not the whole window")
     arguments = parser.parse_args()
-    shot = Shot(arguments.picture, arguments.coverage, arguments.tab, arguments.view)
+    shot = Shot(arguments.picture, arguments.coverage, tuple(arguments.tab), arguments.view)
+    if arguments.view and not arguments.tab:
+        parser.error("--view needs --tab")
     problems = take(arguments.recording, [shot])
     if problems:
         print(f"{arguments.recording}: the viewer reports: {problems}", file=sys.stderr)
