@@ -79,8 +79,8 @@ def make_blueprint(
                 rrb.Tabs(
                     _lives(),
                     _curves("Area, m²", ("/run/area/**",), legend=False),
-                    _curves("Number of rooms", ("/run/rooms",)),
-                    _curves("Change of the layout", ("/run/variation_bits",)),
+                    _curves("Count", ("/run/rooms",)),
+                    _curves("Change", ("/run/variation_bits",)),
                     active_tab=0,
                 ),
                 rrb.Tabs(

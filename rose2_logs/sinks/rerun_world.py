@@ -40,7 +40,7 @@ FILLS, CLEAN, SCORE = "/world/room_fills", "/world/clean_map", "/world/structure
 PREDICTED, PATH, ROBOT = "/world/predicted", "/world/path", "/world/robot"
 SEGMENTS, LINES, FACES, VORONOI = "/world/segments", "/world/lines", "/world/faces", "/world/voronoi"
 SPECTRUM = "/spectrum"
-HEIGHTS = (MAP, CLEAN, SCORE, FILLS, PREDICTED, FACES, LINES, SEGMENTS, VORONOI, ROOMS, DOORWAYS, PATH, ROBOT)
+HEIGHTS = (MAP, CLEAN, SCORE, FILLS, PREDICTED, ROOMS, FACES, LINES, SEGMENTS, VORONOI, DOORWAYS, PATH, ROBOT)
 """From the lowest layer to the highest; labels stand above them all."""
 Colour = tuple[int, int, int]
 
