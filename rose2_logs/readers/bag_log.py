@@ -11,6 +11,7 @@ import struct
 import sys
 from collections import Counter, deque
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import NoReturn
@@ -23,7 +24,14 @@ from rosbags.interfaces import Connection, ConnectionExtRosbag2
 from rose2_logs.errors import LogError
 from rose2_logs.readers.messages import Decoder, Grid, Patch, decoder, is_map_type, ros_type
 from rose2_logs.readers.selection import Times
-from rose2_logs.readers.source import DamagedMessageError, LoggedMap, LogInfo, MessageSource, TopicInfo
+from rose2_logs.readers.source import (
+    DamagedMessageError,
+    LoggedBytes,
+    LoggedMap,
+    LogInfo,
+    MessageSource,
+    TopicInfo,
+)
 
 if sys.version_info >= (3, 14):
     from compression.zstd import ZstdError
@@ -107,6 +115,11 @@ class BagSource(MessageSource):
         streams = [self._read_one(number, topics, times) for number in range(len(self._readers))]
         return heapq.merge(*streams, key=lambda message: message.log_time_ns)
 
+    def stream(self, topics: Sequence[str]) -> Iterator[LoggedBytes]:
+        """Yield all messages of `topics` in the order of log time, none of them held."""
+        streams = [_stream_one(reader, topics) for reader in self._readers]
+        return heapq.merge(*streams, key=lambda message: message.log_time_ns)
+
     def _read_one(self, number: int, topics: Sequence[str], times: Times) -> Iterator[LoggedMap]:
         """Read from one bag, each run of successive messages by one query."""
         own = np.unique(np.concatenate([self._reader_times(number, topic) for topic in topics]))
@@ -152,6 +165,14 @@ class BagSource(MessageSource):
             TopicInfo(name, message_type, count, is_map_type(message_type, encoding), encoding)
             for (name, message_type, encoding), count in sorted(topics.items())
         )
+
+
+def _stream_one(reader: Reader, topics: Sequence[str]) -> Iterator[LoggedBytes]:
+    """Messages of one bag, up to where it is damaged."""
+    connections = [each for each in reader.connections if each.topic in topics]
+    with suppress(*_DAMAGE):
+        for connection, time, data in reader.messages(connections) if connections else ():
+            yield LoggedBytes(time, connection.topic, _encoding(connection), partial(bytes, data))
 
 
 def _times_in_databases(reader: rosbag2.Reader, topic: str) -> list[int]:

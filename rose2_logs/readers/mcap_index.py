@@ -10,6 +10,8 @@ import logging
 import struct
 from collections import Counter, OrderedDict
 from collections.abc import Callable, Collection, Iterator
+from contextlib import suppress
+from functools import partial
 from io import BufferedReader, BytesIO
 from pathlib import Path
 from typing import NamedTuple
@@ -19,8 +21,8 @@ from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.reader import make_reader
-from mcap.records import Channel, Chunk, Schema
-from mcap.stream_reader import get_chunk_data_stream
+from mcap.records import Channel, Chunk, Message, Schema
+from mcap.stream_reader import StreamReader, get_chunk_data_stream
 from mcap.summary import Summary
 
 from rose2_logs.errors import LogError
@@ -144,6 +146,36 @@ class McapFile:
                     if time <= _LATEST_NS
                 ]
         return sorted(places)
+
+    def messages(self, channel_ids: Collection[int]) -> Iterator[tuple[int, int, Callable[[], memoryview]]]:
+        """Yield log time, channel and what gives the bytes of the messages of some channels.
+
+        Chunk by chunk, so that neither messages nor their places are held; damaged chunks are passed over.
+        """
+        if self._summary is None:
+            yield from self._messages_in_file_order(channel_ids)
+            return
+        for chunk in sorted(self._summary.chunk_indexes, key=lambda each: each.message_start_time):
+            places = []
+            for channel_id in set(channel_ids) & set(chunk.message_index_offsets):
+                with suppress(*_DAMAGE):
+                    places += [
+                        Place(time, chunk.chunk_start_offset, offset, channel_id)
+                        for time, offset in self._message_index(
+                            chunk.message_index_offsets[channel_id], channel_id
+                        )
+                    ]
+            for place in sorted(places):
+                yield place.log_time_ns, place.channel_id, partial(self.payload, place)
+
+    def _messages_in_file_order(
+        self, channel_ids: Collection[int]
+    ) -> Iterator[tuple[int, int, Callable[[], memoryview]]]:
+        """As far as a file without index is whole; it is opened once more."""
+        with suppress(*_DAMAGE, OSError), self.path.open("rb") as stream:
+            for record in StreamReader(stream, record_size_limit=None).records:
+                if isinstance(record, Message) and record.channel_id in channel_ids:
+                    yield record.log_time, record.channel_id, partial(_view, record.data)
 
     def _message_index(self, begin: int, channel_id: int) -> list[tuple[int, int]]:
         """Log time and offset of each message of a channel, from the message index at a file offset.
@@ -292,3 +324,7 @@ class McapFile:
         if len(data) != length:
             raise EOFError("the file ends within the record")
         return data
+
+
+def _view(data: bytes) -> memoryview:
+    return memoryview(data)

@@ -13,7 +13,14 @@ from mcap.records import Channel, Schema
 from rose2_logs.readers.mcap_index import McapFile, Place
 from rose2_logs.readers.messages import Decoder, Grid, Patch, decoder, is_map_type, is_patch_type
 from rose2_logs.readers.selection import Times
-from rose2_logs.readers.source import DamagedMessageError, LoggedMap, LogInfo, MessageSource, TopicInfo
+from rose2_logs.readers.source import (
+    DamagedMessageError,
+    LoggedBytes,
+    LoggedMap,
+    LogInfo,
+    MessageSource,
+    TopicInfo,
+)
 
 
 class McapSource(MessageSource):
@@ -95,6 +102,23 @@ class McapSource(MessageSource):
         ):
             yield LoggedMap(place.log_time_ns, topic, partial(self._decode, number, place))
 
+    def stream(self, topics: Sequence[str]) -> Iterator[LoggedBytes]:
+        """Yield all messages of `topics` about in the order of log time, none of them held."""
+        for file in sorted(self._files, key=lambda each: each.start_ns or 0):
+            channels = {each.id: each for each in file.channels.values() if each.topic in topics}
+            for time_ns, channel_id, data in file.messages(channels):
+                channel = channels[channel_id]
+                read = partial(self._decompressed, data)
+                yield LoggedBytes(time_ns, channel.topic, channel.message_encoding, read)
+
+    def _decompressed(self, data: Callable[[], memoryview]) -> memoryview:
+        if not self._messages_are_zstd:
+            return data()
+        try:
+            return memoryview(zstandard.ZstdDecompressor().decompressobj().decompress(data()))
+        except zstandard.ZstdError as error:
+            raise DamagedMessageError(f"damaged ({error})") from error
+
     def _topic_places(self, topic: str) -> list[tuple[Place, int]]:
         if topic not in self._places:
             found = []
@@ -110,12 +134,7 @@ class McapSource(MessageSource):
 
     def _decode(self, number: int, place: Place) -> Grid | Patch | None:
         file = self._files[number]
-        data = file.payload(place)
-        if self._messages_are_zstd:
-            try:
-                data = memoryview(zstandard.ZstdDecompressor().decompressobj().decompress(data))
-            except zstandard.ZstdError as error:
-                raise DamagedMessageError(f"damaged ({error})") from error
+        data = self._decompressed(partial(file.payload, place))
         key = (number, place.channel_id)
         if key not in self._decoders:
             channel = file.channels[place.channel_id]
