@@ -1,0 +1,98 @@
+"""Reports of all logs below a folder, and a page that lists them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from urllib.parse import quote
+
+from rose2_logs.files import refuse_existing
+from rose2_logs.report.page import PANELS, REPORT_NAME, render, write_page, write_report
+from rose2_logs.report.words import MISSING, Cell, Column, Table, count, date_of, duration, number, share
+from rose2_logs.results.folder import RunResults, find_results
+
+
+def write_reports(
+    folder: Path, out: Path | None = None, *, panels: int = PANELS, overwrite: bool = False
+) -> list[Path]:
+    """Write the report of a log, or of all logs below a folder with a page that lists them.
+
+    Parameters
+    ----------
+    folder : path
+        What `analyse_log` or a batch has written.
+    out : path, optional
+        The page of one log; of several the folder for their pages. By default each lies with its results.
+    panels, overwrite
+        As for `write_report`.
+
+    Returns
+    -------
+    list of path
+        The pages, the list of several last.
+
+    Raises
+    ------
+    LogError
+        If there are no results or they cannot be read.
+    OutputError
+        If there is a page already that may not be replaced, or one cannot be written.
+    """
+    found = find_results(folder)
+    if found == [folder]:
+        return [write_report(folder, out, panels=panels, overwrite=overwrite)]
+    base = folder if out is None else out
+    names = [each.relative_to(folder).as_posix() for each in found]
+    pages = [
+        base / (f"{name}/{REPORT_NAME}" if out is None else f"{name.replace('/', '.')}.html")
+        for name in names
+    ]
+    listing = base / REPORT_NAME
+    refuse_existing([listing, *pages], overwrite=overwrite)
+    for results, page in zip(found, pages, strict=True):
+        write_report(results, page, panels=panels, overwrite=overwrite)
+    rows = [_row(RunResults(results)) for results in found]
+    links = [quote(page.relative_to(base).as_posix()) for page in pages]
+    text = render("overview.html.j2", title=f"Rooms of {len(found)} logs", table=_table(rows), links=links)
+    write_page(listing, text)
+    return [*pages, listing]
+
+
+def _table(rows: list[tuple[Cell, ...]]) -> Table:
+    columns = (
+        Column("log", is_number=False),
+        Column("recorded", is_number=False),
+        Column("duration"),
+        Column("maps"),
+        Column("first coverage", "coverage of the first map"),
+        Column("rooms", "in the last map"),
+        Column("tracks", "rooms over the run"),
+        Column("final from", "coverage from which on the layout was that of the last map"),
+        Column("splits"),
+        Column("merges"),
+        Column("shifts", "of the whole map"),
+        Column("backed by walls", "share of the outlines that walls back, median of the last map's rooms"),
+        Column("frontier, m", "open frontier of the last map's rooms"),
+    )
+    return Table("Logs", columns, tuple(rows))
+
+
+def _row(results: RunResults) -> tuple[Cell, ...]:
+    found, layout = results.summary["results"], results.summary.get("layout", {})
+    events, final = found.get("events", {}), layout.get("final_since")
+    first_ns, last_ns = found.get("first_log_time_ns"), found.get("last_log_time_ns")
+    span = None if first_ns is None or last_ns is None else (last_ns - first_ns) / 1e9
+    return (
+        Cell(results.name),
+        Cell(date_of(first_ns) or MISSING),
+        Cell(MISSING) if span is None else Cell(duration(span), span),
+        count(found["snapshots"]),
+        share(found["coverage_first"]),
+        count(found["rooms_last"]),
+        count(found["tracks"]),
+        share(None if final is None else final["coverage"]),
+        count(events.get("split", 0)),
+        count(events.get("merged", 0)),
+        count(events.get("shifted", 0)),
+        share(layout.get("outline_wall_share_median")),
+        number(layout.get("frontier_m")),
+    )

@@ -1,0 +1,1 @@
+"""Results of ``analyze`` and ``batch`` read back from their folders."""
