@@ -17,6 +17,8 @@ from rose2_logs.rooms import Doorway
 
 PREDICTED_MIN_WIDTH_M = 0.3
 """Unseen parts of rooms are told from this width on: narrower ones are walls, whose inside is never seen."""
+ROUNDING_CELLS = 0.25
+"""Half of what a corner may lie from the cell that it is rounded to."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,6 +180,10 @@ def _unknown_within(shape: BaseGeometry, below: PlanMap) -> BaseGeometry:
     if shape.is_empty:
         return shapely.Polygon()
     in_cells = shapely.transform(shape, lambda xy: geometry.world_to_grid(xy) / geometry.resolution_m)
+    # A little smaller: a cell whose side lies on the outline is in or out by its middle, not by rounding.
+    in_cells = in_cells.buffer(-ROUNDING_CELLS, join_style="mitre")
+    if in_cells.is_empty:
+        return in_cells
     x0, y0, x1, y1 = (int(value) for value in np.round(in_cells.bounds))
     height, width = y1 - y0 + 1, x1 - x0 + 1
     inside = np.zeros((height, width), np.uint8)

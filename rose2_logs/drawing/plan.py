@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from rose2_logs.drawing.shapes import Area, Colour, Drawing, Lines, Picture, Text, hatching
-from rose2_logs.occupancy import UNKNOWN
 from rose2_logs.room_plan import PlanMap, PlanRoom, RoomPlan, predicted_parts
 from rose2_logs.sinks.palette import track_colour
 
@@ -134,6 +133,8 @@ def _simpler(shape: BaseGeometry, detail: float) -> BaseGeometry:
     """Return a shape on the page without what is too small to be read there."""
     parts = []
     for part in shapely.get_parts(shape.simplify(detail)):
+        if part.is_empty:
+            continue
         rings = shapely.polygons(shapely.get_rings(part))
         holes = [ring.exterior for ring in rings[1:] if ring.area >= HOLE_MIN]
         parts.append(shapely.Polygon(rings[0].exterior, holes))
@@ -150,18 +151,17 @@ def _picture(below: PlanMap, to_page: NDArray[np.float64], most_px: int) -> Pict
     import cv2
 
     cells, labels = below.cells, below.labels
-    grey = np.interp(np.arange(101), (0, 100), (FREE_GREY, OCCUPIED_GREY))
-    by_value = np.full(2**8, UNKNOWN_GREY, np.float64)
-    by_value[:101] = grey
-    colours = {0: (0, 0, 0)} | {
-        number: track_colour(number) for number in np.unique(labels).tolist() if number
-    }
-    numbers, place = np.unique(labels, return_inverse=True)
-    table = np.array([colours[number] for number in numbers.tolist()], np.float64)
-    shade = by_value[cells.view(np.uint8)][..., None]
-    opacity = np.where(labels > 0, SEEN_OPACITY, 0.0)[..., None]
-    pixels = np.round(shade * (1 - opacity) + table[place.reshape(labels.shape)] * opacity).astype(np.uint8)
-    pixels[cells == UNKNOWN] = UNKNOWN_GREY
+    # The colour of each value of a cell, one row for each room after that of none.
+    values = np.arange(2**8)
+    grey = np.interp(values, (0, 100), (FREE_GREY, OCCUPIED_GREY))
+    grey[values > 100] = UNKNOWN_GREY
+    numbers = [number for number in np.unique(labels).tolist() if number > 0]
+    tints = np.array([track_colour(number) for number in numbers], float).reshape(-1, 1, 3)
+    tinted = (1 - SEEN_OPACITY) * grey[:, None] + SEEN_OPACITY * tints
+    table = np.concatenate([np.repeat(grey[:, None], 3, axis=1)[None], tinted])
+    row = np.zeros(max([0, *numbers]) + 1, np.intp)
+    row[numbers] = np.arange(1, len(numbers) + 1)
+    pixels = np.round(table).astype(np.uint8)[row[labels], cells.view(np.uint8)]
     height, width = cells.shape
     block = -(-max(height, width) // most_px)
     size = (-(-width // block), -(-height // block))

@@ -81,9 +81,11 @@ def labelled_pixels(below: PlanMap, values: dict[int, int]) -> np.ndarray[Any, n
     free, occupied = classify(below.cells, OccupancyParameters())
     pixels = np.full(below.cells.shape, UNKNOWN_PIXEL, np.uint8)
     pixels[free], pixels[occupied] = FREE, OCCUPIED
-    numbers, place = np.unique(below.labels, return_inverse=True)
-    of_room = np.array([values.get(number, 0) for number in numbers.tolist()], np.uint8)
-    labelled = of_room[place.reshape(below.labels.shape)]
+    of_room = np.zeros(int(below.labels.max(initial=0)) + 1, np.uint8)
+    for number, value in values.items():
+        if number < len(of_room):
+            of_room[number] = value
+    labelled = of_room[below.labels]
     return np.flipud(np.where(labelled > 0, labelled, pixels)).copy()
 
 

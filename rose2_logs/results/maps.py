@@ -64,7 +64,7 @@ class RunMaps:
             cells = segmented.cells
         if cells.shape != segmented.cells.shape:
             cells = segmented.cells
-        labels = labels_of_segmented(segmented.cells, cells, segmented.geometry, rooms)
+        labels = labels_of_segmented(segmented.cells, segmented.geometry, rooms)
         # Where only the segmented map tells: what belongs to a room is free.
         cells = np.where((cells is segmented.cells) & (labels > 0), np.int8(0), cells)
         return PlanMap(segmented.geometry, cells, labels)
@@ -84,19 +84,16 @@ class RunMaps:
 
 
 def labels_of_segmented(
-    segmented: NDArray[np.int8], cells: NDArray[np.int8], geometry: GridGeometry, rooms: Sequence[PlanRoom]
+    segmented: NDArray[np.int8], geometry: GridGeometry, rooms: Sequence[PlanRoom]
 ) -> NDArray[np.int32]:
-    """Find the rooms of a segmented map's cells.
-
-    It gives several rooms the same value where tracks are many, and between them it shows the map itself,
-    whose probabilities may be the values of rooms: there the rooms' shapes decide.
+    """Find the rooms of a segmented map's cells; where several share a value, their shapes decide.
 
     Parameters
     ----------
-    segmented, cells : (H, W) int8
-        The segmented map and the map itself.
+    segmented : (H, W) int8
+        The segmented map.
     geometry : GridGeometry
-        Where they lie.
+        Where it lies.
     rooms : sequence of PlanRoom
         The map's rooms.
 
@@ -112,17 +109,11 @@ def labels_of_segmented(
     for value, holders in by_value.items():
         numbers[value] = holders[0].number
     labels = numbers[segmented.view(np.uint8)]
-    doubtful = (labels > 0) & (segmented == cells)
     for value, holders in by_value.items():
-        unclear = (segmented == value) if len(holders) > 1 else (segmented == value) & doubtful
-        row, column = np.nonzero(unclear)
-        if not len(row):
-            continue
-        centres = geometry.cell_centres(row, column)
-        found = np.where(doubtful[row, column], 0, holders[0].number)
-        for room in holders:
-            reached = room.shape.buffer(geometry.resolution_m)
-            shapely.prepare(reached)
-            found[shapely.contains_xy(reached, centres[:, 0], centres[:, 1])] = room.number
-        labels[row, column] = found
+        if len(holders) > 1:
+            row, column = np.nonzero(segmented == value)
+            centres = shapely.points(geometry.cell_centres(row, column))
+            distances = [shapely.distance(room.shape, centres) for room in holders]
+            nearest = np.argmin(np.nan_to_num(distances, nan=np.inf), axis=0)
+            labels[row, column] = np.array([room.number for room in holders])[nearest]
     return labels
