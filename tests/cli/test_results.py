@@ -11,6 +11,7 @@ from PIL import Image
 from saved_maps import save_map, two_rooms
 
 from rose2_logs.cli import main
+from rose2_logs.cli_options import state
 
 
 @pytest.fixture
@@ -19,6 +20,7 @@ def cli(monkeypatch, capfd):
 
     def run(*arguments: object) -> tuple[int, str, str]:
         monkeypatch.setattr(sys, "argv", ["rose2-logs", *map(str, arguments)])
+        monkeypatch.setitem(state, "debug", False)
         with pytest.raises(SystemExit) as ended:
             main()
         out, err = capfd.readouterr()
