@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from rose2_logs.cli_options import Debug, Overwrite
+from rose2_logs.cli_options import EXIT_KNOWN, Debug, Overwrite
 
 REPORT_EXAMPLE = (
     "Example: [bold]rose2-logs report results/run[/bold], then open results/run/report.html in a browser. "
@@ -53,8 +53,13 @@ def report(
     from rose2_logs import reporting
     from rose2_logs.report.overview import write_reports
 
-    for page in write_reports(folder, out, panels=panels, overwrite=overwrite):
+    written = write_reports(folder, out, panels=panels, overwrite=overwrite)
+    for page in written.pages:
         reporting.print_file(page)
+    for error in written.failed:
+        reporting.error(str(error))
+    if written.failed:
+        raise typer.Exit(EXIT_KNOWN)
 
 
 def figure(

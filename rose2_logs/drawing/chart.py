@@ -85,18 +85,21 @@ def line_chart(
         y_axis = Axis(*y_range, is_log=False)
     chosen = np.unique(np.linspace(0, len(x) - 1, min(len(x), POINTS_MAX)).round().astype(int))
     columns = LEFT + (x - x_axis.low) / (x_axis.high - x_axis.low) * (WIDTH - LEFT - RIGHT)
-    parts = [*_frame(x_axis, y_axis, x_label, HEIGHT), *_marks(marks, x_axis, HEIGHT)]
+    are_counts = all(np.array_equal(each.values, np.round(each.values)) for each in series)
+    rows = [value for value in y_axis.ticks() if not are_counts or value == round(value)]
+    parts = [*_frame(x_axis, y_axis, rows, x_label, HEIGHT), *_marks(marks, x_axis, HEIGHT)]
     for each in series:
         shares = (each.values - y_axis.low) / (y_axis.high - y_axis.low)
-        rows = HEIGHT - BOTTOM - shares * (HEIGHT - TOP - BOTTOM)
+        heights = HEIGHT - BOTTOM - shares * (HEIGHT - TOP - BOTTOM)
         parts.append(
-            f'<path class="curve" stroke="{escape(each.colour)}" d="{_path(columns[chosen], rows[chosen])}"/>'
+            f'<path class="curve" stroke="{escape(each.colour)}" '
+            f'd="{_path(columns[chosen], heights[chosen])}"/>'
         )
         if len(x) <= DOTS_MAX:
             parts += [
                 f'<circle cx="{column:.1f}" cy="{row:.1f}" r="2.4" fill="{escape(each.colour)}">'
                 f"<title>{escape(each.name)}: {value:.3g} at {place:.4g}</title></circle>"
-                for column, row, value, place in zip(columns, rows, each.values, x, strict=True)
+                for column, row, value, place in zip(columns, heights, each.values, x, strict=True)
                 if np.isfinite(value)
             ]
     return _svg(title, HEIGHT, parts)
@@ -128,7 +131,7 @@ def lane_chart(
     """
     x_axis = axis_of(x, False) if x_range is None else Axis(*x_range, is_log=False)
     height = TOP + BOTTOM + LANE * len(names)
-    parts = [*_frame(x_axis, None, x_label, height), *_marks(marks, x_axis, height)]
+    parts = [*_frame(x_axis, None, (), x_label, height), *_marks(marks, x_axis, height)]
     ends = np.append(x[1:], x_axis.high)
     for lane, (name, colour) in enumerate(zip(names, colours, strict=True)):
         y = TOP + LANE * lane
@@ -154,7 +157,9 @@ def _svg(title: str, height: float, parts: Sequence[str]) -> str:
     return "\n".join([head, *parts, "</svg>"])
 
 
-def _frame(x_axis: Axis, y_axis: Axis | None, x_label: str, height: float) -> list[str]:
+def _frame(
+    x_axis: Axis, y_axis: Axis | None, rows: Sequence[float], x_label: str, height: float
+) -> list[str]:
     """Axes with their marks and numbers."""
     bottom, right = height - BOTTOM, WIDTH - RIGHT
     parts = []
@@ -167,7 +172,7 @@ def _frame(x_axis: Axis, y_axis: Axis | None, x_label: str, height: float) -> li
     for value, column in columns[::step]:
         parts.append(f'<path class="grid" d="M{column:.1f} {TOP:.0f}V{bottom:.1f}"/>')
         parts.append(f'<text x="{column:.1f}" y="{bottom + 14:.1f}" text-anchor="middle">{value:g}</text>')
-    for value in [] if y_axis is None else y_axis.ticks():
+    for value in rows:
         row = bottom - y_axis.share(value) * (bottom - TOP) if y_axis is not None else bottom
         parts.append(f'<path class="grid" d="M{LEFT:.0f} {row:.1f}H{right:.0f}"/>')
         parts.append(f'<text x="{LEFT - 5:.0f}" y="{row + 4:.1f}" text-anchor="end">{value:g}</text>')

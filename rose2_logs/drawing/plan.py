@@ -16,7 +16,8 @@ from rose2_logs.sinks.palette import track_colour
 UNKNOWN_GREY, FREE_GREY, OCCUPIED_GREY = 232, 255, 25
 SEEN_OPACITY, PREDICTED_OPACITY, SHAPE_OPACITY = 0.55, 0.22, 0.5
 """Of the colour on seen cells, on unseen parts, and on whole shapes where there is no map."""
-OUTLINE_DARKER = 0.6
+OUTLINE_DARKER, HATCH_DARKER = 0.6, 0.8
+"""Shares of the brightness of a room's colour."""
 DOORWAY_COLOUR: Colour = (205, 45, 20)
 LABEL_GREY: Colour = (25, 25, 25)
 MARGIN_M = 0.5
@@ -111,7 +112,7 @@ def draw_plan(plan: RoomPlan, style: PlanStyle = FIGURE, bounds_m: Bounds | None
             drawing.add(Area(shape, colour, SHAPE_OPACITY, _told(room)))
         elif room.number in predicted:
             part = _simpler(on_page(predicted[room.number]), style.detail)
-            lines = Lines(hatching(part, style.hatch_gap), colour, 0.7 * style.line)
+            lines = Lines(hatching(part, style.hatch_gap), _darker(colour, HATCH_DARKER), 0.7 * style.line)
             drawing.add(Area(part, colour, PREDICTED_OPACITY), lines)
     for number, shape in shapes.items():
         drawing.add(Lines(shape, _darker(track_colour(number)), style.line))
@@ -228,7 +229,7 @@ def _legend(
         elif sign == "predicted":
             shapes += [
                 Area(box, colour, PREDICTED_OPACITY),
-                Lines(hatching(box, style.hatch_gap), colour, 0.7 * line),
+                Lines(hatching(box, style.hatch_gap), _darker(colour, HATCH_DARKER), 0.7 * line),
                 Lines(box, _darker(colour), line),
             ]
         else:
@@ -238,6 +239,6 @@ def _legend(
     return shapes
 
 
-def _darker(colour: Colour) -> Colour:
-    red, green, blue = (round(value * OUTLINE_DARKER) for value in colour)
+def _darker(colour: Colour, share: float = OUTLINE_DARKER) -> Colour:
+    red, green, blue = (round(value * share) for value in colour)
     return red, green, blue

@@ -15,6 +15,7 @@ from rose2_logs.drawing.shapes import Area, Colour, Drawing, Lines, Picture, Sha
 
 FONTS = "Helvetica, Arial, 'Liberation Sans', 'DejaVu Sans', sans-serif"
 DECIMALS = 2
+FEW_COLOURS = 128
 MIDDLE_EM = 0.36
 """A text's baseline lies so far below the middle of its capitals: half their height in usual fonts."""
 
@@ -40,12 +41,14 @@ def as_svg(drawing: Drawing, *, is_inline: bool = False) -> str:
     return body if is_inline else f'<?xml version="1.0" encoding="UTF-8"?>\n{body}\n'
 
 
-def png_uri(pixels: NDArray[np.uint8]) -> str:
-    """Return pixels (H, W, 3) as a PNG in a data URI."""
+def png_uri(pixels: NDArray[np.uint8], *, few_colours: bool = False) -> str:
+    """Return pixels (H, W, 3) as a PNG in a data URI, with few colours a third as large."""
     from PIL import Image
 
     stream = io.BytesIO()
-    Image.fromarray(pixels).save(stream, format="PNG", optimize=True)
+    image = Image.fromarray(pixels)
+    image = image.quantize(FEW_COLOURS, dither=Image.Dither.NONE) if few_colours else image
+    image.save(stream, format="PNG", optimize=True)
     return f"data:image/png;base64,{base64.b64encode(stream.getvalue()).decode()}"
 
 

@@ -98,7 +98,8 @@ def notes(results: RunResults, plan: RoomPlan) -> list[Note]:
         told.append(Note(f"{found['invalid_maps']} maps could not be analysed and were left out."))
     if messages.get("damaged"):
         told.append(Note(f"{messages['damaged']} messages of the log were damaged and were left out."))
-    told += _layout_notes(summary.get("layout", {}))
+    if found["snapshots"] > 1:
+        told += _layout_notes(summary.get("layout", {}), results.choose())
     told += _room_notes(plan)
     told += _shift_notes(results)
     if messages.get("skipped"):
@@ -121,10 +122,10 @@ def notes(results: RunResults, plan: RoomPlan) -> list[Note]:
     return sorted(told, key=lambda note: not note.is_warning)
 
 
-def _layout_notes(layout: dict[str, Any]) -> list[Note]:
+def _layout_notes(layout: dict[str, Any], last: int) -> list[Note]:
     final = layout.get("final_since")
-    if final is None:
-        return [Note("The layout never stayed as it is in the last map: take the rooms as preliminary.")]
+    if final is None or final["snapshot"] == last:
+        return [Note("The layout still changed up to the last map: take the rooms as preliminary.")]
     if final["coverage"] > LATE_COVERAGE:
         late = (
             f"The layout became final only at {_percent(final['coverage'])} coverage: "

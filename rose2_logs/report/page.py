@@ -109,6 +109,7 @@ def _content(results: RunResults, panels: int, *, is_beside: bool) -> dict[str, 
         along = [results.plan(int(results.snapshots["snapshot"][place]), maps) for place in shown]
     for each in along:
         bounds = _around(bounds, each.bounds_m)
+    is_run = len(results.snapshots["snapshot"]) > 1
     parameters = tables.parameter_table(results)
     return {
         "name": results.name,
@@ -125,7 +126,8 @@ def _content(results: RunResults, panels: int, *, is_beside: bool) -> dict[str, 
         ],
         "maps": len(results.snapshots["snapshot"]),
         "charts": [
-            (chart, Markup(chart.over_coverage), Markup(chart.over_time)) for chart in run_charts(results)
+            (chart, Markup(chart.over_coverage), Markup(chart.over_time))
+            for chart in (run_charts(results) if is_run else ())
         ],
         "rooms": tables.room_table(results, plan),
         "doorways": tables.doorway_table(results, plan),

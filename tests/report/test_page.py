@@ -154,24 +154,36 @@ def test_a_baseline_without_the_annotated_log_has_a_report(tmp_path: Path):
 
 
 def test_one_map_has_a_report(tmp_path: Path):
-    """There is no change, no time and one coverage then."""
-    folder = run_of(SAMPLE_LOGS / "wing.bag", tmp_path / "out", 1)
-    assert Reader(write_report(folder)).rows("rooms-table")
+    """There is no growth to be told then."""
+    page = write_report(run_of(SAMPLE_LOGS / "wing.bag", tmp_path / "out", 1))
+    assert Reader(page).rows("rooms-table")
+    assert "Curves" not in page.read_text(encoding="utf-8")
 
 
 def test_many_logs_have_a_page_that_lists_them(office_results: Path, tmp_path: Path):
-    for name in ("logs/a", "logs/b"):
+    """With a picture of each; results that cannot be read are told and do not stop the others."""
+    for name in ("logs/a", "logs/b", "logs/damaged"):
         shutil.copytree(office_results, tmp_path / name)
-    *pages, listing = write_reports(tmp_path, panels=1)
-    assert pages == [tmp_path / "logs" / name / "report.html" for name in ("a", "b")]
-    told = Reader(listing)
+    (tmp_path / "logs" / "damaged" / "tracks.parquet").write_bytes(b"PAR1")
+    written = write_reports(tmp_path, panels=1)
+    assert written.pages == (
+        tmp_path / "logs" / "a" / "report.html",
+        tmp_path / "logs" / "b" / "report.html",
+        tmp_path / "report.html",
+    )
+    (error,) = written.failed
+    assert "tracks.parquet" in str(error)
+    told = Reader(tmp_path / "report.html")
     assert [row[0] for row in told.rows("logs-table")] == ["a", "b"]
-    assert [link for link in told.addresses if not link.startswith("data:")] == [
-        "logs/a/report.html",
-        "logs/b/report.html",
+    links = [link for link in told.addresses if not link.startswith("data:")]
+    assert links == ["logs/a/report.html", "logs/b/report.html"] * 2
+    assert told.tags.count("img") == 2
+    elsewhere = write_reports(tmp_path, tmp_path / "elsewhere", panels=1).pages
+    assert [page.relative_to(tmp_path).as_posix() for page in elsewhere] == [
+        "elsewhere/logs/a.html",
+        "elsewhere/logs/b.html",
+        "elsewhere/report.html",
     ]
-    *pages, _ = write_reports(tmp_path, tmp_path / "elsewhere", panels=1)
-    assert [page.name for page in pages] == ["logs.a.html", "logs.b.html"]
 
 
 def test_a_folder_without_results_is_named(tmp_path: Path):
