@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from rose2_logs.drawing.shapes import Area, Colour, Drawing, Lines, Picture, Text, hatching
+from rose2_logs.occupancy import distinct_labels
 from rose2_logs.room_plan import PlanMap, PlanRoom, RoomPlan, predicted_parts
 from rose2_logs.sinks.palette import track_colour
 
@@ -156,11 +157,11 @@ def _picture(below: PlanMap, to_page: NDArray[np.float64], most_px: int) -> Pict
     values = np.arange(2**8)
     grey = np.interp(values, (0, 100), (FREE_GREY, OCCUPIED_GREY))
     grey[values > 100] = UNKNOWN_GREY
-    numbers = [number for number in np.unique(labels).tolist() if number > 0]
+    numbers = [number for number in distinct_labels(labels)[0].tolist() if number > 0]
     tints = np.array([track_colour(number) for number in numbers], float).reshape(-1, 1, 3)
     tinted = (1 - SEEN_OPACITY) * grey[:, None] + SEEN_OPACITY * tints
     table = np.concatenate([np.repeat(grey[:, None], 3, axis=1)[None], tinted])
-    row = np.zeros(max([0, *numbers]) + 1, np.intp)
+    row = np.zeros(max([0, *numbers]) + 1, np.uint16)
     row[numbers] = np.arange(1, len(numbers) + 1)
     pixels = np.round(table).astype(np.uint8)[row[labels], cells.view(np.uint8)]
     height, width = cells.shape

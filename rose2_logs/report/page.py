@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,7 @@ from rose2_logs.report import facts, tables
 from rose2_logs.report.charts import run_charts
 from rose2_logs.report.words import duration
 from rose2_logs.results.folder import RunResults
+from rose2_logs.results.maps import RunMaps
 from rose2_logs.room_plan import RoomPlan
 
 REPORT_NAME = "report.html"
@@ -101,14 +102,11 @@ def render(template: str, **content: Any) -> str:
 def _content(results: RunResults, panels: int, *, is_beside: bool) -> dict[str, Any]:
     from markupsafe import Markup
 
-    last = results.choose()
     with results.open_maps() as maps:
-        plan = results.plan(last, maps)
-        bounds = plan.bounds_m
-        shown = along_coverage(results.snapshots["coverage"].astype(float), panels)
-        along = [results.plan(int(results.snapshots["snapshot"][place]), maps) for place in shown]
-    for each in along:
-        bounds = _around(bounds, each.bounds_m)
+        plan = results.plan(results.choose(), maps)
+        drawn_panels = [
+            Panel(Markup(svg), *caption) for svg, *caption in _panels(results, maps, plan, panels)
+        ]
     is_run = len(results.snapshots["snapshot"]) > 1
     parameters = tables.parameter_table(results)
     return {
@@ -117,13 +115,7 @@ def _content(results: RunResults, panels: int, *, is_beside: bool) -> dict[str, 
         "tiles": facts.tiles(results, plan),
         "notes": facts.notes(results, plan),
         "plan": Markup(as_svg(draw_plan(plan, FIGURE), is_inline=True)),
-        "panels": [
-            Panel(
-                Markup(as_svg(draw_plan(each, PANEL, bounds), is_inline=True)),
-                *_caption(results, each, place),
-            )
-            for place, each in zip(shown, along, strict=True)
-        ],
+        "panels": drawn_panels,
         "maps": len(results.snapshots["snapshot"]),
         "charts": [
             (chart, Markup(chart.over_coverage), Markup(chart.over_time))
@@ -139,6 +131,24 @@ def _content(results: RunResults, panels: int, *, is_beside: bool) -> dict[str, 
         "is_beside": is_beside,
         "recording": next((name for name in results.summary["files"] if str(name).endswith(".rrd")), None),
     }
+
+
+def _panels(
+    results: RunResults, maps: RunMaps | None, last: RoomPlan, most: int
+) -> Iterator[tuple[str, str, str]]:
+    """Yield the small pictures along the run, each with its two lines; one map at a time is held.
+
+    All show the same part of the world: the last map, and the shapes of rooms that went beyond.
+    """
+    places = along_coverage(results.snapshots["coverage"].astype(float), most)
+    numbers = [int(results.snapshots["snapshot"][place]) for place in places]
+    bounds = last.bounds_m
+    for number in numbers:
+        shapes = results.plan(number, None)
+        bounds = _around(bounds, shapes.bounds_m) if shapes.rooms else bounds
+    for place, number in zip(places, numbers, strict=True):
+        plan = results.plan(number, maps)
+        yield as_svg(draw_plan(plan, PANEL, bounds), is_inline=True), *_caption(results, plan, place)
 
 
 def along_coverage(coverage: np.ndarray[Any, Any], most: int) -> list[int]:
@@ -167,7 +177,7 @@ def along_coverage(coverage: np.ndarray[Any, Any], most: int) -> list[int]:
     return sorted(chosen)[-most:] if len(chosen) > most else sorted(chosen)
 
 
-def _caption(results: RunResults, plan: RoomPlan, place: int) -> Sequence[str]:
+def _caption(results: RunResults, plan: RoomPlan, place: int) -> tuple[str, str]:
     values = results.snapshots
     final = values["final_share"][place]
     right = "" if np.isnan(float(final)) else f", {final:.0%} as in the end"

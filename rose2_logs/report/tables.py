@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -12,8 +13,6 @@ from rose2_logs.room_plan import RoomPlan
 
 ROWS_MOST = 300
 """Rows of a table: more can be read by programs only, and they stand in the Parquet tables."""
-EVENT_RANK = ("shifted", "split", "merged", "returned", "lost", "born")
-"""Kinds of events that are shown, those first that are kept where there are too many."""
 EVENT_WORDS = {
     "shifted": "the whole map shifted",
     "split": "split",
@@ -22,6 +21,7 @@ EVENT_WORDS = {
     "lost": "was lost",
     "born": "was first seen",
 }
+"""Kinds of events in words, those first that are kept where there are too many."""
 
 
 def room_table(results: RunResults, plan: RoomPlan) -> Table:
@@ -112,7 +112,10 @@ def event_table(results: RunResults) -> Table:
     table = results.table("events")
     table = table.filter(pc.not_equal(table["kind"], "continued"))
     events = table.to_pylist()
-    ranked = sorted(range(len(events)), key=lambda place: (EVENT_RANK.index(events[place]["kind"]), place))
+    ranks = {kind: rank for rank, kind in enumerate(EVENT_WORDS)}
+    ranked = sorted(
+        range(len(events)), key=lambda place: (ranks.get(events[place]["kind"], len(ranks)), place)
+    )
     shown = [events[place] for place in sorted(ranked[:ROWS_MOST])]
     rows = [_event_row(results, event) for event in shown]
     columns = (
@@ -129,10 +132,10 @@ def event_table(results: RunResults) -> Table:
 
 def _event_row(results: RunResults, event: dict[str, Any]) -> tuple[Cell, ...]:
     row = results.row(event["snapshot"])
-    kind, text = event["kind"], EVENT_WORDS[event["kind"]]
+    kind, text = event["kind"], EVENT_WORDS.get(event["kind"], event["kind"])
     if kind == "shifted":
-        shift_m = (event["shift_x_m"] ** 2 + event["shift_y_m"] ** 2) ** 0.5
-        text += f" by {shift_m:.2f} m and {event['turn_rad'] * 180 / 3.141592653589793:.2f}°"
+        shift_m = math.hypot(event["shift_x_m"], event["shift_y_m"])
+        text += f" by {shift_m:.2f} m and {math.degrees(event['turn_rad']):.2f}°"
     overlap = number(event["overlap_iou"], 2) if kind in ("split", "merged", "returned") else Cell(MISSING)
     return (
         count(event["snapshot"]),
