@@ -8,6 +8,8 @@ from typing import Annotated
 import typer
 
 from rose2_logs.cli_options import EXIT_KNOWN, Debug, Overwrite
+from rose2_logs.report import PANELS
+from rose2_logs.results import FIGURE_WIDTH_PX
 
 REPORT_EXAMPLE = (
     "Example: [bold]rose2-logs report results/run[/bold], then open results/run/report.html in a browser. "
@@ -45,7 +47,7 @@ def report(
     ] = None,
     panels: Annotated[
         int, typer.Option(min=1, help="Small pictures of the layout, evenly along coverage.")
-    ] = 12,
+    ] = PANELS,
     overwrite: Overwrite = False,
     debug: Debug = False,
 ) -> None:
@@ -79,7 +81,7 @@ def figure(
     ] = None,
     width: Annotated[
         int, typer.Option(metavar="PX", min=100, max=20000, help="Width of a PNG; 1800 are 15 cm at 300 dpi.")
-    ] = 1800,
+    ] = FIGURE_WIDTH_PX,
     overwrite: Overwrite = False,
     debug: Debug = False,
 ) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from rose2_logs.report.words import date_of, duration, size
+from rose2_logs.report.words import MISSING, date_of, duration, size
 from rose2_logs.results.folder import RunResults
 from rose2_logs.room_plan import RoomPlan
 
@@ -21,6 +21,7 @@ PREDICTED_SHARE = 0.25
 """Rooms of whose shape more than this share was not seen are told."""
 NAMED_MOST = 6
 """Rooms named in one sentence."""
+NOT_FINAL = "not reached"
 
 
 @dataclass(frozen=True)
@@ -73,20 +74,21 @@ def tiles(results: RunResults, plan: RoomPlan) -> list[Tile]:
         Tile("Rooms at the end", str(found["rooms_last"]), f"{found['tracks']} followed over the run"),
         Tile("Floor in rooms", f"{seen:.0f} m²", f"{shapes:.0f} m² with predicted parts"),
         Tile("Doorways", str(len(plan.doorways)), "between rooms, last map"),
-        Tile(
-            "Layout final from",
-            MISSING_FINAL if final is None else f"{_percent(final['coverage'])} coverage",
-            "" if final is None else f"map {final['snapshot']}, {duration(final['time_s'])} into the run",
-        ),
+        Tile("Layout final from", *_final(final, results.choose())),
         Tile(
             "Outlines backed by walls",
-            "–" if sure is None else _percent(sure),
+            MISSING if sure is None else _percent(sure),
             "median of the last map's rooms",
         ),
     ]
 
 
-MISSING_FINAL = "not reached"
+def _final(final: dict[str, Any] | None, last: int) -> tuple[str, str]:
+    """Say from what map on the layout was final; if that is the last, it never was for sure."""
+    if final is None or final["snapshot"] == last > 0:
+        return NOT_FINAL, "it changed up to the last map"
+    moment = f"map {final['snapshot']}, {duration(final['time_s'])} into the run"
+    return f"{_percent(final['coverage'])} coverage", moment
 
 
 def notes(results: RunResults, plan: RoomPlan) -> list[Note]:
@@ -124,9 +126,9 @@ def notes(results: RunResults, plan: RoomPlan) -> list[Note]:
 
 def _layout_notes(layout: dict[str, Any], last: int) -> list[Note]:
     final = layout.get("final_since")
-    if final is None or final["snapshot"] == last:
+    if _final(final, last)[0] == NOT_FINAL:
         return [Note("The layout still changed up to the last map: take the rooms as preliminary.")]
-    if final["coverage"] > LATE_COVERAGE:
+    if final is not None and final["coverage"] > LATE_COVERAGE:
         late = (
             f"The layout became final only at {_percent(final['coverage'])} coverage: "
             "with more exploration it might change again."

@@ -12,7 +12,8 @@ from rose2_logs.drawing.plan import PANEL, draw_plan
 from rose2_logs.drawing.svg import png_uri
 from rose2_logs.errors import LogError
 from rose2_logs.files import refuse_existing
-from rose2_logs.report.page import PANELS, REPORT_NAME, render, write_page, write_report
+from rose2_logs.report import PANELS
+from rose2_logs.report.page import REPORT_NAME, render, write_page, write_report
 from rose2_logs.report.words import MISSING, Cell, Column, Table, count, date_of, duration, number, share
 from rose2_logs.results.folder import RunResults, find_results
 

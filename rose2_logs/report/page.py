@@ -13,7 +13,7 @@ from rose2_logs import __version__
 from rose2_logs.drawing.plan import FIGURE, PANEL, Bounds, draw_plan
 from rose2_logs.drawing.svg import as_svg
 from rose2_logs.files import refuse_existing, replacing
-from rose2_logs.report import facts, tables
+from rose2_logs.report import PANELS, facts, tables
 from rose2_logs.report.charts import run_charts
 from rose2_logs.report.words import duration
 from rose2_logs.results.folder import RunResults
@@ -21,8 +21,6 @@ from rose2_logs.results.maps import RunMaps
 from rose2_logs.room_plan import RoomPlan
 
 REPORT_NAME = "report.html"
-PANELS = 12
-"""Small pictures of the layout along the run: four rows of three on a screen."""
 TEMPLATES = Path(__file__).parent / "templates"
 
 

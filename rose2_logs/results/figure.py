@@ -11,6 +11,7 @@ from rose2_logs.drawing.svg import as_svg
 from rose2_logs.errors import ParameterError
 from rose2_logs.exports.formats import planned_files, write_plan
 from rose2_logs.files import refuse_existing, replacing
+from rose2_logs.results import FIGURE_WIDTH_PX
 from rose2_logs.results.folder import RunResults
 from rose2_logs.sinks.label_image import write_image
 
@@ -23,7 +24,7 @@ def write_figure(
     snapshot: int | None = None,
     coverage: float | None = None,
     *,
-    width_px: int = 1800,
+    width_px: int = FIGURE_WIDTH_PX,
     overwrite: bool = False,
 ) -> Path:
     """Draw the layout of a map.
