@@ -14,7 +14,7 @@ from typing import Annotated
 
 import typer
 
-from rose2_logs import __version__, cli_batch
+from rose2_logs import __version__, cli_batch, cli_results
 from rose2_logs.cli_options import (
     EXIT_FAULT,
     EXIT_INTERRUPTED,
@@ -217,6 +217,9 @@ def view(
 
 
 app.command(epilog=cli_batch.SERVE_EXAMPLE)(cli_batch.serve)
+app.command(epilog=cli_results.REPORT_EXAMPLE)(cli_results.report)
+app.command(epilog=cli_results.FIGURE_EXAMPLE)(cli_results.figure)
+app.command(epilog=cli_results.EXPORT_EXAMPLE)(cli_results.export)
 
 
 @app.command(epilog="Example: [bold]rose2-logs segment map.png --resolution 0.05 -o rooms[/bold]")
@@ -226,6 +229,15 @@ def segment(
     resolution: Annotated[
         float | None,
         typer.Option(metavar="M", help="Side of a cell, for an image without .yaml.", show_default=False),
+    ] = None,
+    formats: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--format",
+            metavar="FORMAT",
+            help="Also write svg, dxf, map_server or graph, as export does; may be repeated.",
+            show_default=False,
+        ),
     ] = None,
     method: Method = "rose2",
     config: Config = None,
@@ -238,7 +250,9 @@ def segment(
     from rose2_logs.static_map import segment_map
 
     parameters = resolve_parameters(config, settings, method)
-    result = segment_map(map_file, out, parameters, method, resolution_m=resolution, overwrite=overwrite)
+    result = segment_map(
+        map_file, out, parameters, method, formats=formats or (), resolution_m=resolution, overwrite=overwrite
+    )
     reporting.print_static_map(result)
 
 

@@ -45,6 +45,7 @@ MinChange = Annotated[
 MaxSnapshots = Annotated[
     int | None, typer.Option(metavar="N", help="Most maps, spread evenly.", show_default=False)
 ]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace what an earlier call has written.")]
 NoRecording = Annotated[bool, typer.Option("--no-rrd", help="Write no Rerun recording.")]
 Layers = Annotated[
     str,

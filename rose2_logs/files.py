@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -46,3 +46,15 @@ def replacing(path: Path) -> Iterator[Path]:
             part.replace(path)
         finally:
             part.unlink(missing_ok=True)
+
+
+def refuse_existing(files: Iterable[Path], *, overwrite: bool) -> None:
+    """Refuse to replace files unasked.
+
+    Raises
+    ------
+    OutputError
+        If one exists and may not be replaced.
+    """
+    if not overwrite and (existing := [file for file in files if file.exists()]):
+        raise OutputError(f"{existing[0]}: exists already; choose another folder or pass --overwrite")

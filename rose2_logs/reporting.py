@@ -14,6 +14,8 @@ from rich.console import Console
 from rich.markup import escape
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from rich.progress import Progress
     from rich.table import Table
 
@@ -178,6 +180,11 @@ def print_run(result: RunResult) -> None:
     _out.print(f"results in [bold]{escape(str(result.folder))}[/]", soft_wrap=True)
     for file in result.files:
         _out.print(f"  {escape(file.name)}  {_megabytes(file.stat().st_size)}", soft_wrap=True)
+
+
+def print_file(path: Path) -> None:
+    """Print where a file is that was written."""
+    _out.print(f"{escape(str(path))}  {_megabytes(path.stat().st_size)}", soft_wrap=True)
 
 
 def print_static_map(result: StaticMapResult) -> None:

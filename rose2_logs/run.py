@@ -13,8 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
-from rose2_logs.errors import InvalidMapError, OutputError
+from rose2_logs.errors import InvalidMapError
 from rose2_logs.explored import coarser_for_its_size
+from rose2_logs.files import refuse_existing
 from rose2_logs.occupancy import UNKNOWN, OccupancySnapshot, classify
 from rose2_logs.parameters import OccupancyParameters, Parameters
 from rose2_logs.pipeline import SnapshotAnalysis, analyse
@@ -153,8 +154,7 @@ def analyse_log(
     """
     start = time.perf_counter()
     planned = _planned_files(folder, log_stem(path), options)
-    if not options.overwrite and (existing := [file for file in planned.values() if file.exists()]):
-        raise OutputError(f"{existing[0]}: exists already; choose another folder or pass --overwrite")
+    refuse_existing(planned.values(), overwrite=options.overwrite)
     totals = RunTotals()
     with (
         open_log(path, topic=options.topic, selection=options.selection) as reader,

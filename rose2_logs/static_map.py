@@ -4,22 +4,25 @@ from __future__ import annotations
 
 import logging
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import shapely
 
-from rose2_logs.errors import LogError, OutputError, ParameterError
+from rose2_logs.errors import LogError, ParameterError
 from rose2_logs.explored import coarser_for_its_size
+from rose2_logs.exports.formats import planned_files, write_plan
+from rose2_logs.exports.geojson import plan_geojson
+from rose2_logs.files import refuse_existing
 from rose2_logs.occupancy import OccupancySnapshot
 from rose2_logs.parameters import Parameters
-from rose2_logs.pipeline import SnapshotAnalysis, analyse
+from rose2_logs.pipeline import analyse
 from rose2_logs.readers import open_log
 from rose2_logs.readers.discovery import IMAGE_ENDINGS
+from rose2_logs.room_evidence import room_evidence
+from rose2_logs.room_plan import plan_of_analysis
 from rose2_logs.rooms import RoomMap
 from rose2_logs.sinks.label_image import write_image, write_label_image
 from rose2_logs.sinks.picture import draw_rooms
@@ -43,6 +46,7 @@ def segment_map(
     parameters: Parameters,
     method: str = "rose2",
     *,
+    formats: Sequence[str] = (),
     resolution_m: float | None = None,
     overwrite: bool = False,
 ) -> StaticMapResult:
@@ -57,6 +61,8 @@ def segment_map(
         ``<name>.floor_plan.geojson`` and ``<name>.rooms.png``.
     parameters, method
         As for `analyse`.
+    formats : sequence of str
+        Further formats for the floor plan, see `exports.formats`.
     resolution_m : float, optional
         Side of a cell, for an image without a ``.yaml`` beside it; its origin is then its lower left corner.
     overwrite : bool
@@ -73,17 +79,20 @@ def segment_map(
     files = tuple(
         folder / f"{name}{ending}" for ending in (".labels.png", ".floor_plan.geojson", ".rooms.png")
     )
-    if not overwrite and (existing := [file for file in files if file.exists()]):
-        raise OutputError(f"{existing[0]}: exists already; choose another folder or pass --overwrite")
+    more = planned_files([each for each in formats if each != "geojson"], folder, name)
+    refuse_existing([*files, *more], overwrite=overwrite)
     snapshot = read_static_map(map_file, resolution_m)
     analysis = analyse(snapshot, parameters, method)
     note = coarser_for_its_size(snapshot.geometry, analysis.resolution_m, parameters.occupancy)
     if note is not None:
         logger.warning("%s: %s", map_file, note)
     write_label_image(files[0], np.flipud(analysis.rooms.labels))
-    write_json(files[1], floor_plan_geojson(analysis))
+    evidence = room_evidence(snapshot, analysis.rooms, parameters.occupancy)
+    plan = plan_of_analysis(snapshot, analysis, evidence, name)
+    write_json(files[1], plan_geojson(plan, analysis.walls))
     write_image(files[2], draw_rooms(snapshot, analysis))
-    return StaticMapResult(analysis.rooms, folder, files)
+    more = write_plan(plan, [each for each in formats if each != "geojson"], folder, name)
+    return StaticMapResult(analysis.rooms, folder, (*files, *more))
 
 
 def read_static_map(map_file: Path, resolution_m: float | None = None) -> OccupancySnapshot:
@@ -112,46 +121,3 @@ def _described(map_file: Path, resolution_m: float | None) -> Iterator[Path]:
         about = {"image": str(map_file.resolve()), "resolution": resolution_m, "origin": [0.0, 0.0, 0.0]}
         described.write_text(yaml.safe_dump(about), encoding="utf-8")
         yield described
-
-
-def floor_plan_geojson(analysis: SnapshotAnalysis) -> dict[str, Any]:
-    """Return rooms, doorways, walls and lines as a GeoJSON feature collection.
-
-    Coordinates are metres in the map's frame, not degrees; the member ``coordinates`` says so. Each feature's
-    property ``kind`` is room, doorway, wall or line.
-    """
-    rooms = analysis.rooms
-    features = [
-        _feature(
-            polygon,
-            kind="room",
-            room=number,
-            area_m2=float(rooms.areas_m2[number - 1]),
-            predicted_area_m2=polygon.area,
-            neighbours=list(rooms.neighbours(number)),
-        )
-        for number, polygon in enumerate(rooms.polygons, start=1)
-    ]
-    for doorway in rooms.doorways:
-        line = shapely.LineString(doorway.ends_m)
-        features.append(_feature(line, kind="doorway", rooms=list(doorway.rooms), width_m=doorway.width_m))
-    if analysis.walls is not None:
-        walls = analysis.walls
-        for ends, direction in zip(walls.segments_m, walls.segment_direction.tolist(), strict=True):
-            features.append(
-                _feature(shapely.LineString(ends.reshape(2, 2)), kind="wall", direction=direction)
-            )
-        for ends, direction, weight in zip(
-            walls.lines_m, walls.line_direction.tolist(), walls.line_weight.tolist(), strict=True
-        ):
-            line = shapely.LineString(ends.reshape(2, 2))
-            features.append(_feature(line, kind="line", direction=direction, weight=weight))
-    return {
-        "type": "FeatureCollection",
-        "coordinates": {"unit": "metre", "frame_id": analysis.geometry.frame_id},
-        "features": features,
-    }
-
-
-def _feature(geometry: shapely.Geometry, **properties: Any) -> dict[str, Any]:
-    return {"type": "Feature", "properties": properties, "geometry": shapely.geometry.mapping(geometry)}

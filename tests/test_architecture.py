@@ -29,18 +29,24 @@ ORDER = (
     "baselines",
     "pipeline",
     "room_evidence",
+    "room_plan",
     "tracking",
     "evaluation",
     "sinks",
+    "drawing",
+    "exports",
     "log_facts",
     "static_map",
     "provenance",
     "run",
+    "results",
+    "report",
     "batch",
     "reporting",
     "reporting_batch",
     "cli_options",
     "cli_batch",
+    "cli_results",
     "cli",
     "__main__",
 )
@@ -55,6 +61,8 @@ ONLY_IN = {
     "rich": ("reporting",),
     "distributed": ("batch/dask_workers",),
     "fsspec": ("batch/remote",),
+    "ezdxf": ("exports/dxf",),
+    "jinja2": ("report/",),
 }
 """Libraries of formats and surfaces, and the beginnings of the files that may import them."""
 

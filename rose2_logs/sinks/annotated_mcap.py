@@ -102,7 +102,7 @@ class AnnotatedMcap:
         self._waiting: CopiedMessage | CopiedChunk | None = None
         # The messages of a chunk that was taken apart; they come before all else.
         self._opened: deque[CopiedMessage] = deque()
-        self._maker = MessageMaker()
+        self._maker = MessageMaker(info.parameters.occupancy)
         self._sequence = 0
         map_metadata: dict[str, str] = {}
         for channel in log.channels():

@@ -12,6 +12,7 @@ from PIL import ImageDraw, ImageFont
 
 from rose2_logs.evaluation.along import RunPoint
 from rose2_logs.occupancy import FloatArray
+from rose2_logs.sinks.axes import Axis, axis_of
 
 Image = NDArray[np.uint8]
 Colour = tuple[int, int, int]
@@ -22,8 +23,6 @@ LEFT_PX, RIGHT_PX, TOP_PX, BOTTOM_PX = 60, 190, 40, 50
 TEXT_PX, LINE_PX, DOT_PX = 14, 2, 3
 SMOOTHING = 2
 """Drawn so many times as large and then reduced: lines without steps."""
-TICKS_MAX = 8
-ROUND_STEPS = (1.0, 2.0, 5.0, 10.0)
 PAPER, INK, GRID = (255, 255, 255), (0, 0, 0), (225, 225, 225)
 LINE_COLOURS: tuple[Colour, ...] = (
     (31, 119, 180),
@@ -101,13 +100,13 @@ def draw_curves(
     (H, W, 3) uint8
         RGB.
     """
-    x_axis = _axis(np.concatenate([curve.x for curve in curves]), log_x)
+    x_axis = axis_of(np.concatenate([curve.x for curve in curves]), log_x)
     top = np.concatenate([curve.y for curve in curves])
     if y_range is not None:
-        y_axis = _Axis(*y_range, log_y)
+        y_axis = Axis(*y_range, log_y)
     else:
-        y_axis = _axis(top if log_y else np.append(top, 0.0), log_y)
-        y_axis = y_axis if log_y else _Axis(0.0, y_axis.high, is_log=False)
+        y_axis = axis_of(top if log_y else np.append(top, 0.0), log_y)
+        y_axis = y_axis if log_y else Axis(0.0, y_axis.high, is_log=False)
     s = SMOOTHING
     image = PillowImage.new("RGB", (WIDTH_PX * s, HEIGHT_PX * s), PAPER)
     draw, font = ImageDraw.Draw(image), ImageFont.load_default(TEXT_PX * s)
@@ -139,46 +138,3 @@ def draw_curves(
         draw.line((right + 10 * s, beside, right + 34 * s, beside), colour, LINE_PX * s)
         draw.text((right + 42 * s, beside), curve.name, INK, font, anchor="lm")
     return np.asarray(image.reduce(s))
-
-
-@dataclass(frozen=True)
-class _Axis:
-    """The range of an axis; a logarithmic one lies above 0."""
-
-    low: float
-    high: float
-    is_log: bool
-
-    def share(self, value: float) -> float:
-        """Where a value lies, 0 at the low end and 1 at the high one."""
-        if self.is_log:
-            return float(np.log(value / self.low) / np.log(self.high / self.low))
-        return (value - self.low) / (self.high - self.low)
-
-    def ticks(self) -> list[float]:
-        if self.is_log:
-            powers = range(round(np.log10(self.low)), round(np.log10(self.high)) + 1)
-            return [10.0**power for power in powers]
-        step = _step(self.low, self.high)
-        first, last = np.ceil(self.low / step - 1e-9), np.floor(self.high / step + 1e-9)
-        # Adding nothing turns a negative zero into zero.
-        return [float(number) * step + 0.0 for number in np.arange(first, last + 1)]
-
-
-def _axis(values: FloatArray, is_log: bool) -> _Axis:
-    """Return an axis that holds all values: its ends are multiples of its step, or powers of ten."""
-    low, high = float(values.min()), float(values.max())
-    if is_log:
-        first, last = np.floor(np.log10(low) + 1e-9), np.ceil(np.log10(high) - 1e-9)
-        return _Axis(10.0**first, 10.0 ** max(last, first + 1), is_log=True)
-    if high <= low:
-        low, high = low - 1.0, high + 1.0
-    step = _step(low, high)
-    return _Axis(float(np.floor(low / step) * step), float(np.ceil(high / step) * step), is_log=False)
-
-
-def _step(low: float, high: float) -> float:
-    """Return the least round step that gives at most `TICKS_MAX` ticks."""
-    exact = (high - low) / TICKS_MAX
-    power = 10.0 ** np.floor(np.log10(exact))
-    return float(next(round_step * power for round_step in ROUND_STEPS if round_step * power >= exact))

@@ -10,7 +10,8 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from rose2_logs.occupancy import UNKNOWN, FloatArray
+from rose2_logs.occupancy import UNKNOWN, FloatArray, classify
+from rose2_logs.parameters import OccupancyParameters
 from rose2_logs.sinks.cdr import CdrWriter
 from rose2_logs.sinks.palette import track_colour
 from rose2_logs.tracking.frames import TrackedSnapshot
@@ -43,6 +44,7 @@ LINE_WIDTH_M = 0.03
 MARKER_LAYERS = ("rooms", "lines", "walls", "outlines", "doorways", "labels")
 """Namespaces of markers, the lowest first."""
 LAYER_STEP_M = 0.01
+DEFAULT_OCCUPANCY = OccupancyParameters()
 TOUCH_M = 1e-3
 """How much wider a shape is drawn that cannot be triangulated as it is: far below a cell."""
 ADD, DELETE_ALL = 0, 3
@@ -73,9 +75,16 @@ def ros2_typestore(extra: Mapping[str, Any] | None = None) -> Typestore:
 
 
 class MessageMaker:
-    """Makes the serialised messages of a snapshot."""
+    """Makes the serialised messages of a snapshot.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    occupancy : OccupancyParameters
+        Which cells are free and which are occupied.
+    """
+
+    def __init__(self, occupancy: OccupancyParameters = DEFAULT_OCCUPANCY) -> None:
+        self._occupancy = occupancy
         self._store = ros2_typestore()
         self._triangles: dict[bytes, FloatArray] = {}
 
@@ -88,10 +97,14 @@ class MessageMaker:
         return _grid(frame, frame.snapshot.cells)
 
     def segmented_map(self, frame: TrackedSnapshot) -> bytearray:
-        """Make the segmented map: rooms as 1..98, occupied 100, other free cells 0, unknown -1."""
+        """Make the segmented map: rooms as 1..98, occupied 100, other free cells 0, all others -1."""
         values = np.array([0, *(1 + (track - 1) % HIGHEST_VALUE for track in frame.track_ids)], np.int8)
         labels = frame.analysis.rooms.labels
-        return _grid(frame, np.where(labels == 0, np.maximum(frame.snapshot.cells, UNKNOWN), values[labels]))
+        # A probability, as some maps hold, would look like a room.
+        free, occupied = classify(frame.snapshot.cells, self._occupancy)
+        cells = np.full(labels.shape, UNKNOWN, np.int8)
+        cells[free], cells[occupied] = 0, 100
+        return _grid(frame, np.where(labels == 0, cells, values[labels]))
 
     def clean_map(self, frame: TrackedSnapshot) -> bytearray | None:
         """Make the clean map: 100 where structure, 0 where free or clutter, -1 unknown; None without one."""

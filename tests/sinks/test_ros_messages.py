@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 import shapely
@@ -117,3 +119,13 @@ def test_triangles_fill_any_outline_of_cells():
         corners = triangle_corners(shape).reshape(-1, 3, 2)
         area = shapely.area(shapely.polygons(corners)).sum()
         assert area == pytest.approx(shape.area, rel=0.05)
+
+
+def test_probabilities_between_rooms_do_not_look_like_rooms(frame: TrackedSnapshot):
+    """Beside rooms the segmented map knows free, occupied and what is neither."""
+    outside = np.argwhere(frame.analysis.rooms.labels == 0)[:3]
+    cells = frame.snapshot.cells.copy()
+    cells[tuple(outside.T)] = 5, 40, 90
+    changed = dataclasses.replace(frame, snapshot=dataclasses.replace(frame.snapshot, cells=cells))
+    grid = ros2_typestore().deserialize_cdr(MessageMaker().segmented_map(changed), GRID)
+    assert np.asarray(grid.data).reshape(cells.shape)[tuple(outside.T)].tolist() == [0, -1, 100]

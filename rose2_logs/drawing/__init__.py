@@ -1,0 +1,1 @@
+"""Floor plans and curves drawn as SVG and as pixels."""

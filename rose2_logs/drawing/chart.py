@@ -1,0 +1,206 @@
+"""Charts as SVG within an HTML page, which gives text and axes their colour: so they fit light and dark."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from xml.sax.saxutils import escape, quoteattr
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rose2_logs.occupancy import BoolArray, FloatArray
+from rose2_logs.sinks.axes import Axis, axis_of
+
+WIDTH, HEIGHT = 420.0, 210.0
+LEFT, RIGHT, TOP, BOTTOM = 44.0, 12.0, 10.0, 36.0
+"""Space around the axes."""
+FONT = 11.0
+TICK_GAP_MIN = 34.0
+"""Marks of the horizontal axis that would stand closer are thinned."""
+POINTS_MAX = 800
+"""Of longer curves so many points are drawn, evenly taken: more than a screen shows."""
+DOTS_MAX = 60
+"""Curves of more points are drawn without dots."""
+LANE = 9.0
+"""Height of a room's lane."""
+
+
+@dataclass(frozen=True, eq=False)
+class Series:
+    """One curve.
+
+    Attributes
+    ----------
+    name : str
+    values : (N,) float
+        NaN where there is none; the curve has a gap there.
+    colour : str
+        As CSS has it.
+    """
+
+    name: str
+    values: FloatArray
+    colour: str
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A vertical line: where it stands, what it means, its class in the page's style."""
+
+    x: float
+    text: str
+    kind: str
+
+
+def line_chart(
+    x: FloatArray,
+    series: Sequence[Series],
+    *,
+    title: str,
+    x_label: str,
+    marks: Sequence[Mark] = (),
+    x_range: tuple[float, float] | None = None,
+    y_range: tuple[float, float] | None = None,
+) -> str:
+    """Draw curves over one axis.
+
+    Parameters
+    ----------
+    x : (N,) float
+        Common to all curves, without NaN; at least one.
+    series : sequence of Series
+    title, x_label : str
+        What it shows, for those who cannot see it; what the axis is.
+    marks : sequence of Mark
+    x_range, y_range : (float, float), optional
+        Ends of the axes; by default round numbers around the values, the vertical one from 0.
+    """
+    x_axis = axis_of(x, False) if x_range is None else Axis(*x_range, is_log=False)
+    if y_range is None:
+        known = np.concatenate([each.values for each in series])
+        y_axis = axis_of(np.append(known[np.isfinite(known)], 0.0), False)
+        y_axis = Axis(0.0, y_axis.high, is_log=False)
+    else:
+        y_axis = Axis(*y_range, is_log=False)
+    chosen = np.unique(np.linspace(0, len(x) - 1, min(len(x), POINTS_MAX)).round().astype(int))
+    columns = LEFT + (x - x_axis.low) / (x_axis.high - x_axis.low) * (WIDTH - LEFT - RIGHT)
+    are_counts = all(np.array_equal(each.values, np.round(each.values)) for each in series)
+    rows = [value for value in y_axis.ticks() if not are_counts or value == round(value)]
+    parts = [*_frame(x_axis, y_axis, rows, x_label, HEIGHT), *_marks(marks, x_axis, HEIGHT)]
+    for each in series:
+        shares = (each.values - y_axis.low) / (y_axis.high - y_axis.low)
+        heights = HEIGHT - BOTTOM - shares * (HEIGHT - TOP - BOTTOM)
+        parts.append(
+            f'<path class="curve" stroke="{escape(each.colour)}" '
+            f'd="{_path(columns[chosen], heights[chosen])}"/>'
+        )
+        if len(x) <= DOTS_MAX:
+            parts += [
+                f'<circle cx="{column:.1f}" cy="{row:.1f}" r="2.4" fill="{escape(each.colour)}">'
+                f"<title>{escape(each.name)}: {value:.3g} at {place:.4g}</title></circle>"
+                for column, row, value, place in zip(columns, heights, each.values, x, strict=True)
+                if np.isfinite(value)
+            ]
+    return _svg(title, HEIGHT, parts)
+
+
+def lane_chart(
+    x: FloatArray,
+    present: BoolArray,
+    names: Sequence[str],
+    colours: Sequence[str],
+    *,
+    title: str,
+    x_label: str,
+    marks: Sequence[Mark] = (),
+    x_range: tuple[float, float] | None = None,
+) -> str:
+    """Draw when each room was there, a lane each.
+
+    Parameters
+    ----------
+    x : (N,) float
+        Where the maps stand, ascending.
+    present : (R, N) bool
+        Which rooms each map shows; a room is there until the next map.
+    names, colours : sequence of R str
+        Of the rooms.
+    title, x_label, marks, x_range
+        As of `line_chart`.
+    """
+    x_axis = axis_of(x, False) if x_range is None else Axis(*x_range, is_log=False)
+    height = TOP + BOTTOM + LANE * len(names)
+    parts = [*_frame(x_axis, None, (), x_label, height), *_marks(marks, x_axis, height)]
+    ends = np.append(x[1:], x_axis.high)
+    for lane, (name, colour) in enumerate(zip(names, colours, strict=True)):
+        y = TOP + LANE * lane
+        parts.append(
+            f'<text class="lane" x="{LEFT - 5:.0f}" y="{y + 0.8 * LANE:.1f}" text-anchor="end">'
+            f"{escape(name)}</text>"
+        )
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], present[lane], [False]]).astype(np.int8)))
+        for first, stop in edges.reshape(-1, 2).tolist():
+            left, right = (_column(value, x_axis) for value in (x[first], ends[stop - 1]))
+            parts.append(
+                f'<rect x="{left:.1f}" y="{y + 1:.1f}" width="{max(right - left, 1.5):.1f}" '
+                f'height="{LANE - 2:.1f}" rx="1.5" fill="{escape(colour)}">'
+                f"<title>{escape(name)}</title></rect>"
+            )
+    return _svg(title, height, parts)
+
+
+def _svg(title: str, height: float, parts: Sequence[str]) -> str:
+    head = (
+        f'<svg class="chart" viewBox="0 0 {WIDTH:.0f} {height:.0f}" role="img" aria-label={quoteattr(title)}>'
+    )
+    return "\n".join([head, *parts, "</svg>"])
+
+
+def _frame(
+    x_axis: Axis, y_axis: Axis | None, rows: Sequence[float], x_label: str, height: float
+) -> list[str]:
+    """Axes with their marks and numbers."""
+    bottom, right = height - BOTTOM, WIDTH - RIGHT
+    parts = []
+    columns = [(value, _column(value, x_axis)) for value in x_axis.ticks()]
+    step = (
+        max(1, int(np.ceil(TICK_GAP_MIN / max(abs(columns[1][1] - columns[0][1]), 1e-9))))
+        if len(columns) > 1
+        else 1
+    )
+    for value, column in columns[::step]:
+        parts.append(f'<path class="grid" d="M{column:.1f} {TOP:.0f}V{bottom:.1f}"/>')
+        parts.append(f'<text x="{column:.1f}" y="{bottom + 14:.1f}" text-anchor="middle">{value:g}</text>')
+    for value in rows:
+        row = bottom - y_axis.share(value) * (bottom - TOP) if y_axis is not None else bottom
+        parts.append(f'<path class="grid" d="M{LEFT:.0f} {row:.1f}H{right:.0f}"/>')
+        parts.append(f'<text x="{LEFT - 5:.0f}" y="{row + 4:.1f}" text-anchor="end">{value:g}</text>')
+    parts.append(f'<path class="axis" d="M{LEFT:.0f} {TOP:.0f}V{bottom:.1f}H{right:.0f}"/>')
+    middle = (LEFT + right) / 2
+    parts.append(f'<text x="{middle:.0f}" y="{height - 5:.1f}" text-anchor="middle">{escape(x_label)}</text>')
+    return parts
+
+
+def _marks(marks: Sequence[Mark], x_axis: Axis, height: float) -> list[str]:
+    return [
+        f'<path class="mark {escape(mark.kind)}" d="M{_column(mark.x, x_axis):.1f} {TOP:.0f}'
+        f'V{height - BOTTOM:.1f}">'
+        f"<title>{escape(mark.text)}</title></path>"
+        for mark in marks
+    ]
+
+
+def _column(value: float, x_axis: Axis) -> float:
+    return LEFT + x_axis.share(value) * (WIDTH - LEFT - RIGHT)
+
+
+def _path(columns: NDArray[np.float64], rows: NDArray[np.float64]) -> str:
+    """Path data with gaps where a value is missing."""
+    parts, pen_down = [], False
+    for column, row in zip(columns.tolist(), rows.tolist(), strict=True):
+        known = np.isfinite(row)
+        if known:
+            parts.append(f"{'L' if pen_down else 'M'}{column:.1f} {row:.1f}")
+        pen_down = bool(known)
+    return "".join(parts)

@@ -1,0 +1,129 @@
+"""Drawings as pixels, drawn larger and then reduced: smooth lines and text without a plotting library."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont
+from shapely.geometry.base import BaseGeometry
+
+from rose2_logs.drawing.shapes import Area, Drawing, Lines, Picture, Text
+
+SMOOTHING = 2
+"""Drawn so many times as large and then reduced."""
+BOLD_SHARE = 0.025
+"""The default font has no bold face; its strokes are made so much of its size thicker."""
+
+SQUARED = "\N{SUPERSCRIPT TWO}"
+RAISED_SIZE, RAISED_BY = 0.62, 0.22
+"""Size and rise of a raised two, in sizes of the font."""
+
+
+def as_pixels(drawing: Drawing, width_px: int) -> NDArray[np.uint8]:
+    """Draw at a width in pixels.
+
+    Returns
+    -------
+    (H, W, 3) uint8
+        RGB.
+    """
+    scale = width_px * SMOOTHING / drawing.width
+    size = (width_px * SMOOTHING, math.ceil(drawing.height * scale / SMOOTHING) * SMOOTHING)
+    image = Image.new("RGB", size, drawing.paper)
+    draw = ImageDraw.Draw(image)
+    for shape in drawing.shapes:
+        match shape:
+            case Picture():
+                _picture(image, shape, scale)
+            case Area():
+                _area(image, shape, scale)
+            case Lines(geometry, colour, width):
+                for line in _lines(geometry):
+                    draw.line(
+                        [(x, y) for x, y in (line * scale).tolist()],
+                        colour,
+                        max(1, round(width * scale)),
+                        "curve",
+                    )
+            case Text():
+                _text(draw, shape, scale)
+    return np.asarray(image.reduce(SMOOTHING))
+
+
+def _picture(image: Image.Image, picture: Picture, scale: float) -> None:
+    import cv2
+
+    pixels, matrix = picture.pixels, np.asarray(picture.matrix) * scale
+    # Reduced beforehand, because the warp below looks at a few pixels only.
+    step = math.sqrt(abs(np.linalg.det(matrix[:, :2])))
+    block = max(1, round(1 / step)) if step > 0 else 1
+    if block > 1:
+        height, width = pixels.shape[:2]
+        smaller = (max(1, width // block), max(1, height // block))
+        matrix = matrix @ np.diag([width / smaller[0], height / smaller[1], 1.0])
+        pixels = np.asarray(cv2.resize(pixels, smaller, interpolation=cv2.INTER_AREA), np.uint8)
+    # The matrix goes from corners of pixels, OpenCV counts from their middles.
+    matrix = matrix.copy()
+    matrix[:, 2] += matrix[:, :2] @ (0.5, 0.5) - 0.5
+    flags = cv2.INTER_NEAREST if block == 1 else cv2.INTER_LINEAR
+    page = np.array(image)
+    cv2.warpAffine(pixels, matrix, image.size, dst=page, flags=flags, borderMode=cv2.BORDER_TRANSPARENT)
+    image.paste(Image.fromarray(page))
+
+
+def _area(image: Image.Image, area: Area, scale: float) -> None:
+    if area.shape.is_empty:
+        return
+    x0, y0, x1, y1 = (value * scale for value in area.shape.bounds)
+    left, top = math.floor(x0), math.floor(y0)
+    mask = Image.new("L", (math.ceil(x1) - left + 1, math.ceil(y1) - top + 1))
+    draw = ImageDraw.Draw(mask)
+    level = round(255 * area.opacity)
+    for part in shapely.get_parts(area.shape):
+        if shapely.get_dimensions(part) != 2:
+            continue
+        for number, ring in enumerate(shapely.get_rings(part)):
+            points = shapely.get_coordinates(ring) * scale - (left, top)
+            draw.polygon([(x, y) for x, y in points.tolist()], level if number == 0 else 0)
+    image.paste(area.fill, (left, top), mask)
+
+
+def _lines(shape: BaseGeometry) -> list[NDArray[np.float64]]:
+    found = []
+    for part in shapely.get_parts(np.array([shape], object)):
+        if shapely.get_dimensions(part) == 2:
+            found += [shapely.get_coordinates(ring) for ring in shapely.get_rings(part)]
+        elif shapely.get_dimensions(part) == 1:
+            found.append(shapely.get_coordinates(part))
+    return found
+
+
+def _text(draw: ImageDraw.ImageDraw, text: Text, scale: float) -> None:
+    """Write a text; the default font has no raised two, so that it is written smaller and higher."""
+    size = text.size * scale
+    runs = [(part, size * share, rise * size) for part, share, rise in _runs(text.text)]
+    fonts = [ImageFont.load_default(height) for _, height, _ in runs]
+    x = text.x * scale
+    if text.is_centred:
+        x -= sum(font.getlength(part) for (part, _, _), font in zip(runs, fonts, strict=True)) / 2
+    bold = round(BOLD_SHARE * size) if text.is_bold else 0
+    for colour, rim in (((255, 255, 255), round(text.rim * scale)), (text.colour, 0)):
+        if rim == 0 and colour != text.colour:
+            continue
+        place = x
+        for (part, _, rise), font in zip(runs, fonts, strict=True):
+            where = (place, text.y * scale - rise)
+            draw.text(where, part, colour, font, "lm", stroke_width=rim + bold, stroke_fill=colour)
+            place += font.getlength(part)
+
+
+def _runs(text: str) -> list[tuple[str, float, float]]:
+    """Parts of a text, each with its share of the font's size and of it how much higher it stands."""
+    parts = text.split(SQUARED)
+    runs = [(parts[0], 1.0, 0.0)]
+    for part in parts[1:]:
+        runs += [("2", RAISED_SIZE, RAISED_BY), (part, 1.0, 0.0)]
+    return [run for run in runs if run[0]]

@@ -1,0 +1,113 @@
+"""Drawings as SVG: text, with the picture inside as PNG."""
+
+from __future__ import annotations
+
+import base64
+import io
+from xml.sax.saxutils import escape, quoteattr
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry.base import BaseGeometry
+
+from rose2_logs.drawing.shapes import Area, Colour, Drawing, Lines, Picture, Shape, Text
+
+FONTS = "Helvetica, Arial, 'Liberation Sans', 'DejaVu Sans', sans-serif"
+DECIMALS = 2
+FEW_COLOURS = 128
+MIDDLE_EM = 0.36
+"""A text's baseline lies so far below the middle of its capitals: half their height in usual fonts."""
+
+
+def as_svg(drawing: Drawing, *, is_inline: bool = False) -> str:
+    """Write a drawing.
+
+    Parameters
+    ----------
+    drawing : Drawing
+    is_inline : bool
+        For a place within an HTML page: no XML declaration, and it fills the width it is given.
+    """
+    width, height = _number(drawing.width), _number(drawing.height)
+    size = "" if is_inline else f' width="{width}" height="{height}"'
+    head = (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}"{size} role="img" '
+        f'aria-label={quoteattr(drawing.title)} font-family="{FONTS}">'
+    )
+    title = "" if is_inline else f"<title>{escape(drawing.title)}</title>"
+    paper = f'<rect width="{width}" height="{height}" fill="{_colour(drawing.paper)}"/>'
+    body = "\n".join([head, title + paper, *(_element(shape) for shape in drawing.shapes), "</svg>"])
+    return body if is_inline else f'<?xml version="1.0" encoding="UTF-8"?>\n{body}\n'
+
+
+def png_uri(pixels: NDArray[np.uint8], *, few_colours: bool = False) -> str:
+    """Return pixels (H, W, 3) as a PNG in a data URI, with few colours a third as large."""
+    from PIL import Image
+
+    stream = io.BytesIO()
+    image = Image.fromarray(pixels)
+    image = image.quantize(FEW_COLOURS, dither=Image.Dither.NONE) if few_colours else image
+    image.save(stream, format="PNG", optimize=True)
+    return f"data:image/png;base64,{base64.b64encode(stream.getvalue()).decode()}"
+
+
+def _element(shape: Shape) -> str:
+    match shape:
+        case Picture(pixels, matrix):
+            height, width = pixels.shape[:2]
+            parts = " ".join(f"{value:.6g}" for value in np.asarray(matrix).T.ravel())
+            return (
+                f'<image width="{width}" height="{height}" transform="matrix({parts})" '
+                f'preserveAspectRatio="none" style="image-rendering:pixelated" href="{png_uri(pixels)}"/>'
+            )
+        case Area(geometry, fill, opacity, title):
+            inner = f"><title>{escape(title)}</title></path>" if title else "/>"
+            shown = "" if opacity == 1 else f' fill-opacity="{opacity:g}"'
+            return f'<path d="{_path(geometry)}" fill="{_colour(fill)}"{shown} fill-rule="evenodd"{inner}'
+        case Lines(geometry, colour, thickness):
+            return (
+                f'<path d="{_path(geometry)}" fill="none" stroke="{_colour(colour)}" '
+                f'stroke-width="{_number(thickness)}" stroke-linejoin="round" stroke-linecap="butt"/>'
+            )
+        case Text():
+            return _text(shape)
+
+
+def _text(text: Text) -> str:
+    rim = (
+        f' stroke="#fff" stroke-width="{_number(text.rim * 2)}" stroke-linejoin="round" paint-order="stroke"'
+        if text.rim
+        else ""
+    )
+    return (
+        f'<text x="{_number(text.x)}" y="{_number(text.y + MIDDLE_EM * text.size)}" '
+        f'font-size="{_number(text.size)}" fill="{_colour(text.colour)}"{rim}'
+        f"{' text-anchor=' + quoteattr('middle') if text.is_centred else ''}"
+        f"{' font-weight=' + quoteattr('bold') if text.is_bold else ''}>{escape(text.text)}</text>"
+    )
+
+
+def _path(shape: BaseGeometry) -> str:
+    """Path data of the rings of polygons and of lines."""
+    parts = []
+    for part in shapely.get_parts(np.array([shape], object)):
+        if shapely.get_dimensions(part) == 2:
+            rings = shapely.get_rings(part)
+            parts += [f"M{_points(shapely.get_coordinates(ring)[:-1])}Z" for ring in rings]
+        elif shapely.get_dimensions(part) == 1:
+            parts.append(f"M{_points(shapely.get_coordinates(part))}")
+    return "".join(parts)
+
+
+def _points(points: NDArray[np.float64]) -> str:
+    return "L".join(f"{_number(x)} {_number(y)}" for x, y in points.tolist())
+
+
+def _number(value: float) -> str:
+    # Adding nothing turns a negative zero into zero.
+    return f"{round(value, DECIMALS) + 0.0:.{DECIMALS}f}".rstrip("0").rstrip(".")
+
+
+def _colour(colour: Colour) -> str:
+    return f"#{colour[0]:02x}{colour[1]:02x}{colour[2]:02x}"

@@ -1,0 +1,1 @@
+"""Floor plans in the formats of other programs."""

@@ -1,0 +1,119 @@
+"""The maps of a run with its rooms in them, read back from its annotated MCAP."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import closing
+from pathlib import Path
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from rose2_logs.errors import LogError
+from rose2_logs.occupancy import GridGeometry, OccupancySnapshot
+from rose2_logs.readers import LogReader, Selection, open_source
+from rose2_logs.readers.marker_lines import read_marker_lines
+from rose2_logs.readers.source import MessageSource
+from rose2_logs.room_plan import PlanMap, PlanRoom
+from rose2_logs.sinks.ros_messages import HIGHEST_VALUE
+
+SEGMENTED_TOPIC, MARKERS_TOPIC = "/rose2/segmented_map", "/rose2/markers"
+WALLS_NAMESPACE = "walls"
+
+
+class RunMaps:
+    """The annotated MCAP of a run; a context manager that closes it.
+
+    Parameters
+    ----------
+    path : path
+        The file.
+    topic : str
+        The map topic.
+
+    Raises
+    ------
+    LogError
+        If it cannot be opened.
+    """
+
+    def __init__(self, path: Path, topic: str) -> None:
+        self._path, self._topic = path, topic
+        self._source: MessageSource = open_source(path)
+
+    def __enter__(self) -> RunMaps:
+        return self
+
+    def __exit__(self, *ended: object) -> None:
+        with closing(self._source):
+            pass
+
+    def read(self, log_time_ns: int, rooms: Sequence[PlanRoom]) -> PlanMap:
+        """Return the map logged at a time, with the cells of the rooms found in it.
+
+        Raises
+        ------
+        LogError
+            If it is not there or cannot be read.
+        """
+        segmented = self._first(SEGMENTED_TOPIC, log_time_ns)
+        try:
+            cells = self._first(self._topic, log_time_ns).cells
+        except LogError:
+            cells = segmented.cells
+        if cells.shape != segmented.cells.shape:
+            cells = segmented.cells
+        labels = labels_of_segmented(segmented.cells, segmented.geometry, rooms)
+        # Where only the segmented map tells: what belongs to a room is free.
+        cells = np.where((cells is segmented.cells) & (labels > 0), np.int8(0), cells)
+        return PlanMap(segmented.geometry, cells, labels)
+
+    def _first(self, topic: str, log_time_ns: int) -> OccupancySnapshot:
+        return LogReader(self._source, topic, Selection(start_ns=log_time_ns, end_ns=log_time_ns)).first()
+
+    def walls_m(self, log_time_ns: int) -> NDArray[np.float64] | None:
+        """Ends (N, 2, 2) of the wall segments of a map, None if none are there.
+
+        Raises
+        ------
+        LogError
+            If the file cannot be read.
+        """
+        return read_marker_lines(self._path, MARKERS_TOPIC, WALLS_NAMESPACE, log_time_ns)
+
+
+def labels_of_segmented(
+    segmented: NDArray[np.int8], geometry: GridGeometry, rooms: Sequence[PlanRoom]
+) -> NDArray[np.int32]:
+    """Find the rooms of a segmented map's cells; where several share a value, their shapes decide.
+
+    Parameters
+    ----------
+    segmented : (H, W) int8
+        The segmented map.
+    geometry : GridGeometry
+        Where it lies.
+    rooms : sequence of PlanRoom
+        The map's rooms.
+
+    Returns
+    -------
+    (H, W) int32
+        Numbers of rooms, 0 for none.
+    """
+    by_value: dict[int, list[PlanRoom]] = {}
+    for room in rooms:
+        by_value.setdefault(1 + (room.number - 1) % HIGHEST_VALUE, []).append(room)
+    numbers = np.zeros(2**8, np.int32)
+    for value, holders in by_value.items():
+        numbers[value] = holders[0].number
+    labels = numbers[segmented.view(np.uint8)]
+    for value, holders in by_value.items():
+        if len(holders) > 1:
+            row, column = np.nonzero(segmented == value)
+            centres = shapely.points(geometry.cell_centres(row, column))
+            distances = [shapely.distance(room.shape, centres) for room in holders]
+            nearest = np.argmin(np.nan_to_num(distances, nan=np.inf), axis=0)
+            labels[row, column] = np.array([room.number for room in holders])[nearest]
+    return labels

@@ -1,0 +1,101 @@
+"""report, figure and export from the command line."""
+
+from __future__ import annotations
+
+import sys
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import pytest
+from PIL import Image
+from saved_maps import save_map, two_rooms
+
+from rose2_logs.cli import main
+from rose2_logs.cli_options import state
+
+
+@pytest.fixture
+def cli(monkeypatch, capfd):
+    """Run the command line; returns exit code, stdout and stderr."""
+
+    def run(*arguments: object) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["rose2-logs", *map(str, arguments)])
+        monkeypatch.setitem(state, "debug", False)
+        with pytest.raises(SystemExit) as ended:
+            main()
+        out, err = capfd.readouterr()
+        return int(ended.value.code or 0), out, err
+
+    return run
+
+
+def test_report_writes_a_page(cli, office_results: Path, tmp_path: Path):
+    code, out, _ = cli("report", office_results, "-o", tmp_path / "page.html", "--panels", 2)
+    assert (code, str(tmp_path / "page.html") in out.replace("\n", "")) == (0, True)
+    assert (tmp_path / "page.html").read_text().startswith("<!DOCTYPE html>")
+
+
+def test_figures_are_png_and_svg(cli, office_results: Path, tmp_path: Path):
+    """Of any map; a PNG as wide as asked for."""
+    png, svg = tmp_path / "half.png", tmp_path / "two.svg"
+    assert cli("figure", office_results, "--coverage", 0.5, "-o", png, "--width", 640)[0] == 0
+    assert cli("figure", office_results, "--snapshot", 2, "-o", svg)[0] == 0
+    with Image.open(png) as image:
+        assert (image.format, image.size[0]) == ("PNG", 640)
+    assert "snapshot 2" in ET.parse(svg).getroot().get("aria-label")
+
+
+def test_exports_name_the_map_unless_it_is_the_last(cli, office_results: Path, tmp_path: Path):
+    assert cli("export", office_results, "-f", "dxf", "-f", "map_server", "-o", tmp_path)[0] == 0
+    assert cli("export", office_results, "--format", "graph", "--snapshot", 1, "-o", tmp_path)[0] == 0
+    assert {file.name for file in tmp_path.iterdir()} == {
+        "office.floor_plan.dxf",
+        "office.rooms.pgm",
+        "office.rooms.yaml",
+        "office.rooms.list.yaml",
+        "office.snapshot1.graph.json",
+    }
+
+
+def test_segment_writes_the_same_formats(cli, tmp_path: Path):
+    path = save_map(tmp_path, "flat", two_rooms())
+    formats = [
+        word for name in ("dxf", "svg", "graph", "map_server", "geojson") for word in ("--format", name)
+    ]
+    assert cli("segment", path, "-o", tmp_path / "out", *formats)[0] == 0
+    endings = {file.name.removeprefix("flat.") for file in (tmp_path / "out").iterdir()}
+    assert endings >= {"floor_plan.dxf", "floor_plan.svg", "graph.json", "rooms.pgm", "floor_plan.geojson"}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["report", "nowhere"], "nowhere"),
+        (["figure", "RESULTS", "-o", "x.pdf"], "x.pdf"),
+        (["figure", "RESULTS", "--snapshot", "99"], "snapshot 99"),
+        (["figure", "RESULTS", "--coverage", "50"], "half is 0.5"),
+        (["figure", "RESULTS", "--coverage", "0.5", "--last"], "exclude each other"),
+        (["export", "RESULTS", "--format", "pdf"], "there are: geojson"),
+        (["export", "nowhere", "--format", "dxf"], "nowhere"),
+    ],
+)
+def test_what_cannot_be_done_is_one_line(cli, office_results: Path, arguments: list[str], told: str):
+    arguments = [str(office_results) if word == "RESULTS" else word for word in arguments]
+    code, out, err = cli(*arguments)
+    assert (code, out) == (2, "")
+    assert told in err
+    assert err.startswith("error:")
+    assert err.count("\n") == 1
+
+
+def test_nothing_is_replaced_unasked(cli, office_results: Path, tmp_path: Path):
+    for verb, options, name in (
+        ("report", ["--panels", 1], "page.html"),
+        ("figure", [], "page.png"),
+        ("export", ["-f", "graph"], "plans"),
+    ):
+        arguments = [verb, office_results, *options, "-o", tmp_path / name]
+        assert cli(*arguments)[0] == 0
+        code, _, err = cli(*arguments)
+        assert (code, "--overwrite" in err) == (2, True)
+        assert cli(*arguments, "--overwrite")[0] == 0

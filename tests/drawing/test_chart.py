@@ -1,0 +1,87 @@
+"""Charts are XML whose curves stand where the axes say."""
+
+import re
+import xml.etree.ElementTree as ET
+
+import numpy as np
+import pytest
+
+from rose2_logs.drawing.chart import (
+    BOTTOM,
+    HEIGHT,
+    LEFT,
+    RIGHT,
+    TOP,
+    WIDTH,
+    Mark,
+    Series,
+    lane_chart,
+    line_chart,
+)
+
+
+def curves(svg: str) -> list[np.ndarray]:
+    root = ET.fromstring(svg)
+    paths = [each.get("d") for each in root.iter("path") if each.get("class") == "curve"]
+    return [np.array([part.split() for part in re.split("[ML]", path)[1:]], float) for path in paths]
+
+
+def test_a_curve_goes_from_corner_to_corner():
+    (points,) = curves(
+        line_chart(
+            np.array([0.0, 50.0, 100.0]),
+            [Series("a", np.array([0.0, 2.5, 10.0]), "#123456")],
+            title="t",
+            x_label="x",
+            x_range=(0.0, 100.0),
+        )
+    )
+    assert points[0] == pytest.approx([LEFT, HEIGHT - BOTTOM])
+    assert points[1] == pytest.approx(
+        [(LEFT + WIDTH - RIGHT) / 2, HEIGHT - BOTTOM - 0.25 * (HEIGHT - TOP - BOTTOM)]
+    )
+    assert points[2] == pytest.approx([WIDTH - RIGHT, TOP])
+
+
+def test_missing_values_are_gaps():
+    svg = line_chart(
+        np.arange(5.0), [Series("a", np.array([1, 2, np.nan, 3, 4]), "#000")], title="t", x_label="x"
+    )
+    (path,) = re.findall(r'class="curve"[^>]* d="([^"]+)"', svg)
+    assert path.count("M") == 2
+    assert "nan" not in svg
+
+
+def test_names_are_escaped_and_a_flat_curve_has_an_axis():
+    svg = line_chart(
+        np.array([3.0]),
+        [Series("<b>&", np.array([0.0]), "#000")],
+        title='"<title>"',
+        x_label="<x>",
+        marks=[Mark(3.0, "<mark>", "final")],
+    )
+    root = ET.fromstring(svg)
+    assert root.get("aria-label") == '"<title>"'
+    assert "<b>&: 0 at 3" in [each.text for each in root.iter("title")]
+
+
+def test_long_curves_are_thinned():
+    x = np.arange(100_000.0)
+    (points,) = curves(line_chart(x, [Series("a", np.sin(x), "#000")], title="t", x_label="x"))
+    assert len(points) == 800
+
+
+def test_lanes_show_when_rooms_were_there():
+    """A room that went and came back has two bars; a bar reaches to the next map."""
+    x = np.array([0.0, 10.0, 20.0, 30.0, 40.0])
+    present = np.array([[True, False, True, True, False], [False, False, False, False, True]])
+    root = ET.fromstring(
+        lane_chart(x, present, ["1", "2"], ["#000", "#fff"], title="t", x_label="x", x_range=(0.0, 40.0))
+    )
+    bars = [(float(each.get("x")), float(each.get("width"))) for each in root.iter("rect")]
+    quarter = (WIDTH - LEFT - RIGHT) / 4
+    assert bars[:2] == [
+        pytest.approx((LEFT, quarter), abs=0.1),
+        pytest.approx((LEFT + 2 * quarter, 2 * quarter), abs=0.1),
+    ]
+    assert len(bars) == 3

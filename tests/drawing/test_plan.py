@@ -1,0 +1,116 @@
+"""A drawn plan shows each room where it is, in the colour of its track, as SVG and as pixels alike."""
+
+from __future__ import annotations
+
+import base64
+import dataclasses
+import io
+import xml.etree.ElementTree as ET
+
+import numpy as np
+import pytest
+import shapely
+from drawn_plans import LEFT, RIGHT, two_rooms_plan
+from PIL import Image
+
+from rose2_logs.drawing.pixels import as_pixels
+from rose2_logs.drawing.plan import FREE_GREY, MARGIN_M, PANEL, SEEN_OPACITY, UNKNOWN_GREY, draw_plan
+from rose2_logs.drawing.shapes import Drawing, Lines, Text, hatching
+from rose2_logs.drawing.svg import as_svg
+from rose2_logs.sinks.palette import track_colour
+
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+def seen_colour(number: int) -> np.ndarray:
+    return np.round((1 - SEEN_OPACITY) * FREE_GREY + SEEN_OPACITY * np.array(track_colour(number)))
+
+
+@pytest.mark.parametrize("yaw_rad", [0.0, 0.6])
+def test_pixels_show_rooms_where_they_are(yaw_rad: float):
+    """Also on a turned grid; x goes right and y up; what was not seen is pale, what is unknown is grey."""
+    plan = two_rooms_plan(yaw_rad)
+    drawing = draw_plan(plan, dataclasses.replace(PANEL, font=0.0, hatch_gap=1e9))
+    image = as_pixels(drawing, 720)
+    x0, _, x1, y1 = plan.bounds_m
+    metres_per_px = (x1 - x0 + 2 * MARGIN_M) / 720
+
+    def at(grid_xy_m):
+        x, y = plan.map.geometry.grid_to_world(np.array(grid_xy_m))
+        column, row = (x - x0 + MARGIN_M) / metres_per_px, (y1 + MARGIN_M - y) / metres_per_px
+        return image[int(row), int(column)].astype(int)
+
+    assert np.abs(at((2.2, 3.5)) - seen_colour(LEFT)).max() <= 2
+    assert np.abs(at((6.2, 1.5)) - seen_colour(RIGHT)).max() <= 2
+    pale = at((8.3, 2.5))
+    assert np.abs(pale - np.array([UNKNOWN_GREY] * 3)).max() > 5
+    assert pale.mean() > seen_colour(RIGHT).mean()
+    assert at((5.0, 2.5))[0] > 180 > at((5.0, 2.5))[1] + 60  # the red doorway
+
+
+def test_svg_is_xml_with_the_same_picture_and_shapes():
+    """The picture within holds the cells' colours, paths are rooms, texts their names; markup is escaped."""
+    plan = two_rooms_plan()
+    text = as_svg(draw_plan(plan))
+    root = ET.fromstring(text)
+    assert root.get("aria-label") == plan.title == root.findtext(f"{SVG}title")
+    (image,) = root.iter(f"{SVG}image")
+    pixels = np.asarray(Image.open(io.BytesIO(base64.b64decode(image.get("href").split(",")[1]))))
+    assert pixels.shape == (32, 62, 3)
+    assert (pixels[10, 10] == seen_colour(LEFT)).all()
+    texts = [element.text for element in root.iter(f"{SVG}text")]
+    assert {"Room 3", "Room 120", "12 m²", "predicted, unseen", "doorway"} <= set(texts)
+    told = [element.text for element in root.iter(f"{SVG}title")]
+    assert "Room 3: 12.0 m² seen of 12.0 m², 75% of its outline backed by walls" in told
+    assert as_svg(draw_plan(two_rooms_plan())) == text
+
+
+def test_several_plans_share_a_part_of_the_world():
+    """With the same bounds a room stands at the same place of the page."""
+    plan = two_rooms_plan()
+    bounds = (-10.0, -10.0, 20.0, 20.0)
+    sizes = set()
+    for shown in (plan, dataclasses.replace(plan, rooms=plan.rooms[:1], map=None)):
+        drawing = draw_plan(shown, PANEL, bounds)
+        sizes.add((drawing.width, drawing.height))
+        outline = next(
+            each
+            for each in drawing.shapes
+            if isinstance(each, Lines) and each.shape.geom_type == "MultiPolygon"
+        )
+        scale = PANEL.width / 31
+        corner = shapely.get_coordinates(outline.shape).min(0)
+        assert corner == pytest.approx([(-1 + 10.5) * scale, (20.5 - 5) * scale], abs=0.5)
+    assert len(sizes) == 1
+
+
+def test_an_empty_plan_is_a_page():
+    plan = dataclasses.replace(two_rooms_plan(), rooms=(), doorways=(), map=None)
+    assert as_pixels(draw_plan(plan), 100).shape[1] == 100
+    ET.fromstring(as_svg(draw_plan(plan)))
+
+
+@pytest.mark.parametrize("gap", [0.5, 2.0])
+def test_hatching_fills_a_shape_evenly(gap: float):
+    """Its lines lie within, rise at 45 degrees and are as long together as the area over the gap."""
+    shape = shapely.Point(3, -2).buffer(20)
+    lines = hatching(shape, gap)
+    assert lines.difference(shape.buffer(1e-6)).is_empty
+    assert lines.length == pytest.approx(shape.area / gap, rel=0.05)
+    ends = shapely.get_coordinates(shapely.get_parts(lines)).reshape(-1, 2, 2)
+    across = np.diff(ends, axis=1)[:, 0]
+    assert across[:, 0] == pytest.approx(-across[:, 1])
+
+
+def test_a_raised_two_is_drawn():
+    """The square of metres is no empty box: it is there, smaller and higher than a plain two."""
+
+    def ink(text):
+        page = Drawing(100, 40)
+        page.add(Text(text, 50, 20, 24))
+        return as_pixels(page, 100).min(2) < 128
+
+    plain, raised = ink("m2"), ink("m²")
+    assert 0 < raised.sum() < plain.sum()
+    right = slice(int(np.flatnonzero(raised.any(0))[-1]) - 5, None)
+    assert np.flatnonzero(raised[:, right].any(1))[-1] < np.flatnonzero(plain.any(1))[-1] - 3

@@ -1,0 +1,178 @@
+"""Floor plans read back by the programs' own readers."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import ezdxf
+import networkx as nx
+import numpy as np
+import pytest
+import shapely
+import yaml
+from drawn_plans import LEFT, RIGHT, two_rooms_plan
+from shapely.geometry import shape
+
+from rose2_logs.errors import OutputError, ParameterError
+from rose2_logs.exports.dxf import LAYERS
+from rose2_logs.exports.formats import FORMATS, planned_files, write_plan
+from rose2_logs.exports.map_server import room_values
+from rose2_logs.readers import open_log
+from rose2_logs.results.folder import RunResults
+
+
+@pytest.fixture(params=[0.0, 0.4], ids=["straight", "turned"])
+def plan(request):
+    return two_rooms_plan(request.param)
+
+
+@pytest.fixture
+def real_plan(office_results: Path):
+    results = RunResults(office_results)
+    with results.open_maps() as maps:
+        return results.plan(results.choose(), maps, with_walls=True)
+
+
+def test_geojson_is_read_by_shapely(plan, tmp_path: Path):
+    """Rooms, unseen parts, doorways and walls with what is known of them; rings turn as the standard asks."""
+    (file,) = write_plan(plan, ["geojson"], tmp_path, "two")
+    collection = json.loads(file.read_text())
+    assert collection["type"] == "FeatureCollection"
+    assert collection["map_frame"]["unit"] == "metre"
+    assert "not longitude" in collection["map_frame"]["note"]
+    # The standard forbids these names to collections.
+    assert not {"coordinates", "geometry", "properties"} & collection.keys()
+    found = {}
+    for feature in collection["features"]:
+        found.setdefault(feature["properties"]["kind"], []).append(feature)
+    assert {kind: len(features) for kind, features in found.items()} == {
+        "room": 2,
+        "predicted": 1,
+        "doorway": 1,
+        "wall": 2,
+    }
+    for feature, room in zip(found["room"], plan.rooms, strict=True):
+        polygon = shape(feature["geometry"])
+        assert polygon.symmetric_difference(room.shape).area < 1e-2
+        assert polygon.exterior.is_ccw
+        about = feature["properties"]
+        assert (about["room"], about["name"]) == (room.number, room.name)
+        assert (about["area_m2"], about["confidence"]) == pytest.approx((room.area_m2, 0.75))
+        assert about["neighbours"] == list(room.neighbours)
+    (door,) = found["doorway"]
+    assert shape(door["geometry"]).length == pytest.approx(door["properties"]["width_m"], abs=1e-3) == 1.0
+    assert door["properties"]["rooms"] == [LEFT, RIGHT]
+    assert shape(found["predicted"][0]["geometry"]).within(plan.rooms[1].shape.buffer(0.11))
+
+
+def test_a_room_without_a_shape_has_no_geometry(tmp_path: Path):
+    plan = two_rooms_plan()
+    bare = dataclasses.replace(plan.rooms[0], shape=shapely.Polygon(), label_point_m=None)
+    files = write_plan(dataclasses.replace(plan, rooms=(bare, plan.rooms[1])), list(FORMATS), tmp_path, "x")
+    assert json.loads(files[0].read_text())["features"][0]["geometry"] is None
+
+
+def test_dxf_passes_the_audit(plan, tmp_path: Path):
+    """Layers, metres, outlines, hatches, doorways, labels."""
+    (file,) = write_plan(plan, ["dxf"], tmp_path, "two")
+    document = ezdxf.readfile(file)
+    audit = document.audit()
+    assert not audit.errors
+    assert not audit.fixes
+    assert document.units == ezdxf.units.M
+    assert set(LAYERS) <= {layer.dxf.name for layer in document.layers}
+    space = document.modelspace()
+    outlines = space.query('LWPOLYLINE[layer=="ROOMS"]')
+    assert [shapely.Polygon(list(each.vertices())).area for each in outlines] == pytest.approx([12.0, 12.0])
+    assert len({each.dxf.true_color for each in outlines}) == 2
+    assert all(each.closed for each in outlines)
+    assert len(space.query('HATCH[layer=="PREDICTED"]')) == 1
+    (door,) = space.query('LINE[layer=="DOORWAYS"]')
+    assert np.allclose([door.dxf.start.vec2, door.dxf.end.vec2], plan.doorways[0].ends_m)
+    assert len(space.query('LINE[layer=="WALLS"]')) == 2
+    assert {each.dxf.text for each in space.query('TEXT[layer=="LABELS"]')} >= {"Room 3", "Room 120"}
+
+
+def test_the_same_plan_gives_the_same_files(plan, tmp_path: Path):
+    """Byte for byte, also where a format would hold times and random numbers."""
+    one = write_plan(plan, list(FORMATS), tmp_path / "one", "two")
+    other = write_plan(plan, list(FORMATS), tmp_path / "other", "two")
+    assert [file.read_bytes() for file in one] == [file.read_bytes() for file in other]
+    assert not ezdxf.options.write_fixed_meta_data_for_testing
+
+
+def test_labelled_map_is_read_as_a_map(plan, tmp_path: Path):
+    """Our reader of map_server's files gets the cells, their place, and the rooms as values."""
+    image, about, listing = write_plan(plan, ["map_server"], tmp_path, "two")
+    with open_log(about) as log:
+        snapshot = log.first()
+    geometry = plan.map.geometry
+    assert snapshot.geometry.shape == geometry.shape
+    assert snapshot.geometry.origin_xy_m == pytest.approx(geometry.origin_xy_m)
+    assert snapshot.geometry.yaw_rad == pytest.approx(geometry.yaw_rad)
+    rooms = {each["room"]: each for each in yaml.safe_load(listing.read_text())["rooms"]}
+    for number in (LEFT, RIGHT):
+        assert ((plan.map.labels == number) == (snapshot.cells == rooms[number]["value"])).all()
+    outside = plan.map.labels == 0
+    assert np.array_equal(snapshot.cells[outside], plan.map.cells[outside])
+    assert rooms[LEFT]["neighbours"] == [RIGHT]
+    assert image.read_bytes().startswith(b"P5")
+
+
+def test_more_rooms_than_values_share_them():
+    rooms = [dataclasses.replace(two_rooms_plan().rooms[0], number=number) for number in range(1, 201)]
+    values = room_values(dataclasses.replace(two_rooms_plan(), rooms=tuple(rooms)))
+    assert set(values.values()) == set(range(1, 100))
+
+
+def test_graph_is_read_by_networkx(plan, tmp_path: Path):
+    door = plan.doorways[0]
+    twice = dataclasses.replace(plan, doorways=(door, dataclasses.replace(door, ends_m=door.ends_m + 0.1)))
+    (file,) = write_plan(twice, ["graph"], tmp_path, "two")
+    graph = nx.node_link_graph(json.loads(file.read_text()), edges="edges")
+    assert (graph.is_multigraph(), graph.is_directed()) == (True, False)
+    assert list(graph.nodes) == [LEFT, RIGHT]
+    assert graph.nodes[LEFT]["name"] == "Room 3"
+    assert graph.number_of_edges(LEFT, RIGHT) == 2
+    assert graph.edges[LEFT, RIGHT, 0]["width_m"] == pytest.approx(1.0)
+
+
+def test_svg_is_xml(plan, tmp_path: Path):
+    (file,) = write_plan(plan, ["svg"], tmp_path, "two")
+    assert ET.parse(file).getroot().tag.endswith("svg")
+
+
+def test_a_real_plan_is_read_back(real_plan, tmp_path: Path):
+    """All rooms, doorways and walls of a run's last map, in every format."""
+    write_plan(real_plan, list(FORMATS), tmp_path, "real")
+    document = ezdxf.readfile(tmp_path / "real.floor_plan.dxf")
+    assert not document.audit().errors
+    space = document.modelspace()
+    assert len(space.query('LINE[layer=="DOORWAYS"]')) == len(real_plan.doorways) > 5
+    assert len(space.query('LINE[layer=="WALLS"]')) == len(real_plan.walls_m) > 100
+    features = json.loads((tmp_path / "real.floor_plan.geojson").read_text())["features"]
+    areas = {
+        each["properties"]["room"]: shape(each["geometry"]).area
+        for each in features
+        if each["properties"]["kind"] == "room"
+    }
+    assert areas == pytest.approx({room.number: room.predicted_area_m2 for room in real_plan.rooms}, rel=1e-3)
+    assert all(shape(each["geometry"]).is_valid for each in features)
+    graph = nx.node_link_graph(json.loads((tmp_path / "real.graph.json").read_text()), edges="edges")
+    neighbours = {room.number: sorted(set(graph.neighbors(room.number))) for room in real_plan.rooms}
+    assert neighbours == {room.number: list(room.neighbours) for room in real_plan.rooms}
+
+
+def test_an_unknown_format_is_named(plan, tmp_path: Path):
+    with pytest.raises(ParameterError, match="there are: geojson, svg, dxf, map_server, graph"):
+        planned_files(["pdf"], tmp_path, "two")
+
+
+def test_a_folder_that_cannot_be_made_is_named(plan, tmp_path: Path):
+    (tmp_path / "taken").write_text("")
+    for name in FORMATS:
+        with pytest.raises(OutputError, match="taken"):
+            write_plan(plan, [name], tmp_path / "taken", "two")

@@ -1,0 +1,222 @@
+"""The report says what was found, escapes what logs are called, and needs nothing but itself."""
+
+from __future__ import annotations
+
+import html
+import json
+import re
+import shutil
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from finished_runs import SAMPLE_LOGS, renamed_topic, run_of
+
+from rose2_logs.errors import LogError, OutputError
+from rose2_logs.report import tables
+from rose2_logs.report.overview import write_reports
+from rose2_logs.report.page import along_coverage, write_report
+from rose2_logs.report.words import date_of, duration
+
+
+class Reader(HTMLParser):
+    """Texts of the cells of each table's body, tags by name, addresses."""
+
+    def __init__(self, page: Path) -> None:
+        super().__init__()
+        self.tables: dict[str, list[list[str]]] = {}
+        self.tags: list[str] = []
+        self.addresses: list[str] = []
+        self._table, self._in_cell = "", False
+        self.feed(page.read_text(encoding="utf-8"))
+
+    def handle_starttag(self, tag, attrs):
+        about = dict(attrs)
+        self.tags.append(tag)
+        self.addresses += [value for name, value in attrs if name in ("src", "href", "srcset", "action")]
+        if tag == "table":
+            self._table = about["id"]
+            self.tables[self._table] = []
+        elif tag == "tr":
+            self.tables[self._table].append([])
+        elif tag == "td":
+            self._in_cell = True
+            self.tables[self._table][-1].append("")
+
+    def handle_endtag(self, tag):
+        if tag == "td":
+            self._in_cell = False
+
+    def handle_data(self, data):
+        if self._in_cell:
+            self.tables[self._table][-1][-1] += data
+
+    def rows(self, table: str) -> list[list[str]]:
+        return [row for row in self.tables[table] if row]
+
+
+def test_it_says_what_the_tables_say(office_results: Path, tmp_path: Path):
+    """Every track with its figures, every doorway of the last map, every event but mere going on."""
+    page = write_report(office_results, tmp_path / "page.html")
+    told = Reader(page)
+    tracks = pq.read_table(office_results / "tracks.parquet").to_pylist()
+    by_name = {row[0]: row for row in told.rows("rooms-table")}
+    assert len(by_name) == len(tracks)
+    for track in tracks:
+        row = by_name[f"Room {track['track']}"]
+        assert row[1] == ("yes" if track["in_last_map"] else "no")
+        assert row[2:4] == [f"{track['area_m2']:.1f}", f"{track['predicted_area_m2']:.1f}"]
+        assert row[7] == f"{track['first_coverage']:.0%}"
+    doorways = pq.read_table(office_results / "doorways.parquet").to_pylist()
+    assert len(told.rows("doorways-table")) == len([door for door in doorways if door["snapshot"] == 5])
+    events = pq.read_table(office_results / "events.parquet").to_pylist()
+    assert len(told.rows("events-table")) == len([event for event in events if event["kind"] != "continued"])
+    text = page.read_text(encoding="utf-8")
+    summary = json.loads((office_results / "summary.json").read_text())
+    assert f"<strong>{summary['results']['rooms_last']}</strong>" in text
+    assert "All parameters have their defaults" in text
+    parameters = {row[0]: row[1] for row in told.rows("parameters-table")}
+    assert parameters["floor_plan.room_min_area_m2"] == "3"
+
+
+def test_it_stands_alone(office_results: Path, tmp_path: Path):
+    """Nothing is fetched: addresses are data, places in the page, or files beside it."""
+    page = write_report(office_results, tmp_path / "page.html")
+    told = Reader(page)
+    assert all(address.startswith(("data:", "#")) for address in told.addresses)
+    assert not re.search(
+        r"@import|url\(|https?://(?!www\.w3\.org/2000/svg)", page.read_text(encoding="utf-8")
+    )
+    beside = shutil.copytree(office_results, tmp_path / "office")
+    names = [link for link in Reader(write_report(beside)).addresses if not link.startswith(("data:", "#"))]
+    assert "rooms.parquet" in names
+    assert all((beside / name).is_file() for name in names)
+
+
+def test_panels_are_as_many_as_asked_for(office_results: Path, tmp_path: Path):
+    """And the same results give the same bytes."""
+    few = write_report(office_results, tmp_path / "few.html", panels=2)
+    assert Reader(few).tags.count("figcaption") == 2 + 7
+    again = write_report(office_results, tmp_path / "again.html", panels=2)
+    assert few.read_bytes() == again.read_bytes()
+
+
+def test_names_are_text_and_never_markup(tmp_path: Path):
+    """Topic, file and folder are what people call them, also where that is a program."""
+    evil = "<script>alert('x')</script>&\"<img src=x onerror=alert(1)>"
+    log = renamed_topic(SAMPLE_LOGS / "office.mcap", f"/{evil}", tmp_path / "<b>log & 'run'.mcap")
+    folder = run_of(log, tmp_path / "<script>alert(2)<%2F", 2, topic=f"/{evil}")
+    page = write_report(folder)
+    text, told = page.read_text(encoding="utf-8"), Reader(page)
+    assert (
+        html.escape(f"/{evil} in frame map", quote=True).replace("&quot;", "&#34;").replace("&#x27;", "&#39;")
+        in text
+    )
+    assert told.tags.count("script") == 1
+    assert "img" not in told.tags
+    assert "b" not in told.tags
+    assert "<script>alert" not in text
+
+
+def test_an_earlier_page_stays_unless_it_may_be_replaced(office_results: Path, tmp_path: Path):
+    page = tmp_path / "page.html"
+    page.write_text("mine")
+    with pytest.raises(OutputError, match="--overwrite"):
+        write_report(office_results, page)
+    assert page.read_text() == "mine"
+    write_report(office_results, page, overwrite=True)
+    assert page.read_text() != "mine"
+
+
+def test_long_tables_are_cut_and_say_so(office_results: Path, tmp_path: Path, monkeypatch):
+    """What is kept: rooms of the last map, the events that tell most."""
+    monkeypatch.setattr(tables, "ROWS_MOST", 4)
+    page = write_report(office_results, tmp_path / "page.html")
+    told = Reader(page)
+    assert [len(told.rows(name)) for name in ("rooms-table", "doorways-table", "events-table")] == [4, 4, 4]
+    assert {row[1] for row in told.rows("rooms-table")} == {"yes"}
+    kinds = {row["kind"] for row in pq.read_table(office_results / "events.parquet").to_pylist()}
+    if "split" in kinds:
+        assert "split" in {row[4] for row in told.rows("events-table")}
+    assert "4 of " in page.read_text(encoding="utf-8")
+
+
+def test_a_baseline_without_the_annotated_log_has_a_report(tmp_path: Path):
+    """Shapes alone are drawn then; the page says why."""
+    folder = run_of(
+        SAMPLE_LOGS / "office.mcap", tmp_path / "out", 3, method="morphological", annotated_log=False
+    )
+    text = write_report(folder).read_text(encoding="utf-8")
+    assert "the annotated MCAP, which holds the maps, is not there" in text
+    assert "morphological" in text
+
+
+def test_one_map_has_a_report(tmp_path: Path):
+    """There is no growth to be told then."""
+    page = write_report(run_of(SAMPLE_LOGS / "wing.bag", tmp_path / "out", 1))
+    assert Reader(page).rows("rooms-table")
+    assert "Curves" not in page.read_text(encoding="utf-8")
+
+
+def test_many_logs_have_a_page_that_lists_them(office_results: Path, tmp_path: Path):
+    """With a picture of each; results that cannot be read are told and do not stop the others."""
+    for name in ("logs/a", "logs/b", "logs/damaged"):
+        shutil.copytree(office_results, tmp_path / name)
+    (tmp_path / "logs" / "damaged" / "tracks.parquet").write_bytes(b"PAR1")
+    written = write_reports(tmp_path, panels=1)
+    assert written.pages == (
+        tmp_path / "logs" / "a" / "report.html",
+        tmp_path / "logs" / "b" / "report.html",
+        tmp_path / "report.html",
+    )
+    (error,) = written.failed
+    assert "tracks.parquet" in str(error)
+    told = Reader(tmp_path / "report.html")
+    assert [row[0] for row in told.rows("logs-table")] == ["a", "b"]
+    links = [link for link in told.addresses if not link.startswith("data:")]
+    assert links == ["logs/a/report.html", "logs/b/report.html"] * 2
+    assert told.tags.count("img") == 2
+    elsewhere = write_reports(tmp_path, tmp_path / "elsewhere", panels=1).pages
+    assert [page.relative_to(tmp_path).as_posix() for page in elsewhere] == [
+        "elsewhere/logs/a.html",
+        "elsewhere/logs/b.html",
+        "elsewhere/report.html",
+    ]
+
+
+def test_a_folder_without_results_is_named(tmp_path: Path):
+    with pytest.raises(LogError, match=r"holds no summary\.json"):
+        write_reports(tmp_path)
+    with pytest.raises(LogError, match="no such folder"):
+        write_reports(tmp_path / "nowhere")
+
+
+@pytest.mark.parametrize("most", [1, 2, 5, 12, 100])
+def test_panels_stand_evenly_along_coverage(most: int):
+    """First and last are there, none twice, and no stretch of coverage is left out."""
+    coverage = np.concatenate([np.linspace(0.1, 0.9, 30), np.full(30, 0.9), [0.85], np.linspace(0.9, 1, 5)])
+    places = along_coverage(coverage, most)
+    assert len(places) == min(most, len(coverage))
+    assert places == sorted(set(places))
+    assert places[-1] == len(coverage) - 1
+    if most > 1:
+        assert places[0] == 0
+        # A step of the maps themselves is 0.05 at most.
+        assert np.diff(coverage[places]).max() <= 0.9 / (most - 1) + 0.05
+
+
+def test_maps_that_cover_the_same_are_spread():
+    assert along_coverage(np.ones(101), 5) == [0, 25, 50, 75, 100]
+
+
+def test_words():
+    assert [duration(seconds) for seconds in (0.0, 2.5, 61.0, 7260.0)] == [
+        "0 s",
+        "2.5 s",
+        "1 min 1 s",
+        "2 h 1 min",
+    ]
+    assert date_of(1_700_000_020_000_000_000) == "2023-11-14 22:13:40 UTC"
+    assert date_of(125_000_000_000) is None
