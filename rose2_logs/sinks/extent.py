@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+import shapely
 
 from rose2_logs.occupancy import FloatArray
-from rose2_logs.sinks.ros_messages import outer_rings
 from rose2_logs.tracking.frames import TrackedSnapshot
 
 
@@ -24,12 +24,13 @@ class Extent:
 
     def add(self, frame: TrackedSnapshot) -> None:
         """Take one map."""
-        rings = [ring for shape in frame.analysis.rooms.polygons for ring in outer_rings(shape)]
-        if rings and not self._has_rooms:
+        bounds = shapely.total_bounds(np.array(frame.analysis.rooms.polygons, object)).reshape(2, 2)
+        has_rooms = bool(np.isfinite(bounds).all())
+        if has_rooms and not self._has_rooms:
             self._has_rooms = True
             self.low_m, self.high_m = np.full(2, np.inf), np.full(2, -np.inf)
-        if rings:
-            self._grow(np.concatenate(rings))
+        if has_rooms:
+            self._grow(bounds)
         elif not self._has_rooms:
             self._grow(frame.analysis.geometry.corners_m())
 
