@@ -13,7 +13,7 @@ from typing import Annotated
 
 import typer
 
-from rose2_logs import __version__, cli_batch
+from rose2_logs import __version__, cli_batch, cli_compare
 from rose2_logs.cli_options import (
     EXIT_FAULT,
     EXIT_INTERRUPTED,
@@ -189,6 +189,9 @@ def view(
 
 
 app.command(epilog=cli_batch.SERVE_EXAMPLE)(cli_batch.serve)
+
+
+app.command(epilog=cli_compare.EXAMPLE)(cli_compare.compare)
 
 
 @app.command(epilog="Example: [bold]rose2-logs segment map.png --resolution 0.05 -o rooms[/bold]")

@@ -17,7 +17,7 @@ from rose2_logs import __version__
 from rose2_logs.cli import main
 from rose2_logs.sinks.label_image import write_label_image
 
-VERBS = ("info", "analyze", "batch", "view", "serve", "segment", "evaluate")
+VERBS = ("info", "analyze", "batch", "view", "serve", "compare", "segment", "evaluate")
 
 
 @pytest.fixture
