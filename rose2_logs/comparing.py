@@ -71,7 +71,8 @@ def compare_runs(
     files = tuple(folder / name for name in names)
     if not overwrite and (existing := [file for file in files if file.exists()]):
         raise OutputError(f"{existing[0]}: exists already; choose another folder or pass --overwrite")
-    a, b = read_final_layout(folder_a), read_final_layout(folder_b)
+    name_a, name_b = _names(folder_a, folder_b)
+    a, b = read_final_layout(folder_a, name_a), read_final_layout(folder_b, name_b)
     comparison = compare_layouts(a, b)
     if comparison is None:
         few = folder_a if not a.map.can_be_placed else folder_b
@@ -86,11 +87,21 @@ def compare_runs(
     return ComparisonResult(comparison, folder, files)
 
 
-def read_final_layout(folder: Path) -> FinalLayout:
+def _names(folder_a: Path, folder_b: Path) -> tuple[str, str]:
+    """Name two folders by as much of their ends as tells them apart."""
+    parts_a, parts_b = folder_a.resolve().parts, folder_b.resolve().parts
+    for count in range(1, max(len(parts_a), len(parts_b))):
+        if parts_a[-count:] != parts_b[-count:]:
+            return "/".join(parts_a[-count:]), "/".join(parts_b[-count:])
+    return folder_a.resolve().name, folder_b.resolve().name
+
+
+def read_final_layout(folder: Path, name: str | None = None) -> FinalLayout:
     """Read the last layout of a run from its results.
 
-    The rooms come from the tables, the map from the annotated MCAP or else from the log itself; the walls,
-    which no table holds, are found in it once more by the run's parameters.
+    The run is called by the folder's name unless told otherwise. The rooms come from the tables, the map from
+    the annotated MCAP or else from the log itself; the walls, which no table holds, are found in it once more
+    by the run's parameters.
 
     Raises
     ------
@@ -116,7 +127,7 @@ def read_final_layout(folder: Path) -> FinalLayout:
     if not np.isclose(analysis.free_area_m2, last["free_area_m2"]):
         raise LogError(f"{folder}: {log} does not hold the map that the results are of; analyze it again")
     return FinalLayout(
-        name=folder.resolve().name,
+        name=name or folder.resolve().name,
         map=PlacedMap(snapshot, parameters.occupancy),
         tracks=tuple(row["track"] for row in rooms),
         shapes=tuple(shapely.from_wkb([row["polygon_wkb"] for row in rooms])),

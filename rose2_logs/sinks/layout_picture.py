@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import shapely
@@ -15,6 +15,7 @@ from shapely.geometry.base import BaseGeometry
 from rose2_logs.layouts.room_changes import RoomStatus
 from rose2_logs.layouts.wall_changes import WallStatus
 from rose2_logs.occupancy import UNKNOWN, FloatArray, GridGeometry, known_window
+from rose2_logs.sinks.comparison_picture import text_line
 from rose2_logs.sinks.palette import track_colour
 from rose2_logs.tracking.alignment import RigidMotion
 from rose2_logs.tracking.matching import resample_labels
@@ -26,12 +27,12 @@ if TYPE_CHECKING:
 Image = NDArray[np.uint8]
 Colour = tuple[int, int, int]
 
-SIDE_PX = 900
-"""Longer side of a panel."""
+SIDE_PX = 1000
+"""Longer side of the panel of what differs; the layouts are drawn half as large."""
 MARGIN_M = 0.5
 GAP_PX, TEXT_PX, TITLE_PX, NUMBER_PX = 14, 18, 22, 16
 WIDE = 1.6
-"""Width over height from which panels stand above each other and not side by side."""
+"""Width over height from which the layouts stand above what differs and not beside it."""
 ROOM_OPACITY = 0.6
 STRIPE_PX, STRIPE_EVERY_PX = 3, 12
 LINE_PX = 5
@@ -69,25 +70,36 @@ def draw_layout_comparison(comparison: LayoutComparison) -> Image:
         RGB, row 0 at the top as in the world. Rooms that belong together have one colour in A and B.
     """
     b_to_a = comparison.placement.motion
-    canvas = _Canvas(comparison)
-    still = RigidMotion.none()
-    panels = [
-        canvas.layout(comparison.a, still, [change.tracks_a for change in comparison.rooms]),
-        canvas.layout(comparison.b, b_to_a, [change.tracks_b for change in comparison.rooms]),
-        canvas.differences(comparison),
+    large, small = _Canvas(comparison, SIDE_PX), _Canvas(comparison, (SIDE_PX - GAP_PX) // 2)
+    found = _captioned("what differs", large.differences(comparison))
+    layouts = [
+        _captioned(f"A: {comparison.a.name}", small.layout(comparison.a, RigidMotion.none(), "tracks_a")),
+        _captioned(f"B: {comparison.b.name}, laid over A", small.layout(comparison.b, b_to_a, "tracks_b")),
     ]
-    captions = (f"A: {comparison.a.name}", f"B: {comparison.b.name}, laid over A", "what differs")
-    captioned = [
-        np.concatenate([_text_line(text, panel.shape[1], TEXT_PX), panel])
-        for text, panel in zip(captions, panels, strict=True)
-    ]
-    height, width = panels[0].shape[:2]
-    axis = 0 if width > WIDE * height else 1
-    gap_shape = (GAP_PX, width, 3) if axis == 0 else (captioned[0].shape[0], GAP_PX, 3)
-    gap = np.full(gap_shape, 255, np.uint8)
-    sheet = np.concatenate([captioned[0], gap, captioned[1], gap, captioned[2]], axis=axis)
-    title = _text_line(_title(comparison), sheet.shape[1], TITLE_PX)
+    height, width = found.shape[:2]
+    if width > WIDE * height:
+        sheet = _joined([_joined(layouts, axis=1), found], axis=0)
+    else:
+        sheet = _joined([found, _joined(layouts, axis=0)], axis=1)
+    title = text_line(_title(comparison), sheet.shape[1], TITLE_PX)
     return np.concatenate([title, sheet, _legend(comparison, sheet.shape[1])])
+
+
+def _captioned(text: str, panel: Image) -> Image:
+    return np.concatenate([text_line(text, panel.shape[1], TEXT_PX), panel])
+
+
+def _joined(images: Sequence[Image], axis: int) -> Image:
+    """Put pictures one after the other with a gap, below (0) or beside (1) each other."""
+    across = 1 - axis
+    most = max(image.shape[across] for image in images)
+    parts = []
+    for number, image in enumerate(images):
+        after = [(0, 0), (0, 0), (0, 0)]
+        after[across] = (0, most - image.shape[across])
+        after[axis] = (GAP_PX if number else 0, 0)
+        parts.append(np.pad(image, after, constant_values=255))
+    return np.concatenate(parts, axis=axis)
 
 
 def _title(comparison: LayoutComparison) -> str:
@@ -100,18 +112,22 @@ def _title(comparison: LayoutComparison) -> str:
 class _Canvas:
     """The part of A's frame that holds both layouts, as pixels."""
 
-    def __init__(self, comparison: LayoutComparison) -> None:
+    def __init__(self, comparison: LayoutComparison, side_px: int) -> None:
+        self._changes = comparison.rooms
         a, b, motion = comparison.a, comparison.b, comparison.placement.motion
         corners = np.concatenate([_known_corners(a), motion.points(_known_corners(b))])
         low, high = corners.min(axis=0) - MARGIN_M, corners.max(axis=0) + MARGIN_M
-        cell = float((high - low).max()) / SIDE_PX
+        cell = float((high - low).max()) / side_px
         columns, rows = np.ceil((high - low) / cell).astype(int).tolist()
         x, y = low.tolist()
         self._geometry = GridGeometry(cell, (x, y), 0.0, "a", (rows, columns))
 
-    def layout(self, layout: FinalLayout, motion: RigidMotion, groups: list[tuple[int, ...]]) -> Image:
-        """Draw a layout with its rooms in the colours of their groups, with their numbers."""
+    def layout(
+        self, layout: FinalLayout, motion: RigidMotion, tracks_of: Literal["tracks_a", "tracks_b"]
+    ) -> Image:
+        """Draw a layout with its rooms in the colours of what they belong to, with their numbers."""
         image = self._map(layout, motion)
+        groups = [getattr(change, tracks_of) for change in self._changes]
         group_of = {track: number for number, tracks in enumerate(groups, start=1) for track in tracks}
         named = sorted(zip(layout.tracks, layout.shapes_moved(motion), strict=True), key=lambda each: each[0])
         for track, shape in named:
@@ -208,12 +224,6 @@ def _pair_name(tracks_a: tuple[int, ...], tracks_b: tuple[int, ...]) -> str:
 def _known_corners(layout: FinalLayout) -> FloatArray:
     snapshot = layout.map.snapshot
     return snapshot.geometry.part(known_window(snapshot.cells != UNKNOWN)).corners_m()
-
-
-def _text_line(text: str, width: int, size_px: float) -> Image:
-    from rose2_logs.sinks.comparison_picture import text_line
-
-    return text_line(text, width, size_px)
 
 
 def _legend(comparison: LayoutComparison, width: int) -> Image:
