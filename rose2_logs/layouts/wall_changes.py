@@ -1,6 +1,7 @@
 """Which walls of two layouts are missing, new or moved.
 
-A wall is told to be gone only where the other map shows free space in its place: not where it was never seen.
+A wall is told to be gone only where the other map shows free space in its place and on both its sides: not
+where it was never seen, nor where the view ended before it.
 """
 
 from __future__ import annotations
@@ -134,16 +135,21 @@ def _look_up(
     placed = to_other.points(points)
     reach_m = max(own.map.reach_m, other.map.reach_m)
     on = other.map.on_wall(placed, reach_m)
-    free = other.map.is_free(placed) & ~on
+    start, end = walls.segments_m[segment, :2], walls.segments_m[segment, 2:]
+    forward = (end - start) / np.maximum(np.linalg.norm(end - start, axis=1), 1e-9)[:, None]
+    aside = reach_m * np.column_stack([-forward[:, 1], forward[:, 0]])
+    free = ~on
+    for seen in (points, points + aside, points - aside):
+        free &= other.map.is_free(to_other.points(seen))
     cluster = _clusters(walls)[segment]
     gone = []
     compared = kept = 0
     for each in np.unique(cluster).tolist():
         chosen = cluster == each
         longest = _longest(walls.segments_m[np.unique(segment[chosen])])
-        ends, seen, there = _stretches(points[chosen], on[chosen], free[chosen], longest, reach_m)
-        gone.append(ends)
-        compared, kept = compared + seen, kept + there
+        stretches, told, there = _stretches(points[chosen], on[chosen], free[chosen], longest, reach_m)
+        gone.append(stretches)
+        compared, kept = compared + told, kept + there
     return np.concatenate(gone), compared * STEP_M, kept * STEP_M
 
 
