@@ -40,6 +40,8 @@ EXPLORED_MIN_SHARE = 0.5
 """A room is missing where the other run has explored most of its place."""
 SAMPLE_M = 0.1
 """What is explored is looked up every so many metres: two cells of usual maps."""
+SAMPLES_MOST = 250_000
+"""Most points that are looked up for one room; they are further apart in larger halls than 50 m by 50 m."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,7 +176,8 @@ def _explored(
     if whole.is_empty:
         return None, 0.0
     low, high = np.reshape(whole.bounds, (2, 2))
-    x, y = (np.arange(start + SAMPLE_M / 2, end, SAMPLE_M) for start, end in zip(low, high, strict=True))
+    step_m = max(SAMPLE_M, float(np.sqrt(np.prod(high - low) / SAMPLES_MOST)))
+    x, y = (np.arange(start + step_m / 2, end, step_m) for start, end in zip(low, high, strict=True))
     points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     inside_a, inside_b = (shapely.contains_xy(shape, points) for shape in (shape_a, shape_b))
     inside = inside_a | inside_b

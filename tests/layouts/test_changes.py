@@ -134,3 +134,11 @@ def test_a_method_without_walls_compares_rooms(office):
     assert found.walls is None
     assert room_at(other, CORRIDOR)
     assert found.floor_iou > 0.8
+
+
+def test_a_run_without_rooms_is_compared(office):
+    """All rooms of the other one are missing, or new; also two without any."""
+    without = dataclasses.replace(office, tracks=(), shapes=(), areas_m2=np.zeros(0))
+    assert compare_layouts(office, without).room_counts == {"missing": 3}
+    assert compare_layouts(without, office).room_counts == {"new": 3}
+    assert compare_layouts(without, without).room_counts == {}
