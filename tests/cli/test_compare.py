@@ -16,6 +16,7 @@ from PIL import Image
 from saved_maps import FREE, UNKNOWN, WALL, save_map
 
 from rose2_logs.cli import main
+from rose2_logs.cli_options import state
 
 BIN = Path(sys.executable).parent
 
@@ -26,6 +27,7 @@ def cli(monkeypatch, capfd):
 
     def run(*arguments: object) -> tuple[int, str, str]:
         monkeypatch.setattr(sys, "argv", ["rose2-logs", *map(str, arguments)])
+        monkeypatch.setitem(state, "debug", False)
         with pytest.raises(SystemExit) as ended:
             main()
         out, err = capfd.readouterr()
