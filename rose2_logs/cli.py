@@ -14,7 +14,7 @@ from typing import Annotated
 
 import typer
 
-from rose2_logs import __version__, cli_batch, cli_results
+from rose2_logs import __version__, cli_batch, cli_compare, cli_results
 from rose2_logs.cli_options import (
     EXIT_FAULT,
     EXIT_INTERRUPTED,
@@ -220,6 +220,9 @@ app.command(epilog=cli_batch.SERVE_EXAMPLE)(cli_batch.serve)
 app.command(epilog=cli_results.REPORT_EXAMPLE)(cli_results.report)
 app.command(epilog=cli_results.FIGURE_EXAMPLE)(cli_results.figure)
 app.command(epilog=cli_results.EXPORT_EXAMPLE)(cli_results.export)
+
+
+app.command(epilog=cli_compare.EXAMPLE)(cli_compare.compare)
 
 
 @app.command(epilog="Example: [bold]rose2-logs segment map.png --resolution 0.05 -o rooms[/bold]")

@@ -35,6 +35,11 @@ _NULLABLE = frozenset(
         "shape_right_time_s",
         "shape_right_coverage",
         "shape_right_seen_share",
+        "explored_iou",
+        "shape_a_wkb",
+        "shape_b_wkb",
+        "shift_m",
+        *(f"{layout}_{end}_m" for layout in "ab" for end in ("x0", "y0", "x1", "y1")),
     }
 )
 
@@ -208,3 +213,47 @@ TRACKS = _table(
     },
     {"geo": json.dumps(GEOPARQUET, sort_keys=True)},
 )
+
+ROOM_CHANGES = _table(
+    {
+        "status": (
+            pa.string(),
+            "same, partly seen, changed, split, merged, regrouped, missing, new or unseen",
+        ),
+        "tracks_a": (pa.list_(pa.int32()), "tracks of the rooms of A, ascending; none for a new room"),
+        "tracks_b": (pa.list_(pa.int32()), "tracks of the rooms of B, ascending; none for a missing room"),
+        "iou": (pa.float64(), "intersection over union of A's and B's shapes, share"),
+        "explored_iou": (
+            pa.float64(),
+            "the same where both runs have explored, share; null where they nowhere have",
+        ),
+        "explored_share": (pa.float64(), "share of the place of both shapes that both runs have explored"),
+        "area_a_m2": (pa.float64(), "area in A as far as it was seen, square metres"),
+        "area_b_m2": (pa.float64(), "area in B as far as it was seen, square metres"),
+        "predicted_area_a_m2": (pa.float64(), "area of A's shape, with the predicted part, square metres"),
+        "predicted_area_b_m2": (pa.float64(), "area of B's shape, with the predicted part, square metres"),
+        "shape_a_wkb": (
+            pa.binary(),
+            "shape in A with the predicted part, well-known binary, A's frame, metres",
+        ),
+        "shape_b_wkb": (pa.binary(), "shape in B, likewise, also in A's frame"),
+    },
+)
+"""Rooms of two layouts, of `compare`."""
+
+WALL_CHANGES = _table(
+    {
+        "status": (pa.string(), "missing, new or moved"),
+        "length_m": (pa.float64(), "length of the stretch, of a moved wall the longer of the two, metres"),
+        "shift_m": (pa.float64(), "of a moved wall, how far it is from where it was, across it, metres"),
+        "a_x0_m": (pa.float64(), "x of one end in A, A's frame, metres; null for a new wall"),
+        "a_y0_m": (pa.float64(), "y of it"),
+        "a_x1_m": (pa.float64(), "x of the other end in A"),
+        "a_y1_m": (pa.float64(), "y of it"),
+        "b_x0_m": (pa.float64(), "x of one end in B, A's frame, metres; null for a missing wall"),
+        "b_y0_m": (pa.float64(), "y of it"),
+        "b_x1_m": (pa.float64(), "x of the other end in B"),
+        "b_y1_m": (pa.float64(), "y of it"),
+    }
+)
+"""Walls that differ between two layouts, of `compare`."""

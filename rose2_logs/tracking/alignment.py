@@ -118,7 +118,7 @@ class MapAligner:
     def __init__(self, tracking: TrackingParameters, occupancy: OccupancyParameters | None = None) -> None:
         self._tracking = tracking
         self._occupancy = occupancy or OccupancyParameters()
-        self._before: _Walls | None = None
+        self._before: WallSample | None = None
 
     def update(self, snapshot: OccupancySnapshot) -> RigidMotion | None:
         """Take the next map of the run.
@@ -134,11 +134,11 @@ class MapAligner:
             The motion, in the world frame, of what both maps show; None where it is less than `shift_min_m`
             on average, or the walls do not tell.
         """
-        points = _wall_points(snapshot, self._occupancy)
+        points = wall_points(snapshot, self._occupancy)
         before, self._before = self._before, None
         if len(points) < POINTS_MIN:
             return None
-        fit = _Fit(points, snapshot.geometry.resolution_m)
+        fit = WallFit(points, snapshot.geometry.resolution_m)
         self._before = fit.sample()
         if before is None:
             return None
@@ -147,7 +147,7 @@ class MapAligner:
         return motion if moved >= self._tracking.shift_min_m else None
 
 
-def _wall_points(snapshot: OccupancySnapshot, parameters: OccupancyParameters) -> FloatArray:
+def wall_points(snapshot: OccupancySnapshot, parameters: OccupancyParameters) -> FloatArray:
     """World centres (N, 2) of the occupied cells beside free ones: the faces of walls."""
     free, occupied = classify(snapshot.cells, parameters)
     return snapshot.geometry.cell_centres(*np.nonzero(occupied & _beside(free)))
@@ -163,21 +163,22 @@ def _beside(mask: BoolArray) -> BoolArray:
     return beside
 
 
-def _evenly(points: FloatArray, most: int) -> FloatArray:
+def evenly(points: FloatArray, most: int) -> FloatArray:
+    """Take at most so many points (N, 2), evenly."""
     if len(points) <= most:
         return points
     return points[np.linspace(0, len(points) - 1, most).astype(np.intp)]
 
 
 @dataclass(frozen=True, eq=False)
-class _Walls:
+class WallSample:
     """Points (N, 2) of walls in world metres, and a unit vector (N, 2) across the wall at each."""
 
     points: FloatArray
     across: FloatArray
 
 
-class _Fit:
+class WallFit:
     """The walls of a map, which those of another are laid over."""
 
     def __init__(self, points: FloatArray, resolution_m: float) -> None:
@@ -187,17 +188,17 @@ class _Fit:
         self._tree: cKDTree = cKDTree(points)
         self._gates = tuple(max(gate, GATE_MIN_CELLS * resolution_m) for gate in GATES_M)
 
-    def sample(self) -> _Walls:
+    def sample(self) -> WallSample:
         """Some of the walls, to be laid over those of the next map."""
-        points = _evenly(self._points, POINTS_MAX)
+        points = evenly(self._points, POINTS_MAX)
         _, nearest = self._tree.query(points, k=NEIGHBOURS)
         around = self._points[nearest] - self._points[nearest].mean(axis=1, keepdims=True)
         x, y = around[..., 0], around[..., 1]
         # The direction of the greatest spread is that of the wall.
         along = np.arctan2(2 * (x * y).sum(axis=1), (x * x - y * y).sum(axis=1)) / 2
-        return _Walls(points, np.stack([-np.sin(along), np.cos(along)], axis=1))
+        return WallSample(points, np.stack([-np.sin(along), np.cos(along)], axis=1))
 
-    def best(self, walls: _Walls, parameters: TrackingParameters) -> RigidMotion:
+    def best(self, walls: WallSample, parameters: TrackingParameters) -> RigidMotion:
         """Motion of walls that brings most of them to walls; staying unless another is better."""
         points = walls.points
         centre = points.mean(axis=0)
@@ -205,11 +206,11 @@ class _Fit:
         least = max(self.share(points, staying) + BETTER_SHARE, parameters.shift_min_share)
         if least > 1:
             return staying
-        fitted = self._settled(walls, staying)
+        fitted = self.settled(walls, staying)
         share = self.share(points, fitted)
         if share < SURE_SHARE:
             for start in self._search(points, centre, parameters):
-                other = self._settled(walls, start)
+                other = self.settled(walls, start)
                 if (found := self.share(points, other)) > share:
                     fitted, share = other, found
         return fitted if share >= least else staying
@@ -219,7 +220,7 @@ class _Fit:
         distance, _ = self._tree.query(motion.points(points), distance_upper_bound=self._gates[-1])
         return float(np.isfinite(distance).mean())
 
-    def _settled(self, walls: _Walls, motion: RigidMotion) -> RigidMotion:
+    def settled(self, walls: WallSample, motion: RigidMotion) -> RigidMotion:
         """Fit wall to nearest wall in turns (ICP), the far ones with little weight (Tukey's biweight).
 
         Only the distance across the wall counts: along a wall, cells match at every step of the raster.
@@ -249,7 +250,7 @@ class _Fit:
     ) -> list[RigidMotion]:
         """Best starts among all shifts and turns within reach: correlation with the distance to walls."""
         nearness, low = self._nearness(parameters.shift_search_m)
-        chosen = _evenly(points, SEARCH_POINTS)
+        chosen = evenly(points, SEARCH_POINTS)
         radius = max(float(np.linalg.norm(chosen - centre, axis=1).max()), SEARCH_STEP_M)
         shifts = _steps(parameters.shift_search_m, SEARCH_STEP_M)
         turns = _steps(parameters.shift_search_rad, SEARCH_STEP_M / radius)

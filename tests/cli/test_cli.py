@@ -17,7 +17,9 @@ from rose2_logs import __version__
 from rose2_logs.cli import main
 from rose2_logs.sinks.label_image import write_label_image
 
-VERBS = ("info", "analyze", "batch", "view", "serve", "report", "figure", "export", "segment", "evaluate")
+VERBS = (
+    "info", "analyze", "batch", "view", "serve", "report", "figure", "export", "compare", "segment", "evaluate"
+)  # fmt: skip
 
 
 @pytest.fixture

@@ -1,0 +1,180 @@
+"""Two folders of results to what differs between their last layouts: tables, summary, picture, recording."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import shapely
+
+from rose2_logs.errors import LogError, OutputError, ParameterError
+from rose2_logs.layouts.comparison import LayoutComparison, compare_layouts
+from rose2_logs.layouts.layout import FinalLayout
+from rose2_logs.layouts.placing import PlacedMap
+from rose2_logs.occupancy import OccupancySnapshot
+from rose2_logs.parameters import Parameters
+from rose2_logs.pipeline import analyse
+from rose2_logs.readers import Selection, open_log
+from rose2_logs.run import SUMMARY
+
+ANNOTATED_ENDING = ".rose2.mcap"
+FILES = (
+    "room_changes.parquet",
+    "wall_changes.parquet",
+    "comparison.json",
+    "comparison.png",
+    "comparison.rrd",
+)
+
+
+@dataclass(frozen=True)
+class ComparisonResult:
+    """What `compare_runs` found and wrote."""
+
+    comparison: LayoutComparison
+    folder: Path
+    files: tuple[Path, ...]
+
+
+def compare_runs(
+    folder_a: Path, folder_b: Path, folder: Path, *, recording: bool = True, overwrite: bool = False
+) -> ComparisonResult:
+    """Compare the last layouts of two runs and write what differs.
+
+    Parameters
+    ----------
+    folder_a, folder_b : path
+        Results of `analyse_log`; B is laid over A.
+    folder : path
+        Receives the files of `FILES`.
+    recording : bool
+        Whether to write the Rerun recording.
+    overwrite : bool
+        Whether an earlier comparison may be replaced.
+
+    Raises
+    ------
+    LogError
+        If a folder holds no results, or the last map of a run is neither there nor at its log's place, or has
+        too few walls to tell how it lies.
+    OutputError
+        If there is a comparison already and it may not be replaced, or a file cannot be written.
+    """
+    from rose2_logs.sinks.label_image import write_image
+    from rose2_logs.sinks.layout_picture import draw_layout_comparison
+    from rose2_logs.sinks.layout_tables import write_comparison_summary, write_comparison_tables
+
+    names = FILES if recording else FILES[:-1]
+    files = tuple(folder / name for name in names)
+    if not overwrite and (existing := [file for file in files if file.exists()]):
+        raise OutputError(f"{existing[0]}: exists already; choose another folder or pass --overwrite")
+    name_a, name_b = _names(folder_a, folder_b)
+    a, b = read_final_layout(folder_a, name_a), read_final_layout(folder_b, name_b)
+    comparison = compare_layouts(a, b)
+    if comparison is None:
+        few = folder_a if not a.map.can_be_placed else folder_b
+        raise LogError(f"{few}: the last map has too few walls to be laid over another")
+    write_comparison_tables(files[0], files[1], comparison)
+    write_comparison_summary(files[2], comparison, folder_a, folder_b)
+    write_image(files[3], draw_layout_comparison(comparison))
+    if recording:
+        from rose2_logs.sinks.rerun_comparison import write_comparison_recording
+
+        write_comparison_recording(files[4], comparison)
+    return ComparisonResult(comparison, folder, files)
+
+
+def _names(folder_a: Path, folder_b: Path) -> tuple[str, str]:
+    """Name two folders by as much of their ends as tells them apart."""
+    parts_a, parts_b = folder_a.resolve().parts, folder_b.resolve().parts
+    for count in range(1, max(len(parts_a), len(parts_b))):
+        if parts_a[-count:] != parts_b[-count:]:
+            return "/".join(parts_a[-count:]), "/".join(parts_b[-count:])
+    return folder_a.resolve().name, folder_b.resolve().name
+
+
+def read_final_layout(folder: Path, name: str | None = None) -> FinalLayout:
+    """Read the last layout of a run from its results.
+
+    The run is called by the folder's name unless told otherwise. The rooms come from the tables, the map from
+    the annotated MCAP or else from the log itself; the walls, which no table holds, are found in it once more
+    by the run's parameters.
+
+    Raises
+    ------
+    LogError
+        If there are no results, or the map is not to be found or is another one.
+    """
+    summary = _summary(folder)
+    try:
+        parameters = Parameters().replaced(summary["parameters"])
+        last_ns, method = int(summary["results"]["last_log_time_ns"]), str(summary["method"])
+        topic, log = str(summary["topic"]), str(summary["log"])
+        names = [str(name) for name in summary["files"]]
+    except (KeyError, TypeError, ValueError, ParameterError) as error:
+        raise LogError(
+            f"{folder / SUMMARY}: is of another version ({error}); analyze the log again"
+        ) from error
+    last, rooms = _last_rows(folder)
+    annotated = [folder / name for name in names if name.endswith(ANNOTATED_ENDING)]
+    snapshot = _last_map(
+        folder, next((path for path in annotated if path.is_file()), None), log, topic, last_ns
+    )
+    analysis = analyse(snapshot, parameters, method)
+    if not np.isclose(analysis.free_area_m2, last["free_area_m2"]):
+        raise LogError(f"{folder}: {log} does not hold the map that the results are of; analyze it again")
+    return FinalLayout(
+        name=name or folder.resolve().name,
+        map=PlacedMap(snapshot, parameters.occupancy),
+        tracks=tuple(row["track"] for row in rooms),
+        shapes=tuple(shapely.from_wkb([row["polygon_wkb"] for row in rooms])),
+        areas_m2=np.array([row["area_m2"] for row in rooms], float),
+        walls=analysis.walls,
+    )
+
+
+def _summary(folder: Path) -> dict[str, Any]:
+    path = folder / SUMMARY
+    if not path.is_file():
+        inside = sorted(found.parent for found in folder.glob(f"*/{SUMMARY}")) if folder.is_dir() else []
+        hint = f"; did you mean {inside[0]}?" if inside else "; analyze writes such a folder for each log"
+        raise LogError(f"{folder}: holds no results of analyze{hint}")
+    try:
+        summary = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise LogError(f"{path}: cannot be read: {error}") from error
+    if not isinstance(summary, dict):
+        raise LogError(f"{path}: is no summary of analyze")
+    return summary
+
+
+def _last_rows(folder: Path) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+    """Rows of the last snapshot and of its rooms."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        snapshots = pq.read_table(folder / "snapshots.parquet", columns=["snapshot", "free_area_m2"])
+        last = snapshots.slice(snapshots.num_rows - 1).to_pylist()[0]
+        columns = ["track", "area_m2", "polygon_wkb"]
+        chosen = [("snapshot", "=", last["snapshot"])]
+        rooms = pq.read_table(folder / "rooms.parquet", columns=columns, filters=chosen).to_pylist()
+    except (OSError, pa.ArrowException, IndexError) as error:
+        raise LogError(f"{folder}: its tables cannot be read: {error}") from error
+    return last, rooms
+
+
+def _last_map(folder: Path, annotated: Path | None, log: str, topic: str, last_ns: int) -> OccupancySnapshot:
+    try:
+        with open_log(annotated or log, topic=topic, selection=Selection(last_ns, last_ns)) as reader:
+            return reader.last()
+    except LogError as error:
+        if annotated is not None:
+            raise
+        raise LogError(
+            f"{folder}: holds no annotated MCAP, and the last map cannot be read from the log ({error}); "
+            "analyze it again without --no-mcap"
+        ) from error

@@ -1,0 +1,125 @@
+"""`rose2-logs compare` on results of the real command: what it writes, prints and refuses."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+import shapely
+from numpy.typing import NDArray
+from PIL import Image
+from saved_maps import FREE, UNKNOWN, WALL, save_map
+
+from rose2_logs.cli import main
+from rose2_logs.cli_options import state
+
+BIN = Path(sys.executable).parent
+
+
+@pytest.fixture
+def cli(monkeypatch, capfd):
+    """Run the command line; returns exit code, stdout and stderr."""
+
+    def run(*arguments: object) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["rose2-logs", *map(str, arguments)])
+        monkeypatch.setitem(state, "debug", False)
+        with pytest.raises(SystemExit) as ended:
+            main()
+        out, err = capfd.readouterr()
+        return int(ended.value.code or 0), out, err
+
+    return run
+
+
+def three_rooms() -> NDArray[np.uint8]:
+    """Grey image of three rooms, 4, 6 and 8 m long and 5 m wide, with doors of 1 m between them."""
+    image = np.full((120, 400), UNKNOWN, np.uint8)
+    left = 10
+    for length in (80, 120, 160):
+        image[8:112, left : left + length + 4] = WALL
+        image[10:110, left + 2 : left + length + 2] = FREE
+        left += length + 2
+    for x in (92, 214):
+        image[70:90, x - 4 : x + 4] = FREE
+    return image
+
+
+@pytest.fixture
+def results(cli, tmp_path: Path) -> tuple[Path, Path]:
+    """Results of two runs: three rooms; then upside down, two of them joined, the third seen in part."""
+    image = three_rooms()
+    before = save_map(tmp_path / "maps", "before", image)
+    image[10:110, 88:98] = FREE
+    image[:, 280:] = UNKNOWN
+    after = save_map(tmp_path / "maps", "after", image[::-1, ::-1].copy())
+    assert cli("analyze", before, after, "-o", tmp_path / "results", "--no-rrd")[0] == 0
+    return tmp_path / "results" / "before", tmp_path / "results" / "after"
+
+
+def test_compare_tells_what_differs(cli, results, tmp_path: Path):
+    """The second map is laid over the first; the first two rooms are one now, the third was half seen."""
+    code, out, err = cli("compare", *results, "-o", tmp_path / "out")
+    assert (code, err) == (0, "")
+    assert "1 partly seen, 1 merged" in out
+    summary = json.loads((tmp_path / "out" / "comparison.json").read_text())
+    assert summary["same_building"]
+    assert abs(summary["b_in_a"]["yaw_rad"]) == pytest.approx(3.1416, abs=0.01)
+    assert summary["rooms"] == {"partly seen": 1, "merged": 1}
+    seen, merged = pq.read_table(tmp_path / "out" / "room_changes.parquet").to_pylist()
+    assert (len(merged["tracks_a"]), len(merged["tracks_b"])) == (2, 1)
+    assert (len(seen["tracks_a"]), len(seen["tracks_b"])) == (1, 1)
+    assert seen["explored_iou"] > 0.9 > 0.7 > seen["explored_share"]
+    # In the frame of the first run, whose map begins at 1, 2.
+    assert shapely.from_wkb(merged["shape_b_wkb"]).bounds == pytest.approx((1.5, 2.4, 11.7, 7.6), abs=0.3)
+    assert shapely.from_wkb(seen["shape_a_wkb"]).bounds == pytest.approx((11.7, 2.4, 19.8, 7.6), abs=0.3)
+    walls = pq.read_table(tmp_path / "out" / "wall_changes.parquet").to_pylist()
+    missing = [row["length_m"] for row in walls if row["status"] == "missing"]
+    # Five metres with a door of one.
+    assert sum(missing) == pytest.approx(4, abs=0.6)
+    with Image.open(tmp_path / "out" / "comparison.png") as picture:
+        assert picture.width >= 900
+    verified = subprocess.run(
+        [BIN / "rerun", "rrd", "verify", tmp_path / "out" / "comparison.rrd"],
+        capture_output=True,
+        check=False,
+    )
+    assert verified.returncode == 0
+
+
+def test_the_same_comparison_gives_the_same_tables(cli, results, tmp_path: Path):
+    """Byte for byte."""
+    for name in ("one", "two"):
+        assert cli("compare", *results, "-o", tmp_path / name, "--no-rrd")[0] == 0
+    for table in ("room_changes.parquet", "wall_changes.parquet"):
+        assert (tmp_path / "one" / table).read_bytes() == (tmp_path / "two" / table).read_bytes()
+
+
+def test_without_the_annotated_log_the_map_comes_from_the_log(cli, results, tmp_path: Path):
+    """With --no-mcap the log is read once more; where it is gone or another one, a line says so."""
+    for result in results:
+        (result / f"{result.name}.rose2.mcap").unlink()
+    assert cli("compare", *results, "-o", tmp_path / "out", "--no-rrd")[0] == 0
+    save_map(tmp_path / "maps", "before", three_rooms()[:, :150])
+    code, _, err = cli("compare", *results, "-o", tmp_path / "other", "--no-rrd")
+    assert (code, "does not hold the map" in err) == (2, True)
+    (tmp_path / "maps" / "before.yaml").unlink()
+    code, _, err = cli("compare", *results, "-o", tmp_path / "other", "--no-rrd")
+    assert (code, "--no-mcap" in err, len(err.splitlines())) == (2, True, 1)
+    assert not (tmp_path / "other").exists()
+
+
+def test_what_cannot_be_compared_is_told_in_a_line(cli, results, tmp_path: Path):
+    """No results, the folder above them, an earlier comparison."""
+    code, _, err = cli("compare", tmp_path / "nowhere", results[1], "-o", tmp_path / "out")
+    assert (code, "holds no results of analyze" in err) == (2, True)
+    code, _, err = cli("compare", results[0].parent, results[1], "-o", tmp_path / "out")
+    assert (code, f"did you mean {results[1]}" in err) == (2, True)
+    assert cli("compare", *results, "-o", tmp_path / "out", "--no-rrd")[0] == 0
+    code, _, err = cli("compare", *results, "-o", tmp_path / "out", "--no-rrd")
+    assert (code, "--overwrite" in err) == (2, True)
+    assert cli("compare", *results, "-o", tmp_path / "out", "--no-rrd", "--overwrite")[0] == 0
