@@ -10,10 +10,12 @@ from typing import Self
 
 import numpy as np
 
-from rose2_logs.errors import InvalidMapError, LogError, NoMapTopicError
+from rose2_logs.errors import LogError, NoMapTopicError
+from rose2_logs.notices import notice
 from rose2_logs.occupancy import OccupancySnapshot
 from rose2_logs.readers.map_stream import MapStream, ReadCounts
-from rose2_logs.readers.messages import is_patch_type
+from rose2_logs.readers.messages import Patch, Remark, is_patch_type
+from rose2_logs.readers.oddities import Oddities
 from rose2_logs.readers.selection import Selection, Times
 from rose2_logs.readers.source import DamagedMessageError, LoggedMap, LogInfo, MessageSource, TopicInfo
 
@@ -69,22 +71,20 @@ class LogReader:
     def snapshots(self) -> Iterator[OccupancySnapshot]:
         """Yield the selected maps in the order of log time.
 
-        A map equal to the one before is dropped and counted. One map at a time is held, and the times of the
-        topic's messages.
+        A map equal to the one before is dropped and counted, one that is damaged or contradicts itself told,
+        left out and counted. One map at a time is held, and the times of the topic's messages.
 
         Raises
         ------
         LogError
             If no map of the topic lies in the time range, or none can be read any more.
-        InvalidMapError
-            If a map contradicts itself; the text names the file, the message and the topic.
         """
         times = self._times_in_range()
         chosen = self._selection.thin(np.unique(times))
         taken = int(np.isin(times, chosen).sum())
         self.counts = ReadCounts(messages=len(times), skipped=len(times) - taken)
         snapshot = None
-        for snapshot in self._read(chosen, self.counts, self._selection.min_change_m2):
+        for snapshot in self._read(chosen, self.counts, self._selection.min_change_m2, tell=True):
             yield snapshot
         if snapshot is None:
             raise self._no_map(self.counts)
@@ -94,7 +94,7 @@ class LogReader:
 
         Raises
         ------
-        LogError, InvalidMapError
+        LogError
             As `snapshots`.
         """
         counts = ReadCounts()
@@ -110,7 +110,7 @@ class LogReader:
 
         Raises
         ------
-        LogError, InvalidMapError
+        LogError
             As `snapshots`.
         """
         counts = ReadCounts()
@@ -122,24 +122,42 @@ class LogReader:
         raise self._no_map(counts)
 
     def _read(
-        self, chosen: Times, counts: ReadCounts, min_change_m2: float | None = None
+        self, chosen: Times, counts: ReadCounts, min_change_m2: float | None = None, *, tell: bool = False
     ) -> Iterator[OccupancySnapshot]:
-        """Yield the distinct maps as they stand at the `chosen` times (sorted)."""
+        """Yield the distinct maps as they stand at the `chosen` times (sorted); `tell` what is odd."""
         wanted = set(chosen.tolist())
         stream = MapStream(self.topic, counts, min_change_m2)
+        oddities = Oddities()
         for message in self._source.read(self._topics, self._needed(chosen)):
             is_wanted = message.log_time_ns in wanted
+            remarks: tuple[Remark, ...] = ()
             try:
-                stream.apply(message.decode())
-            except DamagedMessageError as error:
-                if not counts.damaged:
-                    logger.warning("%s: %s; reading goes on without it", self._place(message), error)
-                counts.damaged += is_wanted
+                decoded = message.decode()
+                if isinstance(decoded, Patch) and stream.is_empty:
+                    remarks = (Remark("patch_without_map", "a patch without a map before it; left out"),)
+                else:
+                    remarks = oddities.of(decoded)
+                stream.apply(decoded)
+            except LogError as error:
+                is_damaged = isinstance(error, DamagedMessageError)
+                counts.damaged += is_wanted and is_damaged
+                counts.invalid += is_wanted and not is_damaged
+                if message.topic == self.topic:
+                    stream.forget()
+                kind = "damaged_message" if is_damaged else "invalid_map"
+                self._tell(message, Remark(kind, f"{error}; it is left out"), tell)
                 continue
-            except InvalidMapError as error:
-                raise InvalidMapError(f"{self._place(message)}: {error}") from error
+            for remark in remarks:
+                self._tell(message, remark, tell)
             if is_wanted and (snapshot := stream.snapshot(message.log_time_ns)) is not None:
                 yield snapshot
+
+    def _tell(self, message: LoggedMap, remark: Remark, tell: bool) -> None:
+        if tell:
+            total = len(self._source.log_times(message.topic))
+            place = f"{self.info.path}: message {message.number} of {total} on {message.topic}"
+            text = f"{place}: {remark.text}"
+            notice(logger, remark.kind, text, file=message.file, topic=message.topic, index=message.number)
 
     def _needed(self, chosen: Times) -> Times:
         """Times of the messages that the maps at the `chosen` times are made of.
@@ -169,16 +187,14 @@ class LogReader:
             )
         return in_range
 
-    def _place(self, message: LoggedMap) -> str:
-        times = self._source.log_times(message.topic)
-        number = int(np.searchsorted(times, message.log_time_ns)) + 1
-        return f"{self.info.path}: message {number} of {len(times)} on {message.topic}"
-
     def _no_map(self, counts: ReadCounts) -> LogError:
         why = f"; {counts.damaged} messages are damaged" if counts.damaged else ""
+        why += f"; {counts.invalid} maps contradict themselves" if counts.invalid else ""
         return LogError(
             f"{self.info.path}: no message on {self.topic} in the time range holds a map{why}; "
-            "choose another topic or time range"
+            "choose another topic or time range",
+            file=self.info.path,
+            topic=self.topic,
         )
 
 
@@ -190,6 +206,7 @@ def choose_topic(info: LogInfo, asked: str | None = None) -> str:
     NoMapTopicError
         If there is none, or there are several and none was asked for; the text lists them.
     """
+    where = str(info.path) if info.whole else f"{info.path}: is damaged; of what can be read of it"
     maps = {topic.name: topic for topic in info.topics if topic.is_map}
     listed = ", ".join(maps)
     if asked is not None:
@@ -201,12 +218,12 @@ def choose_topic(info: LogInfo, asked: str | None = None) -> str:
     if not maps:
         others = ", ".join(sorted({topic.message_type for topic in info.topics})[:MOST_LISTED]) or "nothing"
         raise NoMapTopicError(
-            f"{info.path}: no topic holds occupancy grids (nav_msgs/OccupancyGrid); it holds {others}; "
+            f"{where}: no topic holds occupancy grids (nav_msgs/OccupancyGrid); it holds {others}; "
             "record the topic of the mapping node, often /map, as well"
         )
     filled = {name: topic for name, topic in maps.items() if topic.message_count != 0}
     if not filled:
-        raise NoMapTopicError(f"{info.path}: no message was recorded on the map topics {listed}")
+        raise NoMapTopicError(f"{where}: no message was recorded on the map topics {listed}")
     for name in filled:
         if name.lstrip("/") == PREFERRED_TOPIC:
             return name

@@ -198,7 +198,11 @@ def write_mcap(
 
 
 def write_bag(
-    path: Path, logged: Sequence[Logged], *, compression: str = "NONE", schemas: dict[str, bytes] | None = None
+    path: Path,
+    logged: Sequence[Logged],
+    *,
+    compression: str = "NONE",
+    schemas: dict[str, bytes] | None = None,
 ) -> Path:
     """Write a ROS 1 bag, a chunk for each message."""
     writer = rosbag1.Writer(path)
@@ -309,7 +313,11 @@ def spoilt(**claims: Any) -> Callable[[], list[Logged]]:
 
     def made() -> list[Logged]:
         return [
-            (topic, time, replace(message, **claims) if k == 2 * FAULTY and isinstance(message, Grid) else message)
+            (
+                topic,
+                time,
+                replace(message, **claims) if k == 2 * FAULTY and isinstance(message, Grid) else message,
+            )
             for k, (topic, time, message) in enumerate(run())
         ]
 
@@ -397,7 +405,11 @@ MESSAGE_FAULTS: dict[str, Callable[[], list[Logged]]] = {
     "patch before the first map": lambda: [_patch(0, 0, -1), *run()],
     "patch outside the map": lambda: _with((3, _patch(88, 0, 1.2))),
     "patch at negative cells": lambda: _with((3, _patch(-2, -1, 1.2))),
-    "patch after a map that is left out": lambda: [*spoilt(resolution=NAN)()[:5], _patch(1, 1, 2.2), *run()[5:]],
+    "patch after a map that is left out": lambda: [
+        *spoilt(resolution=NAN)()[:5],
+        _patch(1, 1, 2.2),
+        *run()[5:],
+    ],
     "maps of 1 x 1": lambda: _maps(*(np.full((1, 1), k, np.int8) for k in range(3))),
     "all maps unknown": lambda: _maps(*(np.full((40, 40 + k), -1) for k in range(3))),
     "all maps occupied": lambda: _maps(*(np.full((40, 40 + k), 100) for k in range(3))),
@@ -510,5 +522,8 @@ def png_claiming(width: int, height: int, rows: bytes) -> bytes:
 
     head = struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)
     return (
-        b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b"")
+        b"\x89PNG\r\n\x1a\n"
+        + chunk(b"IHDR", head)
+        + chunk(b"IDAT", zlib.compress(rows))
+        + chunk(b"IEND", b"")
     )
