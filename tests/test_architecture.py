@@ -12,6 +12,7 @@ PACKAGE = Path(__file__).parents[1] / "rose2_logs"
 ORDER = (
     "__init__",
     "errors",
+    "notices",
     "files",
     "parcels",
     "workers",

@@ -237,8 +237,8 @@ class BagFile(LogFile):
                 with suppress(*_DAMAGE):
                     self._take_connection(head, self._data(head))
             begin = head.end
-        if begin > self._size:
-            reason = "a record is not whole"
+        if begin > self._size or begin == len(MAGIC):
+            reason = reason or "a record is not whole"
         if reason:
             self.whole = False
             text = f"{self.path}: cut off or damaged ({reason}) after {min(begin, self._size)} bytes; "

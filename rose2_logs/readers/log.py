@@ -10,7 +10,7 @@ from typing import Self
 
 import numpy as np
 
-from rose2_logs.errors import LogError, NoMapTopicError
+from rose2_logs.errors import InvalidMapError, LogError, NoMapTopicError
 from rose2_logs.notices import notice
 from rose2_logs.occupancy import OccupancySnapshot
 from rose2_logs.readers.map_stream import MapStream, ReadCounts
@@ -50,6 +50,7 @@ class LogReader:
         self.counts = ReadCounts()
         self._source = source
         self._selection = selection
+        self._first_failure: str | None = None
         self._topics = [self.topic] + [
             item.name
             for item in self.info.topics
@@ -77,7 +78,7 @@ class LogReader:
         Raises
         ------
         LogError
-            If no map of the topic lies in the time range, or none can be read any more.
+            If no map of the topic lies in the time range, or none can be read.
         """
         times = self._times_in_range()
         chosen = self._selection.thin(np.unique(times))
@@ -144,6 +145,7 @@ class LogReader:
                 counts.invalid += is_wanted and not is_damaged
                 if message.topic == self.topic:
                     stream.forget()
+                self._first_failure = self._first_failure or f"{self._place(message)}: {error}"
                 kind = "damaged_message" if is_damaged else "invalid_map"
                 self._tell(message, Remark(kind, f"{error}; it is left out"), tell)
                 continue
@@ -152,11 +154,13 @@ class LogReader:
             if is_wanted and (snapshot := stream.snapshot(message.log_time_ns)) is not None:
                 yield snapshot
 
+    def _place(self, message: LoggedMap) -> str:
+        total = len(self._source.log_times(message.topic))
+        return f"{self.info.path}: message {message.number} of {total} on {message.topic}"
+
     def _tell(self, message: LoggedMap, remark: Remark, tell: bool) -> None:
         if tell:
-            total = len(self._source.log_times(message.topic))
-            place = f"{self.info.path}: message {message.number} of {total} on {message.topic}"
-            text = f"{place}: {remark.text}"
+            text = f"{self._place(message)}: {remark.text}"
             notice(logger, remark.kind, text, file=message.file, topic=message.topic, index=message.number)
 
     def _needed(self, chosen: Times) -> Times:
@@ -188,14 +192,15 @@ class LogReader:
         return in_range
 
     def _no_map(self, counts: ReadCounts) -> LogError:
-        why = f"; {counts.damaged} messages are damaged" if counts.damaged else ""
-        why += f"; {counts.invalid} maps contradict themselves" if counts.invalid else ""
-        return LogError(
-            f"{self.info.path}: no message on {self.topic} in the time range holds a map{why}; "
-            "choose another topic or time range",
-            file=self.info.path,
-            topic=self.topic,
-        )
+        where = f"no message on {self.topic} in the time range holds a map"
+        if self._first_failure is None:
+            text = f"{self.info.path}: {where}; choose another topic or time range"
+            return LogError(text, file=self.info.path, topic=self.topic)
+        why = [f"{counts.damaged} messages are damaged"] if counts.damaged else []
+        why += [f"{counts.invalid} maps contradict themselves"] if counts.invalid else []
+        kind = InvalidMapError if counts.invalid else LogError
+        text = f"{self._first_failure}; {where}: {', '.join(why)}"
+        return kind(text, file=self.info.path, topic=self.topic)
 
 
 def choose_topic(info: LogInfo, asked: str | None = None) -> str:
