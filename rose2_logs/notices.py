@@ -6,6 +6,7 @@ import logging
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,19 @@ FIRST_KEPT = 5
 """Warnings of one kind that are kept word by word; the rest are counted."""
 FIELDS = ("kind", "file", "topic", "index")
 """What a record of the log tells beside its text: see `notice`."""
+
+
+_is_muted: ContextVar[bool] = ContextVar("_is_muted", default=False)
+
+
+@contextmanager
+def muted() -> Iterator[None]:
+    """Say nothing while the context lasts: for a second look at what is told elsewhere."""
+    token = _is_muted.set(True)
+    try:
+        yield
+    finally:
+        _is_muted.reset(token)
 
 
 class StrictError(Rose2LogsError):
@@ -53,6 +67,8 @@ def notice(
     level : int
         Of the `logging` module.
     """
+    if _is_muted.get():
+        return
     extra = {"kind": kind, "file": None if file is None else str(file), "topic": topic, "index": index}
     logger.log(level, "%s", text, extra=extra)
 
@@ -123,7 +139,8 @@ def gathered(strict: bool = False) -> Iterator[Notices]:
             if record.thread != thread:
                 return
             notices.add(record)
-            if strict:
+            # Others are about this machine, not about the log.
+            if strict and hasattr(record, "kind"):
                 text = f"{record.getMessage()} (an error because of --strict)"
                 where = {name: getattr(record, name, None) for name in FIELDS[1:]}
                 raise StrictError(text, **where)

@@ -10,7 +10,6 @@ import os
 import platform
 import shutil
 import tempfile
-import threading
 import time
 import traceback
 import uuid
@@ -24,6 +23,7 @@ from rose2_logs import __version__
 from rose2_logs.batch.location import Location
 from rose2_logs.batch.record import BatchSettings, Record, Signature, signature_of
 from rose2_logs.errors import LogError, OutputError, Rose2LogsError
+from rose2_logs.notices import PACKAGE, gathered
 
 RETRY_PAUSE_S = 2.0
 """Before the second try after a fault of storage or network; doubled for each further one."""
@@ -166,7 +166,7 @@ def analyse_task(task: LogTask, report: Report) -> LogOutcome:
     report : callable
         Told of the progress.
     """
-    with _collected_warnings() as warnings:
+    with gathered() as notices, _own_messages():
         try:
             outcome = _analyse(task, report)
         except Exception as error:
@@ -178,9 +178,9 @@ def analyse_task(task: LogTask, report: Report) -> LogOutcome:
                 is_transient=is_transient(error),
                 details=traceback.format_exc(),
             )
-    told = warnings[:MOST_WARNINGS]
-    if len(warnings) > MOST_WARNINGS:
-        told.append(f"{len(warnings) - MOST_WARNINGS} more warnings")
+    told = notices.texts()[:MOST_WARNINGS]
+    if notices.count > len(told):
+        told.append(f"{notices.count - len(told)} more warnings")
     return dataclasses.replace(outcome, warnings=tuple(told))
 
 
@@ -297,21 +297,11 @@ def _attempt_folder(task: LogTask) -> Iterator[Path]:
 
 
 @contextmanager
-def _collected_warnings() -> Iterator[list[str]]:
-    """Gather the warnings of this thread, which would be lost on another machine."""
-    told: list[str] = []
-    thread = threading.get_ident()
-
-    class Gather(logging.Handler):
-        def emit(self, record: logging.LogRecord) -> None:
-            if record.thread == thread:
-                told.append(record.getMessage())
-
-    logger, handler = logging.getLogger("rose2_logs"), Gather(logging.WARNING)
-    logger.addHandler(handler)
+def _own_messages() -> Iterator[None]:
+    """Keep this package's messages from what else shows messages in this process: they are sent back."""
+    logger = logging.getLogger(PACKAGE)
     before, logger.propagate = logger.propagate, False
     try:
-        yield told
+        yield
     finally:
-        logger.removeHandler(handler)
         logger.propagate = before

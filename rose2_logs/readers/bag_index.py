@@ -65,7 +65,7 @@ class BagFile(LogFile):
 
     def __init__(self, path: Path, limits: ReadingParameters) -> None:
         self.path = path
-        self._limits = limits
+        self.limits = limits
         self._chunk: tuple[int, bytes] = (-1, b"")
         try:
             self._stream = path.open("rb")
@@ -112,7 +112,7 @@ class BagFile(LogFile):
     def places(self, channel_ids: Collection[int]) -> list[Place]:
         """Where the messages of some channels lie, in the order of log time."""
         chosen = self._index[np.isin(self._index["connection"], list(channel_ids))]
-        check_count(self.path, len(chosen), self._limits.map_max_messages)
+        check_count(self.path, len(chosen), self.limits.map_max_messages)
         return sorted(Place(*each) for each in chosen.tolist())
 
     def payload(self, place: Place) -> memoryview:
@@ -131,7 +131,7 @@ class BagFile(LogFile):
     def _payload(self, place: Place) -> memoryview:
         if self._chunk[0] != place.record:
             head = read_head(self._stream, place.record)
-            records = chunk_data(self._stream, head, self._limits.chunk_max_bytes)
+            records = chunk_data(self._stream, head, self.limits.chunk_max_bytes)
             self._chunk = (place.record, bytes(records))
         records = self._chunk[1]
         stream = BytesIO(records)
@@ -250,7 +250,7 @@ class BagFile(LogFile):
     def _scan_chunk(self, chunk: Head, parts: list[NDArray[np.void]]) -> None:
         found: list[tuple[int, int, int, int]] = []
         try:
-            records = chunk_data(self._stream, chunk, self._limits.chunk_max_bytes)
+            records = chunk_data(self._stream, chunk, self.limits.chunk_max_bytes)
             for head in heads_in(records):
                 if head.op == CONNECTION:
                     self._take_connection(head, bytes(records[head.data_begin : head.end]))

@@ -12,12 +12,10 @@ import numpy as np
 from rose2_logs.errors import LogError
 from rose2_logs.notices import notice
 from rose2_logs.parameters import ReadingParameters
-from rose2_logs.readers.decompression import decompress
-from rose2_logs.readers.discovery import ZSTD_MAGIC
 from rose2_logs.readers.log_file import LogFile, Place
 from rose2_logs.readers.messages import Decoder, Grid, Patch, decoder
 from rose2_logs.readers.selection import Times
-from rose2_logs.readers.source import DamagedMessageError, LoggedMap, LogInfo, MessageSource, TopicInfo
+from rose2_logs.readers.source import LoggedMap, LogInfo, MessageSource, TopicInfo
 
 logger = logging.getLogger(__name__)
 
@@ -101,6 +99,11 @@ class FileLog(MessageSource):
         for failure in failures:
             notice(logger, "file_left_out", f"{failure}; the other files are read", file=failure.file)
 
+    @property
+    def files(self) -> tuple[LogFile, ...]:
+        """The open files."""
+        return tuple(self._files)
+
     def close(self) -> None:
         """Release the files; may be called twice."""
         for file in self._files:
@@ -160,12 +163,8 @@ class FileLog(MessageSource):
         file = self._files[number]
         data = file.payload(place)
         channel = file.channels[place.channel_id]
-        # Of a ROS 2 bag that was compressed message by message.
-        if channel.message_encoding == "cdr" and data[:4] == ZSTD_MAGIC:
-            try:
-                data = memoryview(decompress("zstd", data, None, self._limits.chunk_max_bytes))
-            except ValueError as error:
-                raise DamagedMessageError(f"damaged ({error})") from error
+        if channel.message_encoding == "cdr":
+            data = file.decompressed(data)
         key = (number, place.channel_id)
         if key not in self._decoders:
             found = decoder(

@@ -40,6 +40,8 @@ class LogReader:
         What the log holds.
     topic : str
         The map topic that is read.
+    source : MessageSource
+        The open log.
     counts : ReadCounts
         About the latest call of `snapshots`.
     """
@@ -48,7 +50,7 @@ class LogReader:
         self.info = source.info
         self.topic = choose_topic(source.info, topic)
         self.counts = ReadCounts()
-        self._source = source
+        self.source = source
         self._selection = selection
         self._first_failure: str | None = None
         self._topics = [self.topic] + [
@@ -67,7 +69,7 @@ class LogReader:
 
     def close(self) -> None:
         """Release the log's files."""
-        self._source.close()
+        self.source.close()
 
     def snapshots(self) -> Iterator[OccupancySnapshot]:
         """Yield the selected maps in the order of log time.
@@ -129,7 +131,7 @@ class LogReader:
         wanted = set(chosen.tolist())
         stream = MapStream(self.topic, counts, min_change_m2)
         oddities = Oddities()
-        for message in self._source.read(self._topics, self._needed(chosen)):
+        for message in self.source.read(self._topics, self._needed(chosen)):
             is_wanted = message.log_time_ns in wanted
             remarks: tuple[Remark, ...] = ()
             try:
@@ -155,7 +157,7 @@ class LogReader:
                 yield snapshot
 
     def _place(self, message: LoggedMap) -> str:
-        total = len(self._source.log_times(message.topic))
+        total = len(self.source.log_times(message.topic))
         return f"{self.info.path}: message {message.number} of {total} on {message.topic}"
 
     def _tell(self, message: LoggedMap, remark: Remark, tell: bool) -> None:
@@ -170,7 +172,7 @@ class LogReader:
         """
         if len(self._topics) == 1 or not len(chosen):
             return chosen
-        grids, patches = (np.unique(self._source.log_times(topic)) for topic in self._topics)
+        grids, patches = (np.unique(self.source.log_times(topic)) for topic in self._topics)
         last_grid = np.searchsorted(grids, chosen, "right") - 1
         begins = np.where(last_grid >= 0, grids[last_grid], chosen) if len(grids) else chosen
         # A patch is needed if some chosen map is made of it: its grid began before, the map stands after it.
@@ -180,7 +182,7 @@ class LogReader:
         return np.unique(np.concatenate([chosen, begins, patches[begins[following] <= patches]]))
 
     def _times_in_range(self) -> Times:
-        times = np.sort(np.concatenate([self._source.log_times(topic) for topic in self._topics]))
+        times = np.sort(np.concatenate([self.source.log_times(topic) for topic in self._topics]))
         if not len(times):
             raise LogError(f"{self.info.path}: there is no message on {self.topic}; choose another topic")
         in_range = self._selection.in_range(times)

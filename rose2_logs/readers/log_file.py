@@ -10,7 +10,11 @@ from pathlib import Path
 from typing import NamedTuple
 
 from rose2_logs.errors import LogError
+from rose2_logs.parameters import ReadingParameters
+from rose2_logs.readers.decompression import decompress
+from rose2_logs.readers.discovery import ZSTD_MAGIC
 from rose2_logs.readers.messages import is_map_type, is_patch_type
+from rose2_logs.readers.source import DamagedMessageError
 
 LATEST_NS = 2**63 - 1
 """A later log time is damage: it lies beyond the year 2262."""
@@ -86,6 +90,8 @@ class LogFile(ABC):
     Attributes
     ----------
     path : Path
+    limits : ReadingParameters
+        How much it may claim.
     channels : dict of int to Channel
         By id.
     message_counts : Counter
@@ -99,6 +105,7 @@ class LogFile(ABC):
     """
 
     path: Path
+    limits: ReadingParameters
     channels: dict[int, Channel]
     message_counts: Counter[int]
     start_ns: int | None
@@ -123,6 +130,21 @@ class LogFile(ABC):
     @abstractmethod
     def messages(self) -> Iterator[StoredMessage]:
         """Yield every message that is whole, of any channel, for a copy of the log."""
+
+    def decompressed(self, data: bytes | memoryview) -> memoryview:
+        """Return a message of a ROS 2 bag that may have been compressed message by message.
+
+        Raises
+        ------
+        DamagedMessageError
+            If it is damaged, or larger than may be.
+        """
+        if data[:4] != ZSTD_MAGIC:
+            return memoryview(data)
+        try:
+            return memoryview(decompress("zstd", data, None, self.limits.chunk_max_bytes))
+        except ValueError as error:
+            raise DamagedMessageError(f"damaged ({error})") from error
 
     @abstractmethod
     def close(self) -> None:

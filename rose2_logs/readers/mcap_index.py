@@ -12,11 +12,12 @@ from collections import Counter, OrderedDict
 from collections.abc import Collection, Iterator
 from contextlib import suppress
 from pathlib import Path
+from typing import IO, Any
 
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
+from mcap.records import Attachment, ChunkIndex, Header, Metadata, Schema
 from mcap.records import Channel as McapChannel
-from mcap.records import ChunkIndex, Schema
 
 from rose2_logs.errors import LogError
 from rose2_logs.notices import notice
@@ -64,7 +65,7 @@ class McapFile(LogFile):
 
     def __init__(self, path: Path, limits: ReadingParameters) -> None:
         self.path = path
-        self._limits = limits
+        self.limits = limits
         self.channels = {}
         self._schemas: dict[int, Schema] = {}
         self.message_counts = Counter()
@@ -96,6 +97,11 @@ class McapFile(LogFile):
         self._stream.close()
         self._chunks.clear()
 
+    @property
+    def stream(self) -> IO[bytes]:
+        """The open file, for copying chunks."""
+        return self._stream
+
     def places(self, channel_ids: Collection[int]) -> list[Place]:
         """Where the messages of some channels lie, in the order of log time."""
         if self.summary is None:
@@ -104,7 +110,7 @@ class McapFile(LogFile):
         for chunk in self.summary.chunks:
             if wanted := set(channel_ids) & set(chunk.message_index_offsets):
                 places += self._places_in(chunk, wanted)
-                check_count(self.path, len(places), self._limits.map_max_messages)
+                check_count(self.path, len(places), self.limits.map_max_messages)
         return sorted(places)
 
     def _places_in(self, chunk: ChunkIndex, channel_ids: set[int]) -> list[Place]:
@@ -127,9 +133,12 @@ class McapFile(LogFile):
                     if channel in channel_ids and time <= LATEST_NS:
                         found.append(Place(time, begin, record.offset, channel))
         except DAMAGE as error:
-            text = f"{self.path}: the chunk at byte {begin} is damaged ({error}); its messages are left out"
-            notice(logger, "damaged_chunk", text, file=self.path)
+            self._tell_damaged(begin, error)
         return found
+
+    def _tell_damaged(self, begin: int, error: Exception) -> None:
+        text = f"{self.path}: the chunk at byte {begin} is damaged ({error}); its messages are left out"
+        notice(logger, "damaged_chunk", text, file=self.path)
 
     def _message_index(self, begin: int, channel_id: int) -> list[tuple[int, int]]:
         """Log time and offset of each message of a channel, from the message index at a file offset.
@@ -172,9 +181,11 @@ class McapFile(LogFile):
         for record in self._records():
             if record.opcode == Opcode.CHUNK:
                 try:
-                    held = records_in(chunk_records(record.content, self._limits.chunk_max_bytes))
-                except DAMAGE:
-                    continue  # told when the file was opened
+                    held = records_in(chunk_records(record.content, self.limits.chunk_max_bytes))
+                except DAMAGE as error:
+                    if self.indexed:  # else it was told when the file was scanned
+                        self._tell_damaged(record.offset, error)
+                    continue
             else:
                 held = iter([record])
             with suppress(*DAMAGE):
@@ -187,10 +198,34 @@ class McapFile(LogFile):
         data = record.content[MESSAGE.size :]
         return StoredMessage(self.channels[channel_id], log_time_ns, publish_time_ns, sequence, data)
 
+    def header(self) -> Header:
+        """Return the file's profile and the library that wrote it; empty where they are damaged."""
+        try:
+            header: Header = parsed(Header, memoryview(self._record(len(MAGIC))))
+        except (*DAMAGE, OSError):
+            return Header(profile="", library="")
+        return header
+
+    def attachments(self) -> Iterator[Attachment]:
+        """Yield the attachments that the summary names, as far as they are whole."""
+        return self._named(Attachment, [] if self.summary is None else self.summary.attachments)
+
+    def metadata(self) -> Iterator[Metadata]:
+        """Yield the metadata records that the summary names, as far as they are whole."""
+        return self._named(Metadata, [] if self.summary is None else self.summary.metadata)
+
+    def _named(self, kind: Any, offsets: list[int]) -> Iterator[Any]:
+        for offset in offsets:
+            try:
+                yield parsed(kind, memoryview(self._record(offset)))
+            except (*DAMAGE, OSError) as error:
+                text = f"{self.path}: the {kind.__name__.lower()} at byte {offset} is left out ({error})"
+                notice(logger, "damaged_record", text, file=self.path)
+
     def messages_in(self, chunk: ChunkIndex) -> list[StoredMessage]:
         """Messages of one chunk by log time; raises what `DAMAGE` lists where they cannot be read."""
         content = memoryview(self._record(chunk.chunk_start_offset))
-        records = records_in(chunk_records(content, self._limits.chunk_max_bytes))
+        records = records_in(chunk_records(content, self.limits.chunk_max_bytes))
         found = [self._stored(record) for record in records if record.opcode == Opcode.MESSAGE]
         return sorted(found, key=lambda message: message.log_time_ns)
 
@@ -222,7 +257,7 @@ class McapFile(LogFile):
                         f"{self.path}: cut off or damaged after {begin} bytes; what is whole before is read"
                     )
                     notice(logger, "cut_off", text, file=self.path)
-                if opcode == Opcode.CHUNK and length <= self._limits.chunk_max_bytes:
+                if opcode == Opcode.CHUNK and length <= self.limits.chunk_max_bytes:
                     yield Record(begin, opcode, memoryview(self._stream.read(length)))
                 return
             if opcode in (Opcode.DATA_END, Opcode.FOOTER):
@@ -230,7 +265,7 @@ class McapFile(LogFile):
             if opcode in (Opcode.MESSAGE, Opcode.CHUNK, Opcode.SCHEMA, Opcode.CHANNEL):
                 needed = min(length, MESSAGE.size) if is_scan and opcode == Opcode.MESSAGE else length
                 # What is too large stays empty, which is damage to all who look into it.
-                content = self._stream.read(needed if needed <= self._limits.chunk_max_bytes else 0)
+                content = self._stream.read(needed if needed <= self.limits.chunk_max_bytes else 0)
                 yield Record(begin, opcode, memoryview(content))
             begin = end
 
@@ -242,7 +277,7 @@ class McapFile(LogFile):
                 if record.opcode != Opcode.CHUNK:
                     self._take(record, record.offset, -1)
                     continue
-                for inner in records_in(chunk_records(record.content, self._limits.chunk_max_bytes)):
+                for inner in records_in(chunk_records(record.content, self.limits.chunk_max_bytes)):
                     self._take(inner, record.offset, inner.offset)
             except DAMAGE as error:
                 if record.offset + RECORD.size + len(record.content) == size and not self.whole:
@@ -273,14 +308,14 @@ class McapFile(LogFile):
         self.end_ns = log_time_ns if self.end_ns is None else max(self.end_ns, log_time_ns)
         if self.channels[channel_id].is_wanted:
             self._scanned.append(Place(log_time_ns, record, offset, channel_id))
-            check_count(self.path, len(self._scanned), self._limits.map_max_messages)
+            check_count(self.path, len(self._scanned), self.limits.map_max_messages)
 
     def _chunk(self, begin: int) -> memoryview:
         """Uncompressed records of the chunk at a file offset, its checksum verified."""
         if begin in self._chunks:
             self._chunks.move_to_end(begin)
             return self._chunks[begin]
-        self._chunks[begin] = records = chunk_records(self._record(begin), self._limits.chunk_max_bytes)
+        self._chunks[begin] = records = chunk_records(self._record(begin), self.limits.chunk_max_bytes)
         if len(self._chunks) > _CHUNKS_KEPT:
             self._chunks.popitem(last=False)
         return records
@@ -289,6 +324,6 @@ class McapFile(LogFile):
         """Content of the record at a file offset."""
         self._stream.seek(begin)
         opcode, length = RECORD.unpack(read_exactly(self._stream, RECORD.size))
-        if length > self._limits.chunk_max_bytes:
+        if length > self.limits.chunk_max_bytes:
             raise ValueError(f"it claims {length} bytes; {REMEDY}")
         return self._stream.read(length) if opcode == Opcode.CHUNK else read_exactly(self._stream, length)

@@ -14,8 +14,8 @@ from typing import IO, Any, NamedTuple
 
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
+from mcap.records import AttachmentIndex, ChunkIndex, MetadataIndex, Schema, Statistics
 from mcap.records import Channel as McapChannel
-from mcap.records import ChunkIndex, Schema, Statistics
 
 from rose2_logs.readers.decompression import decompress
 from rose2_logs.readers.log_file import Channel
@@ -40,11 +40,13 @@ class Record(NamedTuple):
 
 @dataclass(frozen=True)
 class Summary:
-    """What the end of a file tells about the rest of it."""
+    """What the end of a file tells about the rest of it; attachments and metadata by their file offsets."""
 
     channels: dict[int, Channel]
     chunks: list[ChunkIndex]
     statistics: Statistics
+    attachments: list[int]
+    metadata: list[int]
 
 
 def read_exactly(stream: IO[bytes], length: int) -> bytes:
@@ -159,6 +161,8 @@ def _usable(data: memoryview, start: int) -> Summary | None:
     schemas: dict[int, Schema] = {}
     channels: dict[int, McapChannel] = {}
     chunks: list[ChunkIndex] = []
+    attachments: list[int] = []
+    metadata: list[int] = []
     statistics: Statistics | None = None
     for record in records_in(data):
         match record.opcode:
@@ -172,6 +176,10 @@ def _usable(data: memoryview, start: int) -> Summary | None:
                 chunks.append(parsed(ChunkIndex, record.content))
             case Opcode.STATISTICS:
                 statistics = parsed(Statistics, record.content)
+            case Opcode.ATTACHMENT_INDEX:
+                attachments.append(parsed(AttachmentIndex, record.content).offset)
+            case Opcode.METADATA_INDEX:
+                metadata.append(parsed(MetadataIndex, record.content).offset)
     if statistics is None or len(channels) < statistics.channel_count:
         return None
     if any(channel.schema_id and channel.schema_id not in schemas for channel in channels.values()):
@@ -182,7 +190,7 @@ def _usable(data: memoryview, start: int) -> Summary | None:
     if not chunks and statistics.message_count:
         return None
     described = {key: channel_of(each, schemas.get(each.schema_id)) for key, each in channels.items()}
-    return Summary(described, chunks, statistics)
+    return Summary(described, chunks, statistics, attachments, metadata)
 
 
 def _lie_side_by_side(chunks: list[ChunkIndex], end: int) -> bool:

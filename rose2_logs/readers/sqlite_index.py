@@ -51,7 +51,7 @@ class SqliteFile(LogFile):
 
     def __init__(self, path: Path, limits: ReadingParameters) -> None:
         self.path = path
-        self._limits = limits
+        self.limits = limits
         self.indexed = True
         self.channels: dict[int, Channel] = {}
         try:
@@ -87,7 +87,7 @@ class SqliteFile(LogFile):
     def places(self, channel_ids: Collection[int]) -> list[Place]:
         """Where the messages of some channels lie, in the order of log time."""
         chosen = self._rows[np.isin(self._rows["channel"], list(channel_ids))]
-        check_count(self.path, len(chosen), self._limits.map_max_messages)
+        check_count(self.path, len(chosen), self.limits.map_max_messages)
         return sorted(Place(time, row, -1, channel) for time, row, channel in chosen.tolist())
 
     def payload(self, place: Place) -> memoryview:
@@ -123,7 +123,7 @@ class SqliteFile(LogFile):
 
     def _set_up(self) -> None:
         """Read what is there of a database that is shorter than it says; trust nothing that it defines."""
-        self._base.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, min(self._limits.chunk_max_bytes, 2**31 - 1))
+        self._base.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, min(self.limits.chunk_max_bytes, 2**31 - 1))
         self._base.text_factory = lambda text: text.decode("utf-8", errors="replace")
         for pragma in ("writable_schema = ON", "trusted_schema = OFF", "mmap_size = 0"):
             self._base.execute(f"PRAGMA {pragma}")

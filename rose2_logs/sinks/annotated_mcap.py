@@ -14,14 +14,16 @@ from mcap.exceptions import McapError
 
 from rose2_logs.errors import OutputError
 from rose2_logs.files import part_of
+from rose2_logs.readers import open_source
+from rose2_logs.readers.mcap_index import DAMAGE
+from rose2_logs.readers.source import MessageSource
 from rose2_logs.sinks.mcap_input import (
-    DAMAGE,
     LATCHED_QOS,
     CopiedChannel,
     CopiedChunk,
     CopiedLog,
     CopiedMessage,
-    open_copied_log,
+    copied_log,
 )
 from rose2_logs.sinks.mcap_writer import McapWriter
 from rose2_logs.sinks.ros_messages import ROOMS_TYPE, MessageMaker
@@ -55,6 +57,8 @@ class AnnotatedMcap:
         Where to; written beside and renamed when whole.
     info : RunInfo
         The run.
+    source : MessageSource, optional
+        The log if it is open already, which it then stays.
 
     Raises
     ------
@@ -64,14 +68,18 @@ class AnnotatedMcap:
         If the input cannot be copied.
     """
 
-    def __init__(self, path: Path, info: RunInfo) -> None:
+    def __init__(self, path: Path, info: RunInfo, source: MessageSource | None = None) -> None:
         self._path = path
         self._part = part_of(path)
         self._info = info
+        self._source = source
         self._file: IO[bytes] | None = None
 
     def __enter__(self) -> Self:
-        self._log: CopiedLog = open_copied_log(self._info.log_path)
+        self._opened_source: MessageSource | None = None
+        if self._source is None:
+            self._opened_source = self._source = open_source(self._info.log_path)
+        self._log: CopiedLog = copied_log(self._source)
         try:
             with self._writing():
                 self._path.parent.mkdir(parents=True, exist_ok=True)
@@ -217,7 +225,8 @@ class AnnotatedMcap:
         self._writer.add_message(channel, time_ns, data, time_ns, self._sequence)
 
     def _abandon(self) -> None:
-        self._log.close()
+        if self._opened_source is not None:
+            self._opened_source.close()
         if self._file is not None:
             self._file.close()
         self._part.unlink(missing_ok=True)
