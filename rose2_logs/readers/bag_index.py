@@ -244,8 +244,8 @@ class BagFile(LogFile):
             text = f"{self.path}: cut off or damaged ({reason}) after {min(begin, self._size)} bytes; "
             notice(logger, "cut_off", text + "what is whole before is read", file=self.path)
         else:
-            text = f"{self.path}: has no usable index and was scanned; `rosbag reindex` makes one"
-            notice(logger, "no_index", text, file=self.path, level=logging.INFO)
+            text = f"{self.path}: was not closed, or its index is damaged; all that is there was read"
+            notice(logger, "damaged_index", text, file=self.path)
 
     def _scan_chunk(self, chunk: Head, parts: list[NDArray[np.void]]) -> None:
         found: list[tuple[int, int, int, int]] = []

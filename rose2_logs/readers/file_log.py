@@ -150,6 +150,9 @@ class FileLog(MessageSource):
         order = np.array([place[1:3] for place in places], np.int64).reshape(-1, 2)
         times = np.array([place.log_time_ns for place in places], np.int64)
         along_file = times[np.lexsort((order[:, 1], order[:, 0]))]
+        if len(times) > 1 and times[0] == times[-1]:
+            text = f"{file.path}: all {len(times)} messages on {topic} have the log time {times[0]} ns"
+            notice(logger, "clock_stands", text, file=file.path, topic=topic)
         back = np.flatnonzero(np.diff(along_file) < -CLOCK_SET_BACK_NS)
         for k in back:
             seconds = (int(along_file[k]) - int(along_file[k + 1])) / 1e9

@@ -79,13 +79,17 @@ class McapFile(LogFile):
         try:
             if self._stream.read(len(MAGIC)) != MAGIC:
                 raise LogError(f"{path}: is not an MCAP file, it does not begin as one", file=path)
+            index_damage = ""
             try:
                 self.summary = read_summary(self._stream, limits.chunk_max_bytes)
-            except (*DAMAGE, OSError):
-                self.summary = None
+            except (*DAMAGE, OSError) as error:
+                self.summary, index_damage = None, str(error)
             self.indexed = self.summary is not None
             if self.summary is None:
                 self._scan()
+                if self.whole and index_damage:
+                    text = f"{path}: its index is damaged or cut off ({index_damage}); all before it was read"
+                    notice(logger, "damaged_index", text, file=path)
             else:
                 self._take_summary()
         except BaseException:

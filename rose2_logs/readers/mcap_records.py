@@ -132,28 +132,30 @@ def chunk_records(content: bytes | memoryview, most_bytes: int) -> memoryview:
 
 
 def read_summary(stream: IO[bytes], most_bytes: int) -> Summary | None:
-    """Return the summary of a file if every message of the file can be found by it.
+    """Return the summary of a file if every message of the file can be found by it, None if not by any.
 
     Raises
     ------
     ValueError, struct.error, EOFError, OSError ...
-        If it is damaged.
+        If it is damaged or cut off.
     """
     size = stream.seek(0, 2)
     tail = _FOOTER.size + len(MAGIC)
     stream.seek(max(size - tail, 0))
     end = read_exactly(stream, min(tail, size))
     opcode, _, start, _, checksum = _FOOTER.unpack_from(end)
-    if opcode != Opcode.FOOTER or end[_FOOTER.size :] != MAGIC or start == 0:
+    if opcode != Opcode.FOOTER or end[_FOOTER.size :] != MAGIC:
+        raise ValueError("the file does not end as it should")
+    if start == 0:
         return None
     length = size - tail - start
     if not 0 <= length <= most_bytes:
-        return None
+        raise ValueError("it does not lie where the file's end says")
     stream.seek(start)
     data = read_exactly(stream, length)
     # It covers the footer up to where it stands.
     if checksum and zlib.crc32(end[: _FOOTER.size - 4], zlib.crc32(data)) != checksum:
-        return None
+        raise ValueError("its checksum is wrong")
     return _usable(memoryview(data), start)
 
 
@@ -184,8 +186,10 @@ def _usable(data: memoryview, start: int) -> Summary | None:
         return None
     if any(channel.schema_id and channel.schema_id not in schemas for channel in channels.values()):
         return None
-    if len(chunks) < statistics.chunk_count or not _lie_side_by_side(chunks, start):
+    if len(chunks) < statistics.chunk_count or any(not each.message_index_offsets for each in chunks):
         return None
+    if not _lie_side_by_side(chunks, start):
+        raise ValueError("its chunks lie one over the other")
     # Messages outside chunks have no index.
     if not chunks and statistics.message_count:
         return None
@@ -199,7 +203,7 @@ def _lie_side_by_side(chunks: list[ChunkIndex], end: int) -> bool:
     for chunk in sorted(chunks, key=lambda each: each.chunk_start_offset):
         index_begin = chunk.chunk_start_offset + chunk.chunk_length
         offsets = chunk.message_index_offsets.values()
-        if chunk.chunk_start_offset < place or not offsets:
+        if chunk.chunk_start_offset < place:
             return False
         place = index_begin + chunk.message_index_length
         if place > end or min(offsets) < index_begin or max(offsets) >= place:

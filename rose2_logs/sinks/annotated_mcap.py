@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -14,6 +15,7 @@ from mcap.exceptions import McapError
 
 from rose2_logs.errors import OutputError
 from rose2_logs.files import part_of
+from rose2_logs.notices import notice
 from rose2_logs.readers import open_source
 from rose2_logs.readers.mcap_index import DAMAGE
 from rose2_logs.readers.source import MessageSource
@@ -29,6 +31,8 @@ from rose2_logs.sinks.mcap_writer import McapWriter
 from rose2_logs.sinks.ros_messages import ROOMS_TYPE, MessageMaker
 from rose2_logs.sinks.sink import RunInfo
 from rose2_logs.tracking.frames import TrackedSnapshot
+
+logger = logging.getLogger(__name__)
 
 PREFIX = "/rose2/"
 GRID_TYPE = "nav_msgs/msg/OccupancyGrid"
@@ -180,17 +184,41 @@ class AnnotatedMcap:
                 return
             self._waiting = None
             if isinstance(item, CopiedMessage):
-                self._writer.add_message(
-                    self._register(item.channel), item.log_time, item.data, item.publish_time, item.sequence
-                )
+                self._add_message(item)
             elif time_ns is None or item.end_time <= time_ns:
-                self._writer.copy_chunk(item.stream, item.index)
+                self._copy_chunk(item)
             else:
                 try:
                     self._opened.extend(item.messages())
                 except DAMAGE:
                     # Nothing of it can be told apart any more; it stays what it is.
-                    self._writer.copy_chunk(item.stream, item.index)
+                    self._copy_chunk(item)
+
+    def _copy_chunk(self, chunk: CopiedChunk) -> None:
+        """Copy a chunk as it is, or message by message where the index behind it is damaged."""
+        try:
+            self._writer.copy_chunk(chunk.stream, chunk.index)
+            return
+        except ValueError:
+            pass
+        try:
+            messages = chunk.messages()
+        except DAMAGE as error:
+            begin = chunk.index.chunk_start_offset
+            text = f"{self._info.log_path}: the chunk at byte {begin} is damaged ({error}); it is not copied"
+            notice(logger, "not_copied", text, file=self._info.log_path)
+            return
+        for message in messages:
+            self._add_message(message)
+
+    def _add_message(self, message: CopiedMessage) -> None:
+        self._writer.add_message(
+            self._register(message.channel),
+            message.log_time,
+            message.data,
+            message.publish_time,
+            message.sequence,
+        )
 
     def _register(self, channel: CopiedChannel) -> int:
         if channel.key not in self._channels:
