@@ -31,7 +31,7 @@ _LAST_ROW = 2**62
 # Of rows whose time or topic is not a number.
 _NO_CHANNEL = -1
 # What is wrong with a database, or with a text in it.
-_DAMAGE = (sqlite3.Error, ValueError, TypeError, OverflowError)
+_DAMAGE = (sqlite3.Error, ValueError, TypeError, OverflowError, LookupError)
 
 
 class SqliteFile(LogFile):
@@ -139,6 +139,8 @@ class SqliteFile(LogFile):
         definitions = self._definitions()
         for row in self._base.execute("SELECT * FROM topics"):
             about = dict(zip(columns, row, strict=True))
+            if missing := {"id", "name", "type", "serialization_format"} - about.keys():
+                raise ValueError(f"its table `topics` has no column {min(missing)}")
             name = str(about["type"])
             number, (encoding, text) = int(about["id"]), definitions.get(name, ("", ""))
             qos = about.get("offered_qos_profiles")
