@@ -35,7 +35,7 @@ class ReadingParameters:
         1,
     )
     chunk_max_bytes: int = number(
-        2**30, "bytes", "Largest chunk or message once decompressed; recorders write about 1 MB.", 1024
+        2**28, "bytes", "Largest chunk or message once decompressed: a largest map; usual is 1 MB.", 1024
     )
     map_max_messages: int = number(
         2_000_000, "messages", "Most messages of a map's topics: one a second for 23 days.", 1

@@ -5,10 +5,10 @@ from seeds that are made of the sample logs; what it finds is kept in the folder
 
     python tools/fuzz.py run --seconds 300 --folder fuzzing      # all targets, one after the other
     python tools/fuzz.py run --seconds 60 --folder fuzzing mcap  # one of them
-    python tools/fuzz.py again FILE TARGET                       # one input that was found, with its traceback
+    python tools/fuzz.py again FILE TARGET                       # one input that was found
 
 A target ends before its time when it finds a fault: an exception that is not a known error, more memory than
-`MEMORY_MB`, or more than `INPUT_SECONDS` for one input. The figures of the last long run are in docs/faults.md.
+`MEMORY_MB`, or more than `INPUT_SECONDS` for one input. Figures of a long run are in docs/faults.md.
 """
 
 from __future__ import annotations

@@ -139,7 +139,7 @@ class LogReader:
                 if isinstance(decoded, Patch) and stream.is_empty:
                     remarks = (Remark("patch_without_map", "a patch without a map before it; left out"),)
                 else:
-                    remarks = oddities.of(decoded)
+                    remarks = oddities.of(decoded, message.log_time_ns)
                 stream.apply(decoded)
             except LogError as error:
                 is_damaged = isinstance(error, DamagedMessageError)

@@ -124,7 +124,7 @@ class McapFile(LogFile):
             return [
                 Place(time, begin, offset, channel)
                 for channel in channel_ids
-                for time, offset in self._message_index(chunk.message_index_offsets[channel], channel)
+                for time, offset in self._message_index(chunk, channel)
                 if time <= LATEST_NS
             ]
         except DAMAGE:
@@ -144,16 +144,20 @@ class McapFile(LogFile):
         text = f"{self.path}: the chunk at byte {begin} is damaged ({error}); its messages are left out"
         notice(logger, "damaged_chunk", text, file=self.path)
 
-    def _message_index(self, begin: int, channel_id: int) -> list[tuple[int, int]]:
-        """Log time and offset of each message of a channel, from the message index at a file offset.
+    def _message_index(self, chunk: ChunkIndex, channel_id: int) -> list[tuple[int, int]]:
+        """Log time and offset of each message of a channel in a chunk, from the index behind that.
 
         Read exactly: in a large log there are thousands.
         """
-        self._stream.seek(begin)
+        self._stream.seek(chunk.message_index_offsets[channel_id])
         opcode, _, channel, length = INDEX.unpack(self._stream.read(INDEX.size))
         if opcode != Opcode.MESSAGE_INDEX or channel != channel_id:
             raise ValueError("no message index where the summary says")
-        return list(INDEX_ENTRY.iter_unpack(read_exactly(self._stream, length)))
+        entries = list(INDEX_ENTRY.iter_unpack(read_exactly(self._stream, length)))
+        most = min(chunk.uncompressed_size, self.limits.chunk_max_bytes)
+        if any(offset >= most for _, offset in entries):
+            raise ValueError("the message index points behind the chunk")
+        return entries
 
     def payload(self, place: Place) -> memoryview:
         """Return the data of one message.

@@ -79,8 +79,8 @@ def records_in(data: memoryview) -> Iterator[Record]:
     while place < len(data):
         opcode, length = RECORD.unpack_from(data, place)
         begin = place + RECORD.size
-        if length > len(data) - begin:
-            raise ValueError("a record is longer than what holds it")
+        if length > len(data) - begin or opcode == 0:
+            raise ValueError("a record is not whole")
         yield Record(place, opcode, data[begin : begin + length])
         place = begin + length
 

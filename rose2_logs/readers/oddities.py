@@ -15,13 +15,14 @@ class Oddities:
         self._stamp_ns: int | None = None
         self._frame: str | None = None
 
-    def of(self, message: Grid | Patch | None) -> tuple[Remark, ...]:
-        """Tell what is odd about a map or a patch, and about what changed since the one before."""
+    def of(self, message: Grid | Patch | None, log_time_ns: int) -> tuple[Remark, ...]:
+        """Tell what is odd about a map or a patch with its log time, and what changed since the last one."""
         if message is None:
             return (Remark("no_cells", "a map without cells; left out"),)
         remarks = list(message.remarks)
         before, self._stamp_ns = self._stamp_ns, message.stamp_ns
-        if message.stamp_ns == 0:
+        # Of what carries no time at all, as saved maps, that is known.
+        if message.stamp_ns == 0 and log_time_ns != 0:
             remarks.append(Remark("stamp_zero", "its stamp is zero; only its log time is known"))
         elif before is not None and message.stamp_ns < before - BACK_NS:
             remarks.append(

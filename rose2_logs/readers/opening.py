@@ -275,7 +275,10 @@ def _open_directory(log: Path, limits: ReadingParameters) -> MessageSource:
     if files := _stored_in(log):
         return _open_files(log, files, limits)
     inside = sorted(each for each in log.iterdir() if each.is_file())
-    if maps := [each for each in inside if each.suffix.lower() in MAP_ENDINGS and is_map_file(each)]:
+    # One with an image of its name is a map even if it cannot be read, which is told then.
+    images = {each.stem for each in inside if each.suffix.lower() in IMAGE_ENDINGS}
+    described = [each for each in inside if each.suffix.lower() in MAP_ENDINGS]
+    if maps := [each for each in described if each.stem in images or is_map_file(each)]:
         return _open_files(log, _in_natural_order(maps), limits)
     raise LogError(
         f"{log}: holds neither a bag ({BAG_DESCRIPTION}) nor saved maps; give {_FORMATS}", file=log

@@ -31,7 +31,7 @@ _LAST_ROW = 2**62
 # Of rows whose time or topic is not a number.
 _NO_CHANNEL = -1
 # What is wrong with a database, or with a text in it.
-_DAMAGE = (sqlite3.Error, ValueError, TypeError, OverflowError, LookupError)
+_DAMAGE = (sqlite3.Error, ValueError, TypeError, OverflowError, LookupError, MemoryError)
 
 
 class SqliteFile(LogFile):
@@ -100,7 +100,7 @@ class SqliteFile(LogFile):
         """
         try:
             return self._payload(place.record)
-        except (*_DAMAGE, MemoryError) as error:
+        except _DAMAGE as error:
             raise DamagedMessageError(f"damaged ({error})") from error
 
     def _payload(self, row: int) -> memoryview:
@@ -116,7 +116,7 @@ class SqliteFile(LogFile):
             time, row, channel_id = entry.item()
             try:
                 data, channel = self._payload(row), self.channels[channel_id]
-            except (*_DAMAGE, MemoryError, KeyError):
+            except _DAMAGE:
                 continue
             yield StoredMessage(channel, time, time, sequence[channel_id], data)
             sequence[channel_id] += 1
@@ -187,7 +187,7 @@ class SqliteFile(LogFile):
                 step = 2 * step or 1
         return np.concatenate(parts)
 
-    def _take_rows(self, after: int, found: list[tuple[int, int, int]]) -> sqlite3.Error | None:
+    def _take_rows(self, after: int, found: list[tuple[int, int, int]]) -> Exception | None:
         """Append the next rows, as many as are taken at once, and return what went wrong."""
         query = "SELECT timestamp, rowid, topic_id FROM messages WHERE rowid > ? ORDER BY rowid LIMIT ?"
         try:
@@ -197,7 +197,7 @@ class SqliteFile(LogFile):
                 after = row
                 is_usable = isinstance(time, int) and isinstance(channel, int) and 0 <= time <= LATEST_NS
                 found.append((time, row, channel) if is_usable else (0, row, _NO_CHANNEL))
-        except sqlite3.Error as error:
+        except (sqlite3.Error, MemoryError) as error:  # the latter where a row claims to be huge
             return error
         return None
 

@@ -219,7 +219,7 @@ def write_bag(
                     topic,
                     kind,
                     typestore=typestore(1),
-                    **({} if text is None else {"msgdef": text.decode(), "md5sum": "0" * 32}),
+                    **({} if text is None else {"msgdef": text.decode("latin-1"), "md5sum": "0" * 32}),
                 )
             writer.write(connections[topic, kind], time, packed(message, "ros1"))
     return path
@@ -246,7 +246,7 @@ def write_rosbag2(
                     topic,
                     kind,
                     typestore=typestore(2),
-                    **({} if text is None else {"msgdef": text.decode(), "rihs01": "RIHS01_0"}),
+                    **({} if text is None else {"msgdef": text.decode("latin-1"), "rihs01": "RIHS01_0"}),
                 )
             writer.write(connections[topic, kind], time, packed(message, "cdr"))
     return path
@@ -421,6 +421,12 @@ MESSAGE_FAULTS: dict[str, Callable[[], list[Logged]]] = {
     ],
     "no message at all": list,
 }
+SCHEMA_FAULTS: dict[str, bytes] = {
+    "definition is not that of the type": b"float64 x\nstring name\n",
+    "definition is no definition": b"\x00\xff { not a message ;",
+    "definition empty": b"",
+}
+"""Texts that stand as the definition of nav_msgs/OccupancyGrid in a log that is right otherwise."""
 NOT_IN_FOXGLOVE = {
     # It has no height and no patches; one channel holds one type.
     "width times height past 2^32",
@@ -527,3 +533,51 @@ def png_claiming(width: int, height: int, rows: bytes) -> bytes:
         + chunk(b"IDAT", zlib.compress(rows))
         + chunk(b"IEND", b"")
     )
+
+
+# --- faults of what lies beside the file ------------------------------------------------------------------
+
+
+def _without(name: str) -> Callable[[Path], Path]:
+    def spoil(log: Path) -> Path:
+        (log / name).unlink()
+        return log
+
+    return spoil
+
+
+def _rewritten(name: str, text: str) -> Callable[[Path], Path]:
+    def spoil(log: Path) -> Path:
+        (log / name).write_text(text)
+        return log
+
+    return spoil
+
+
+def _with_second_file(log: Path) -> Path:
+    """A description that names a second file, which is not there."""
+    described = (log / "metadata.yaml").read_text()
+    (entry,) = [line for line in described.splitlines() if line.strip() in ("- run.db3", "- run.mcap")]
+    second = entry.replace("- run.", "- run_1.")
+    (log / "metadata.yaml").write_text(described.replace(entry, f"{entry}\n{second}", 1))
+    return log
+
+
+def _with_journal(log: Path) -> Path:
+    (log / "run.db3-wal").write_bytes(bytes(100))
+    return log
+
+
+def _renamed(log: Path) -> Path:
+    return log.rename(log.with_suffix(".bag" if log.suffix == ".mcap" else ".mcap"))
+
+
+ROS2 = ("ROS 2, sqlite3", "ROS 2, mcap")
+PATH_FAULTS: dict[str, tuple[Callable[[Path], Path], tuple[str, ...]]] = {
+    "no metadata.yaml": (_without("metadata.yaml"), ROS2),
+    "metadata.yaml empty": (_rewritten("metadata.yaml", ""), ROS2),
+    "metadata.yaml of something else": (_rewritten("metadata.yaml", "image: map.png"), ROS2),
+    "metadata.yaml names a file that is missing": (_with_second_file, ROS2),
+    "journal beside the database": (_with_journal, ROS2[:1]),
+    "wrong suffix": (_renamed, ("MCAP, zstd", "ROS 1 bag")),
+}

@@ -186,8 +186,7 @@ def _messages(snapshots: list[OccupancySnapshot], scratch: Path) -> Seeds:
 
 
 def _framed(kind: int, message: bytes) -> bytes:
-    framed = bytes([kind]) + len(message).to_bytes(FRAME_BYTES - 1, "little") + message
-    return framed
+    return bytes([kind]) + len(message).to_bytes(FRAME_BYTES - 1, "little") + message
 
 
 def _schemas(snapshots: list[OccupancySnapshot], scratch: Path) -> Seeds:

@@ -1,4 +1,4 @@
-"""What is fuzzed: from bytes to maps, to a copy of the log, to a patched map; only known errors may come out."""
+"""What is fuzzed: from bytes to maps, to a copy of the log, to a patched map; known errors may come out."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from pathlib import Path
 
 from rose2_logs.errors import LogError
 from rose2_logs.notices import PACKAGE
+from rose2_logs.occupancy import OccupancySnapshot
 from rose2_logs.parameters import ReadingParameters
 from rose2_logs.readers.bag_index import BagFile
 from rose2_logs.readers.file_log import FileLog, OpenFile
@@ -82,7 +83,7 @@ def _check_maps(reader: LogReader) -> None:
     for snapshot in reader.snapshots():
         snapshots += 1
         assert snapshot.cells.size <= LIMITS.map_max_cells
-        assert -1 <= snapshot.cells.min()
+        assert snapshot.cells.min() >= -1
         assert snapshot.cells.max() <= 100
     counts = reader.counts
     told = snapshots + counts.repeats + counts.skipped + counts.damaged + counts.invalid
@@ -127,7 +128,7 @@ _DECODERS = decoders()
 def updates(data: bytes) -> None:
     """Decode messages and apply them as grids and patches, one to the map that those before have made."""
     stream, place = MapStream("/map", ReadCounts()), 0
-    before = None
+    before: OccupancySnapshot | None = None
     for time in range(MOST_MAPS):
         if place + FRAME_BYTES > len(data):
             return
