@@ -50,6 +50,7 @@ def main() -> None:
     """Run the command line and exit."""
     from rose2_logs import reporting_messages as messages
 
+    state["debug"] = False
     try:
         app()
     except Rose2LogsError as error:

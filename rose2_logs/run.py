@@ -165,6 +165,13 @@ def _analyse_log(
         ) as reader,
         start_workers(options) as workers,
     ):
+        logger.info(
+            "%s: %s, %d messages on %s",
+            path,
+            reader.info.format,
+            len(reader.source.log_times(reader.topic)),
+            reader.topic,
+        )
         last = reader.last()
         info = _run_info(path, reader, options)
         first_ns: int | None = None
@@ -176,6 +183,12 @@ def _analyse_log(
                 for sink in sinks:
                     sink.write(frame)
                 totals.add(frame)
+                logger.info(
+                    "snapshot %d: coverage %.1f %%, %d rooms",
+                    frame.snapshot.index,
+                    100 * frame.coverage,
+                    len(frame.track_ids),
+                )
                 if on_snapshot is not None:
                     now_ns = frame.snapshot.log_time_ns
                     first_ns = now_ns if first_ns is None else first_ns

@@ -65,6 +65,9 @@ def grid_decoder(schema: bytes, most_cells: int = MOST_CELLS) -> Decoder:
             return _grid(message_class.FromString(bytes(data)), most_cells)
         except DecodeError as error:
             raise InvalidMapError(f"it cannot be decoded as {FOXGLOVE_GRID_TYPE}: {error}") from error
+        except (AttributeError, TypeError, ValueError, OverflowError) as error:
+            # By a schema of that name, but with other fields.
+            raise InvalidMapError(f"its schema is not that of {FOXGLOVE_GRID_TYPE}: {error}") from error
 
     return decode
 
