@@ -25,16 +25,17 @@ from rose2_logs.readers.bag_records import (
     CHUNK,
     CHUNK_INFO,
     CONNECTION,
-    INDEX,
     INDEX_DTYPE,
+    INDEX_ENTRY_BYTES,
+    INDEX_HEAD_BYTES,
     MAGIC,
     MESSAGE,
     Head,
+    IndexRows,
     chunk_data,
     chunk_info,
     connection_of,
     heads_in,
-    index_entries,
     number,
     read_head,
     time_ns,
@@ -185,11 +186,13 @@ class BagFile(LogFile):
                 raise ValueError("a record that does not belong into the index")
             begin = head.end
         self._check_index(infos)
+        rows = IndexRows()
         for place, counts in infos.items():
             try:
-                self._read_chunk_index(place, counts, parts)
+                self._read_chunk_index(place, counts, rows)
             except (*_DAMAGE, OSError) as error:
                 self._recover_chunk(place, sum(counts.values()), error, parts)
+        parts.append(rows.places())
 
     def _check_index(self, infos: dict[int, dict[int, int]]) -> None:
         """Compare what the index tells with what the bag's header says."""
@@ -197,18 +200,15 @@ class BagFile(LogFile):
         if len(infos) != number(fields, "chunk_count") or len(self.channels) != number(fields, "conn_count"):
             raise ValueError("the index is not whole")
 
-    def _read_chunk_index(self, place: int, counts: dict[int, int], parts: list[NDArray[np.void]]) -> None:
+    def _read_chunk_index(self, place: int, counts: dict[int, int], rows: IndexRows) -> None:
         head = read_head(self._stream, place)
         if head.op != CHUNK:
             raise ValueError("there is no chunk where the index says")
-        found, begin = [], head.end
-        for _ in counts:
-            index = read_head(self._stream, begin)
-            if index.op != INDEX:
-                raise ValueError("a chunk has no index behind it")
-            found.append(index_entries(index, self._data(index), place))
-            begin = index.end
-        parts += found
+        self._stream.seek(head.end)
+        length = len(counts) * INDEX_HEAD_BYTES + sum(counts.values()) * INDEX_ENTRY_BYTES
+        if head.end + length > self._size:
+            raise EOFError("it ends within the index of a chunk")
+        rows.take(self._stream.read(length), counts, place)
 
     def _recover_chunk(self, place: int, count: int, why: Exception, parts: list[NDArray[np.void]]) -> None:
         """Do without the index behind a chunk; if there is no chunk either, tell what is lost."""

@@ -20,6 +20,8 @@ from rose2_logs.readers.log_file import Channel
 MAGIC = b"#ROSBAG V2.0\n"
 MESSAGE, BAG_HEADER, INDEX, CHUNK, CHUNK_INFO, CONNECTION = 2, 3, 4, 5, 6, 7
 """Kinds of records, their field ``op``."""
+INDEX_HEAD_BYTES = 55
+"""Of an index record: its fields and the two lengths around them."""
 LARGEST_HEADER_BYTES = 1 << 20
 """Headers have a few fields, of which the topic's name is the longest; more is damage."""
 KEPT_FIELDS: tuple[str, ...] = ("callerid", "latching", "md5sum")
@@ -29,6 +31,8 @@ _LENGTH = struct.Struct("<I")
 _TIME = struct.Struct("<II")  # seconds, nanoseconds
 _LONG = struct.Struct("<Q")
 _INDEX_ENTRY = np.dtype([("s", "<u4"), ("ns", "<u4"), ("offset", "<u4")])
+INDEX_ENTRY_BYTES = _INDEX_ENTRY.itemsize
+"""Of an index record, for each message."""
 INDEX_DTYPE = np.dtype([("time", "<i8"), ("chunk", "<i8"), ("offset", "<u4"), ("connection", "<u4")])
 """Where a message lies: log time in nanoseconds, file offset of its chunk, offset in the chunk."""
 
@@ -165,19 +169,58 @@ def connection_of(head: Head, data: bytes) -> Channel:
     )
 
 
-def index_entries(head: Head, data: bytes, chunk: int) -> NDArray[np.void]:
-    """Places (N,) of `INDEX_DTYPE` by an index record of a chunk."""
-    if number(head.fields, "ver") != 1:
-        raise ValueError("an index of an unknown version")
-    entries = np.frombuffer(data, _INDEX_ENTRY)
-    if len(entries) != number(head.fields, "count"):
-        raise ValueError("an index has another length than it says")
-    places = np.empty(len(entries), INDEX_DTYPE)
-    places["time"] = entries["s"].astype(np.int64) * 10**9 + entries["ns"]
-    places["chunk"] = chunk
-    places["offset"] = entries["offset"]
-    places["connection"] = number(head.fields, "conn")
-    return places
+class IndexRows:
+    """Gathers the index records of chunks, of which a long bag has hundreds of thousands."""
+
+    def __init__(self) -> None:
+        self._entries: list[bytes] = []
+        self._rows: list[tuple[int, int, int]] = []
+
+    def take(self, data: bytes, counts: dict[int, int], chunk: int) -> None:
+        """Take the index records behind a chunk; all of them or none.
+
+        Parameters
+        ----------
+        data : bytes
+            Begins with the records.
+        counts : dict
+            Messages by connection, as the bag tells of the chunk.
+        chunk : int
+            File offset of the chunk.
+
+        Raises
+        ------
+        ValueError, KeyError, struct.error
+            If a record is damaged or missing, or tells otherwise.
+        """
+        entries, rows, place = [], [], 0
+        for _ in counts:
+            (length,) = _LENGTH.unpack_from(data, place)
+            place += _LENGTH.size
+            fields = parse_fields(data[place : place + length])
+            (size,) = _LENGTH.unpack_from(data, place + length)
+            place += length + _LENGTH.size
+            connection, count = number(fields, "conn"), number(fields, "count")
+            found = data[place : place + size]
+            if fields["op"] != bytes([INDEX]) or number(fields, "ver") != 1:
+                raise ValueError("a chunk has no index behind it")
+            if len(found) != size or size != count * _INDEX_ENTRY.itemsize or counts.get(connection) != count:
+                raise ValueError("an index has another length than it says")
+            entries.append(found)
+            rows.append((chunk, connection, count))
+            place += size
+        self._entries += entries
+        self._rows += rows
+
+    def places(self) -> NDArray[np.void]:
+        """Return the places (N,) of `INDEX_DTYPE` of all messages."""
+        entries = np.frombuffer(b"".join(self._entries), _INDEX_ENTRY)
+        rows = np.array(self._rows, np.int64).reshape(-1, 3)
+        places = np.empty(len(entries), INDEX_DTYPE)
+        places["time"] = entries["s"].astype(np.int64) * 10**9 + entries["ns"]
+        places["offset"] = entries["offset"]
+        places["chunk"], places["connection"] = np.repeat(rows[:, :2], rows[:, 2], axis=0).T
+        return places
 
 
 def chunk_info(head: Head, data: bytes) -> tuple[int, dict[int, int]]:

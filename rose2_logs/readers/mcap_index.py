@@ -153,7 +153,9 @@ class McapFile(LogFile):
         opcode, _, channel, length = INDEX.unpack(self._stream.read(INDEX.size))
         if opcode != Opcode.MESSAGE_INDEX or channel != channel_id:
             raise ValueError("no message index where the summary says")
-        entries = list(INDEX_ENTRY.iter_unpack(read_exactly(self._stream, length)))
+        if length > chunk.message_index_length:
+            raise ValueError("the message index is longer than the place for it")
+        entries = list(INDEX_ENTRY.iter_unpack(self._stream.read(length)))
         most = min(chunk.uncompressed_size, self.limits.chunk_max_bytes)
         if any(offset >= most for _, offset in entries):
             raise ValueError("the message index points behind the chunk")
