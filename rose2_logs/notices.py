@@ -102,6 +102,12 @@ class Notices:
                 {"message": record.getMessage()} | {k: v for k, v in told.items() if v is not None}
             )
 
+    def rename(self, old: str, new: str) -> None:
+        """Write another name for a log: of one that was copied to be read, where it comes from."""
+        for found in self.kinds.values():
+            for told in found.first:
+                told.update({k: v.replace(old, new) for k, v in told.items() if isinstance(v, str)})
+
     def as_json(self) -> dict[str, Any]:
         """Return the number of warnings, and of each kind the number and the first few."""
         kinds = {kind: {"count": found.count, "first": found.first} for kind, found in self.kinds.items()}

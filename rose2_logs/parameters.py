@@ -31,7 +31,7 @@ class ReadingParameters:
     map_max_cells: int = number(
         2**27,
         "cells",
-        "Largest map that is read: 579 m squared at 5 cm; about 20 bytes a cell are needed.",
+        "Largest map that is read: 579 m squared at 5 cm; of an image 2.7 GB are needed.",
         1,
     )
     chunk_max_bytes: int = number(

@@ -196,6 +196,8 @@ def _analyse_log(
             if totals.snapshots == 0:
                 raise InvalidMapError(f"{path}: none of its {totals.invalid} maps can be analysed")
         messages = dataclasses.asdict(reader.counts)
+    if options.origin is not None:
+        warnings.rename(str(path), options.origin)
     seconds = time.perf_counter() - start
     files = {name: file for name, file in planned.items() if name != "summary"}
     write_summary(

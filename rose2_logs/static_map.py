@@ -16,10 +16,11 @@ import shapely
 from rose2_logs.errors import LogError, OutputError, ParameterError
 from rose2_logs.explored import coarser_for_its_size
 from rose2_logs.occupancy import OccupancySnapshot
-from rose2_logs.parameters import Parameters
+from rose2_logs.parameters import Parameters, ReadingParameters
 from rose2_logs.pipeline import SnapshotAnalysis, analyse
 from rose2_logs.readers import open_log
 from rose2_logs.readers.discovery import IMAGE_ENDINGS
+from rose2_logs.readers.opening import DEFAULT_LIMITS
 from rose2_logs.rooms import RoomMap
 from rose2_logs.sinks.label_image import write_image, write_label_image
 from rose2_logs.sinks.picture import draw_rooms
@@ -75,7 +76,7 @@ def segment_map(
     )
     if not overwrite and (existing := [file for file in files if file.exists()]):
         raise OutputError(f"{existing[0]}: exists already; choose another folder or pass --overwrite")
-    snapshot = read_static_map(map_file, resolution_m)
+    snapshot = read_static_map(map_file, resolution_m, parameters.reading)
     analysis = analyse(snapshot, parameters, method)
     note = coarser_for_its_size(snapshot.geometry, analysis.resolution_m, parameters.occupancy)
     if note is not None:
@@ -86,7 +87,9 @@ def segment_map(
     return StaticMapResult(analysis.rooms, folder, files)
 
 
-def read_static_map(map_file: Path, resolution_m: float | None = None) -> OccupancySnapshot:
+def read_static_map(
+    map_file: Path, resolution_m: float | None = None, limits: ReadingParameters = DEFAULT_LIMITS
+) -> OccupancySnapshot:
     """Read a saved map; an image without a ``.yaml`` needs its resolution."""
     if not map_file.is_file():
         raise LogError(f"{map_file}: there is no such file")
@@ -95,7 +98,7 @@ def read_static_map(map_file: Path, resolution_m: float | None = None) -> Occupa
         raise ParameterError(f"{map_file}: no .yaml lies beside it; pass --resolution METRES_PER_CELL")
     if not is_bare and resolution_m is not None:
         raise ParameterError(f"{map_file}: its .yaml says the resolution; leave --resolution out")
-    with _described(map_file, resolution_m) as log, open_log(log) as reader:
+    with _described(map_file, resolution_m) as log, open_log(log, limits=limits) as reader:
         return reader.first()
 
 

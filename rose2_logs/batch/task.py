@@ -23,7 +23,7 @@ from rose2_logs import __version__
 from rose2_logs.batch.location import Location
 from rose2_logs.batch.record import BatchSettings, Record, Signature, signature_of
 from rose2_logs.errors import LogError, OutputError, Rose2LogsError
-from rose2_logs.notices import PACKAGE, gathered
+from rose2_logs.notices import PACKAGE, Notices, gathered
 
 RETRY_PAUSE_S = 2.0
 """Before the second try after a fault of storage or network; doubled for each further one."""
@@ -168,7 +168,7 @@ def analyse_task(task: LogTask, report: Report) -> LogOutcome:
     """
     with gathered() as notices, _own_messages():
         try:
-            outcome = _analyse(task, report)
+            outcome = _analyse(task, report, notices)
         except Exception as error:
             known = isinstance(error, Rose2LogsError)
             outcome = LogOutcome(
@@ -197,7 +197,7 @@ def is_transient(error: BaseException | None) -> bool:
     return False
 
 
-def _analyse(task: LogTask, report: Report) -> LogOutcome:
+def _analyse(task: LogTask, report: Report, notices: Notices) -> LogOutcome:
     if task.version != __version__:
         raise Rose2LogsError(f"the worker runs rose2-logs {__version__}, the batch {task.version}")
     if task.attempt > 1:
@@ -213,6 +213,9 @@ def _analyse(task: LogTask, report: Report) -> LogOutcome:
             if task.log.is_remote and str(path) in str(error):
                 raise type(error)(str(error).replace(str(path), task.log.address)) from error
             raise
+        finally:
+            if task.log.is_remote:
+                notices.rename(str(path), task.log.address)
 
 
 def _analyse_local(task: LogTask, path: Path, signature: Signature, report: Report) -> LogOutcome:

@@ -6,6 +6,7 @@ scanned once, chunk by chunk, over everything that is whole.
 
 from __future__ import annotations
 
+import io
 import logging
 import struct
 from collections import Counter
@@ -40,6 +41,7 @@ from rose2_logs.readers.bag_records import (
     read_head,
     time_ns,
 )
+from rose2_logs.readers.checked_file import CheckedFile
 from rose2_logs.readers.log_file import Channel, LogFile, Place, StoredMessage, check_count
 from rose2_logs.readers.source import DamagedMessageError
 
@@ -69,7 +71,7 @@ class BagFile(LogFile):
         self.limits = limits
         self._chunk: tuple[int, bytes] = (-1, b"")
         try:
-            self._stream = path.open("rb")
+            self._stream = io.BufferedReader(CheckedFile(path))
             self._size = path.stat().st_size
         except OSError as error:
             raise LogError(f"{path}: cannot be opened: {error.strerror}", file=path) from error
@@ -98,7 +100,7 @@ class BagFile(LogFile):
             self.indexed = index_begin > 0
             if self.indexed:
                 self._read_index(index_begin, parts)
-        except (*_DAMAGE, OSError):
+        except _DAMAGE:
             self.indexed = False
         if not self.indexed:
             self.channels, parts = {}, []
@@ -126,7 +128,7 @@ class BagFile(LogFile):
         """
         try:
             return self._payload(place)
-        except (*_DAMAGE, OSError) as error:
+        except _DAMAGE as error:
             raise DamagedMessageError(f"damaged ({error})") from error
 
     def _payload(self, place: Place) -> memoryview:
@@ -155,7 +157,7 @@ class BagFile(LogFile):
         sequence: Counter[int] = Counter()
         for entry in self._index[np.argsort(self._index["time"], kind="stable")]:
             place = Place(*entry.item())
-            with suppress(*_DAMAGE, OSError):
+            with suppress(*_DAMAGE):
                 data = self._payload(place)
                 channel, time = self.channels[place.channel_id], place.log_time_ns
                 yield StoredMessage(channel, time, time, sequence[place.channel_id], data)
@@ -171,7 +173,7 @@ class BagFile(LogFile):
         while begin < self._size:
             try:
                 head = read_head(self._stream, begin)
-            except (*_DAMAGE, OSError):
+            except _DAMAGE:
                 if not infos:
                     raise
                 break  # what is behind the index
@@ -190,7 +192,7 @@ class BagFile(LogFile):
         for place, counts in infos.items():
             try:
                 self._read_chunk_index(place, counts, rows)
-            except (*_DAMAGE, OSError) as error:
+            except _DAMAGE as error:
                 self._recover_chunk(place, sum(counts.values()), error, parts)
         parts.append(rows.places())
 
@@ -212,7 +214,7 @@ class BagFile(LogFile):
 
     def _recover_chunk(self, place: int, count: int, why: Exception, parts: list[NDArray[np.void]]) -> None:
         """Do without the index behind a chunk; if there is no chunk either, tell what is lost."""
-        with suppress(*_DAMAGE, OSError):
+        with suppress(*_DAMAGE):
             head = read_head(self._stream, place)
             if head.op == CHUNK:
                 self._scan_chunk(head, parts)
@@ -228,7 +230,7 @@ class BagFile(LogFile):
         while begin < self._size:
             try:
                 head = read_head(self._stream, begin)
-            except (*_DAMAGE, OSError) as error:
+            except _DAMAGE as error:
                 reason = str(error)
                 break
             if head.op == CHUNK:
@@ -257,7 +259,7 @@ class BagFile(LogFile):
                 elif head.op == MESSAGE:
                     time, connection = time_ns(head.fields, "time"), number(head.fields, "conn")
                     found.append((time, chunk.begin, head.begin, connection))
-        except (*_DAMAGE, OSError) as error:
+        except _DAMAGE as error:
             self.whole = False
             text = f"{self.path}: the chunk at byte {chunk.begin} is damaged ({error}); "
             notice(logger, "damaged_chunk", text + "what is whole of it is read", file=self.path)

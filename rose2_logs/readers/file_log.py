@@ -93,6 +93,8 @@ class FileLog(MessageSource):
             try:
                 self._files.append(open_file(file, self._limits))
             except LogError as error:
+                if isinstance(error.__cause__, OSError):
+                    raise  # of the storage, not of the log: it may pass
                 failures.append(error)
         if failures and not self._files:
             raise failures[0]

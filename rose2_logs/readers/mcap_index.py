@@ -22,6 +22,7 @@ from mcap.records import Channel as McapChannel
 from rose2_logs.errors import LogError
 from rose2_logs.notices import notice
 from rose2_logs.parameters import ReadingParameters
+from rose2_logs.readers.checked_file import CheckedFile
 from rose2_logs.readers.decompression import REMEDY
 from rose2_logs.readers.log_file import LATEST_NS, LogFile, Place, StoredMessage, check_count
 from rose2_logs.readers.mcap_records import (
@@ -73,7 +74,7 @@ class McapFile(LogFile):
         self._chunks: OrderedDict[int, memoryview] = OrderedDict()
         self._scanned: list[Place] = []
         try:
-            self._stream = path.open("rb", buffering=0)
+            self._stream = CheckedFile(path)
         except OSError as error:
             raise LogError(f"{path}: cannot be opened: {error.strerror}", file=path) from error
         try:
@@ -82,7 +83,7 @@ class McapFile(LogFile):
             index_damage = ""
             try:
                 self.summary = read_summary(self._stream, limits.chunk_max_bytes)
-            except (*DAMAGE, OSError) as error:
+            except DAMAGE as error:
                 self.summary, index_damage = None, str(error)
             self.indexed = self.summary is not None
             if self.summary is None:
@@ -182,7 +183,7 @@ class McapFile(LogFile):
             channel_id, _, log_time_ns, _ = MESSAGE.unpack_from(record)
             if (channel_id, log_time_ns) != (place.channel_id, place.log_time_ns):
                 raise ValueError("there is another message where the index says")
-        except (*DAMAGE, OSError) as error:
+        except DAMAGE as error:
             raise DamagedMessageError(f"damaged ({error})") from error
         return record[MESSAGE.size :]
 
@@ -212,7 +213,7 @@ class McapFile(LogFile):
         """Return the file's profile and the library that wrote it; empty where they are damaged."""
         try:
             header: Header = parsed(Header, memoryview(self._record(len(MAGIC))))
-        except (*DAMAGE, OSError):
+        except DAMAGE:
             return Header(profile="", library="")
         return header
 
@@ -228,7 +229,7 @@ class McapFile(LogFile):
         for offset in offsets:
             try:
                 yield parsed(kind, memoryview(self._record(offset)))
-            except (*DAMAGE, OSError) as error:
+            except DAMAGE as error:
                 text = f"{self.path}: the {kind.__name__.lower()} at byte {offset} is left out ({error})"
                 notice(logger, "damaged_record", text, file=self.path)
 

@@ -136,7 +136,7 @@ def read_summary(stream: IO[bytes], most_bytes: int) -> Summary | None:
 
     Raises
     ------
-    ValueError, struct.error, EOFError, OSError ...
+    ValueError, struct.error, EOFError ...
         If it is damaged or cut off.
     """
     size = stream.seek(0, 2)

@@ -1,6 +1,7 @@
 """Every format of a log gives the same maps; damaged, foreign and mapless logs end well."""
 
 import contextlib
+import errno
 import itertools
 import logging
 import shutil
@@ -518,3 +519,34 @@ def test_a_third_party_log_without_maps_says_so_in_one_line(name):
         open_log(path)
     assert "\n" not in str(caught.value)
     assert inspect_log(path).topics
+
+
+def test_a_sector_that_cannot_be_read_is_damage_and_a_lost_network_is_not(tmp_path, monkeypatch):
+    """The first costs a map; the second may pass, so it is no verdict on the log."""
+    from rose2_logs.readers import checked_file
+
+    maps, messages = noisy_run()
+    path = FORMATS["mcap-uncompressed"](tmp_path, messages)
+    at = path.read_bytes().index(serialized(maps[2], 2)[-2000:-1000])
+    read_file = checked_file.io.FileIO.read
+    for number, code in enumerate((errno.EIO, errno.ESTALE)):
+
+        class FailingFile(checked_file.io.FileIO):
+            failure = code
+
+            def read(self, size=-1, /):
+                if self.tell() <= at < self.tell() + size:
+                    raise OSError(self.failure, "broken")
+                return read_file(self, size)
+
+        class Checked(checked_file.CheckedFile, FailingFile):
+            pass
+
+        monkeypatch.setattr("rose2_logs.readers.mcap_index.CheckedFile", Checked)
+        with open_log(path) as log:
+            if number == 0:
+                assert len(list(log.snapshots())) == 4
+                assert log.counts.damaged == 1
+            else:
+                with pytest.raises(OSError, match="broken"):
+                    list(log.snapshots())
