@@ -238,7 +238,7 @@ def _kind(file: Path) -> str:
         return ".yaml"
     if suffix in IMAGE_ENDINGS:
         return "image"
-    if _is_packed(file) or suffix in STORAGE_ENDINGS:
+    if _is_packed(file) or name.endswith(STORAGE_ENDINGS):
         what = "is empty" if not begin else f"does not begin as {suffix} files do"
         raise LogError(f"{file}: {what}; was it copied whole?", file=file)
     raise LogError(f"{file}: is not a kind of log that can be read; give {_FORMATS}", file=file)
