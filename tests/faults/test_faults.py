@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 import tracemalloc
+from pathlib import Path
 
 import numpy as np
 import pytest
 from bombs import BOMBS
-from fault_table import LIMITS, TABLES, expected, make, outcome
+from fault_table import LIMITS, PAGE, TABLES, expected, make, outcome
 from faulty_logs import COUNT, INPUTS, MESSAGE_FAULTS, SEEN, Grid, room
 
 from rose2_logs.notices import StrictError, gathered
@@ -119,3 +121,17 @@ def test_a_lost_map_takes_the_patches_after_it_along(tmp_path):
         snapshots = list(reader.snapshots())
     for snapshot, k in zip(snapshots, (0, 1, 3, 4), strict=True):
         np.testing.assert_array_equal(snapshot.cells, room(SEEN[k], k))
+
+
+def test_every_kind_of_warning_is_explained_on_the_page():
+    """Those that the code can give, wherever it is."""
+    kinds = set()
+    for path in (Path(__file__).parents[2] / "rose2_logs").rglob("*.py"):
+        code = path.read_text(encoding="utf-8")
+        kinds |= set(re.findall(r'(?:notice\(logger, |Remark\(\s*)"(\w+)"', code))
+    assert "invalid_map" not in kinds, "that one is chosen by the error"
+    explained = set(
+        re.findall(r"`(\w+)`", PAGE.read_text(encoding="utf-8").partition("## Faults of messages")[0])
+    )
+    assert kinds | {"invalid_map", "damaged_message"} <= explained
+    assert len(kinds) > 15
