@@ -49,6 +49,8 @@ logger = logging.getLogger(__name__)
 
 # What parsing raises on bytes that are not what they should be; ValueError is also TooLargeError.
 _DAMAGE = (ValueError, KeyError, EOFError, struct.error)
+# Messages of a scanned chunk that are put into an array at once: as tuples they take ten times the memory.
+_ENTRIES_AT_ONCE = 65_536
 
 
 class BagFile(LogFile):
@@ -258,14 +260,17 @@ class BagFile(LogFile):
                     self._take_connection(head, bytes(records[head.data_begin : head.end]))
                 elif head.op == MESSAGE:
                     time, connection = time_ns(head.fields, "time"), number(head.fields, "conn")
-                    found.append((time, chunk.begin, head.begin, connection))
+                    if connection in self.channels:
+                        found.append((time, chunk.begin, head.begin, connection))
+                    if len(found) == _ENTRIES_AT_ONCE:
+                        parts.append(np.array(found, INDEX_DTYPE))
+                        found.clear()
         except _DAMAGE as error:
             self.whole = False
             text = f"{self.path}: the chunk at byte {chunk.begin} is damaged ({error}); "
             notice(logger, "damaged_chunk", text + "what is whole of it is read", file=self.path)
-        known = [each for each in found if each[3] in self.channels]
-        if known:
-            parts.append(np.array(known, INDEX_DTYPE))
+        if found:
+            parts.append(np.array(found, INDEX_DTYPE))
 
     def _take_connection(self, head: Head, data: bytes) -> None:
         channel = connection_of(head, data)
