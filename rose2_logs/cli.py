@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated
 
@@ -19,6 +20,7 @@ from rose2_logs.cli_options import (
     Debug,
     End,
     Every,
+    Layers,
     MaxSnapshots,
     Method,
     MinChange,
@@ -29,10 +31,11 @@ from rose2_logs.cli_options import (
     Strict,
     Topic,
     Workers,
+    chosen_layers,
     resolve_parameters,
     state,
 )
-from rose2_logs.errors import LogError, ParameterError, Rose2LogsError
+from rose2_logs.errors import ParameterError, Rose2LogsError
 
 app = App(
     name="rose2-logs",
@@ -138,6 +141,13 @@ def analyze(
     no_rrd: NoRecording = False,
     no_mcap: NoAnnotatedLog = False,
     strict: Strict = False,
+    layers: Layers = "all",
+    bag: Annotated[
+        bool,
+        typer.Option(
+            "--bag", help="Also write metadata.yaml: `ros2 bag play OUT/NAME` then plays the annotated MCAP."
+        ),
+    ] = False,
     debug: Debug = False,
 ) -> None:
     """Find and follow the rooms in all maps of a log; write recording, annotated MCAP and tables."""
@@ -148,6 +158,9 @@ def analyze(
 
     keep_freed_memory()
     parameters = resolve_parameters(config, settings, method)
+    shown = chosen_layers(layers)
+    if bag and no_mcap:
+        raise ParameterError("--bag is about the annotated MCAP: leave --no-mcap out")
     names = [log_stem(log) for log in logs]
     if twice := {name for name in names if names.count(name) > 1}:
         raise ParameterError(f"several logs are named {min(twice)}: analyze them to different folders")
@@ -162,7 +175,9 @@ def analyze(
                 method=method,
                 workers=workers,
                 recording=not no_rrd,
+                layers=shown,
                 annotated_log=not no_mcap,
+                bag=bag,
                 live=live,
                 overwrite=overwrite,
                 strict=strict,
@@ -182,26 +197,39 @@ def analyze(
 app.command(epilog=cli_batch.BATCH_EXAMPLE)(cli_batch.batch)
 
 
-@app.command(epilog="Example: [bold]rose2-logs view results/run/run.rrd[/bold]")
+@app.command(
+    epilog="Example: [bold]rose2-logs view results/run[/bold]; on a machine without a screen, "
+    "[bold]rose2-logs view results/run --web[/bold]"
+)
 def view(
     recording: Annotated[
         str,
         typer.Argument(
-            metavar="FILE.rrd", help="Recording that analyze wrote, or address that serve printed."
+            metavar="FILE.rrd",
+            help="Recording that analyze wrote, or its folder, or the address that serve printed.",
         ),
     ],
-    web: Annotated[bool, typer.Option("--web", help="In the browser.")] = False,
+    web: Annotated[bool, typer.Option("--web", help="In the browser, served on 127.0.0.1.")] = False,
+    port: Annotated[
+        int | None,
+        typer.Option(min=1, max=65535, help="With --web: port of the page.", show_default=False),
+    ] = None,
     debug: Debug = False,
 ) -> None:
     """Open a recording in the Rerun viewer."""
-    import subprocess
+    from rose2_logs import reporting
+    from rose2_logs.sinks import rerun_viewer
 
-    if "://" not in recording and not Path(recording).is_file():
-        raise LogError(f"{recording}: there is no such file; rose2-logs analyze writes recordings")
-    # Rerun's servers answer the whole network unless they are told otherwise.
-    command = [sys.executable, "-m", "rerun", "--bind", "127.0.0.1", recording]
-    command += ["--web-viewer"] if web else []
-    raise typer.Exit(subprocess.run(command, check=False).returncode)
+    if "://" not in recording:
+        recording = str(rerun_viewer.find_recording(Path(recording)))
+    if not web:
+        raise typer.Exit(rerun_viewer.show(recording))
+    with rerun_viewer.served_page(recording, port) as (url, server):
+        reporting.print_line(f"{url} shows it until Ctrl-C is pressed")
+        if rerun_viewer.has_screen():
+            typer.launch(url)
+        with suppress(KeyboardInterrupt):
+            server.wait()
 
 
 app.command(epilog=cli_batch.SERVE_EXAMPLE)(cli_batch.serve)

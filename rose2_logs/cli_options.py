@@ -52,6 +52,14 @@ MaxSnapshots = Annotated[
     int | None, typer.Option(metavar="N", help="Most maps, spread evenly.", show_default=False)
 ]
 NoRecording = Annotated[bool, typer.Option("--no-rrd", help="Write no Rerun recording.")]
+Layers = Annotated[
+    str,
+    typer.Option(
+        metavar="NAMES",
+        help="What the recording gets besides map, rooms and doorways: all, none, or some of "
+        "predicted, path, clean_map, score, spectrum, segments, lines, faces, voronoi, between commas.",
+    ),
+]
 NoAnnotatedLog = Annotated[bool, typer.Option("--no-mcap", help="Write no annotated MCAP.")]
 Method = Annotated[str, typer.Option(help="Segmentation: rose2, morphological, distance or voronoi.")]
 Strict = Annotated[
@@ -69,6 +77,26 @@ Settings = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="STAGE.NAME=VALUE", help="Change one parameter.", show_default=False),
 ]
+
+
+def chosen_layers(names: str) -> tuple[str, ...]:
+    """Read which layers of a recording were asked for: all, none, or names between commas.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such layer.
+    """
+    from rose2_logs.sinks.sink import RECORDING_LAYERS
+
+    if names in ("all", "none"):
+        return RECORDING_LAYERS if names == "all" else ()
+    asked = [name.strip() for name in names.split(",")]
+    if unknown := [name for name in asked if name not in RECORDING_LAYERS]:
+        raise ParameterError(
+            f"--layers: there is no layer {unknown[0]!r}; there are: all, none, {', '.join(RECORDING_LAYERS)}"
+        )
+    return tuple(name for name in RECORDING_LAYERS if name in asked)
 
 
 def resolve_parameters(config: Path | None, settings: list[str] | None, method: str) -> Parameters:

@@ -244,3 +244,30 @@ def label_sizes(labels: NDArray[np.integer], count: int) -> NDArray[np.int64]:
     for rows in np.array_split(labels, max(1, labels.size // COUNTED_AT_ONCE)):
         sizes += np.bincount(rows.ravel(), minlength=count + 1)
     return sizes
+
+
+def straight_runs(
+    row: NDArray[np.integer], column: NDArray[np.integer], step: tuple[int, int]
+) -> tuple[NDArray[np.integer], NDArray[np.integer]]:
+    """Join cells that follow one another along a direction.
+
+    Parameters
+    ----------
+    row, column : (N,) int
+        The cells, each once.
+    step : (int, int)
+        From a cell to the next of its run: (0, 1), or 1 row with any number of columns.
+
+    Returns
+    -------
+    first, last : (K, 2) int
+        Row and column of the ends of each run; a lone cell is both.
+    """
+    down, right = step
+    place, line = (row, column - right * row) if down else (column, row)
+    order = np.lexsort((place, line))
+    cells = np.column_stack([row, column])[order]
+    is_first = np.ones(len(cells), bool)
+    is_first[1:] = (np.diff(line[order]) != 0) | (np.diff(place[order]) != 1)
+    is_last = np.append(is_first[1:], True)[: len(cells)]
+    return cells[is_first], cells[is_last]

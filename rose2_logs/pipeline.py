@@ -26,6 +26,7 @@ from rose2_logs.floor_plan.rooms import (
 from rose2_logs.floor_plan.stage import FloorPlanResult, make_floor_plan
 from rose2_logs.occupancy import (
     BoolArray,
+    FloatArray,
     GridGeometry,
     OccupancySnapshot,
     distinct_labels,
@@ -37,6 +38,7 @@ from rose2_logs.rooms import Doorway, RoomMap
 from rose2_logs.rose.stage import RoseResult, find_structure
 from rose2_logs.rose.structure import Structure
 from rose2_logs.topology.splitting import split_rooms
+from rose2_logs.topology.voronoi import voronoi_lines
 from rose2_logs.walls.stage import WallResult, count_walls, find_walls
 from rose2_logs.walls.walls import Walls
 
@@ -65,6 +67,8 @@ class SnapshotAnalysis:
         What the stages found; None from a method that does not have them.
     seconds : dict
         Time per stage.
+    voronoi_m : (V, 4) float or None
+        Lines x0, y0, x1, y1 of the free space's Voronoi graph, world metres, where it was asked for.
     """
 
     index: int
@@ -78,6 +82,7 @@ class SnapshotAnalysis:
     walls: Walls | None
     floor_plan: FloorPlan | None
     seconds: dict[str, float]
+    voronoi_m: FloatArray | None = None
 
     def again_for(self, snapshot: OccupancySnapshot) -> SnapshotAnalysis:
         """Return the same for another snapshot of the same free and occupied cells at the same place."""
@@ -90,7 +95,9 @@ class SnapshotAnalysis:
         )
 
 
-def analyse(snapshot: OccupancySnapshot, parameters: Parameters, method: str = "rose2") -> SnapshotAnalysis:
+def analyse(
+    snapshot: OccupancySnapshot, parameters: Parameters, method: str = "rose2", *, voronoi: bool = False
+) -> SnapshotAnalysis:
     """Segment one map into rooms.
 
     Parameters
@@ -99,6 +106,8 @@ def analyse(snapshot: OccupancySnapshot, parameters: Parameters, method: str = "
     parameters : Parameters
     method : str
         One of `METHODS`.
+    voronoi : bool
+        Whether to return the Voronoi graph as well, which nothing but looking at it needs.
 
     Returns
     -------
@@ -175,8 +184,16 @@ def analyse(snapshot: OccupancySnapshot, parameters: Parameters, method: str = "
     labels, shapes, room_of_face = _finished_rooms(labels, plan, free, resolution, parameters)
     rooms = _room_map(labels, shapes, explored, parameters)
     watch.lap("rooms")
+    graph = None
+    if voronoi:
+        passage_m = parameters.topology.doorway_min_width_m / 2
+        # Clutter does not keep the free space apart.
+        inside = (labels > 0) | (occupied & ~walls.walls)
+        graph = explored.segments(voronoi_lines(inside, walls.walls, resolution, passage_m))
+        watch.lap("voronoi")
     return analysis(
         rooms=rooms,
+        voronoi_m=graph,
         structure=_structure(structure, explored),
         walls=_walls(walls, explored),
         floor_plan=_floor_plan(plan, room_of_face, explored, parameters),
@@ -271,6 +288,7 @@ def _structure(found: RoseResult, explored: ExploredPart) -> Structure:
         scores=explored.occupied_cells(found.score),
         threshold=found.threshold,
         clean_cells=explored.occupied_cells(found.clean),
+        spectrum=found.spectrum,
     )
 
 

@@ -24,10 +24,12 @@ from rose2_logs.provenance import fingerprint, software_versions
 from rose2_logs.readers import Selection, inspect_log, open_log
 from rose2_logs.readers.discovery import stem_of
 from rose2_logs.readers.log import LogReader
+from rose2_logs.readers.poses import RobotPath
 from rose2_logs.room_evidence import RoomEvidence, room_evidence
-from rose2_logs.sinks.sink import RunInfo, Sink
+from rose2_logs.sinks.sink import RECORDING_LAYERS, RunInfo, Sink
 from rose2_logs.sinks.summary import RunTotals, write_summary
 from rose2_logs.sinks.tables import Tables
+from rose2_logs.sinks.viewer_layouts import bag_metadata_path, foxglove_path, rviz_path
 from rose2_logs.tracking.frames import TrackedSnapshot, map_motion
 from rose2_logs.tracking.layout_change import LayoutFollower
 from rose2_logs.tracking.lives import Moment
@@ -59,6 +61,10 @@ class RunOptions:
         ``if __name__ == "__main__"``, as each of them imports it.
     recording, annotated_log : bool
         Whether to write the Rerun recording and the annotated MCAP. The tables are always written.
+    bag : bool
+        Whether the folder becomes a bag of ROS 2 that holds the annotated MCAP.
+    layers : tuple of str
+        Those of `RECORDING_LAYERS` that the recording gets.
     live : bool
         Also send the recording to an open Rerun viewer.
     overwrite : bool
@@ -76,10 +82,17 @@ class RunOptions:
     workers: int = 1
     recording: bool = True
     annotated_log: bool = True
+    bag: bool = False
+    layers: tuple[str, ...] = RECORDING_LAYERS
     live: bool = False
     overwrite: bool = False
     origin: str | None = None
     strict: bool = False
+
+    @property
+    def shown_layers(self) -> tuple[str, ...]:
+        """The layers that a recording, stored or live, is going to show."""
+        return self.layers if self.recording or self.live else ()
 
 
 @dataclass(frozen=True)
@@ -175,11 +188,12 @@ def _analyse_log(
         last = reader.last()
         info = _run_info(path, reader, options)
         first_ns: int | None = None
+        way = reader.robot_path(last.geometry.frame_id) if "path" in options.shown_layers else None
         with ExitStack() as stack:
             tables = Tables(folder)
-            outputs = (tables, *_make_sinks(planned, info, options, reader))
-            sinks = [stack.enter_context(sink) for sink in outputs]
-            for frame in tracked_snapshots(reader, last, workers, options.parameters, totals):
+            others = _make_sinks(planned, info, options, tables, reader)
+            sinks = [stack.enter_context(sink) for sink in (tables, *others)]
+            for frame in tracked_snapshots(reader, last, workers, options.parameters, totals, way):
                 for sink in sinks:
                     sink.write(frame)
                 totals.add(frame)
@@ -195,6 +209,7 @@ def _analyse_log(
                     on_snapshot(frame, (now_ns - first_ns) / max(last.log_time_ns - first_ns, 1))
             if totals.snapshots == 0:
                 raise InvalidMapError(f"{path}: none of its {totals.invalid} maps can be analysed")
+            tables.look_back()
         messages = dataclasses.asdict(reader.counts)
     if options.origin is not None:
         warnings.rename(str(path), options.origin)
@@ -220,7 +235,12 @@ def _analyse_log(
 
 def start_workers(options: RunOptions) -> SnapshotWorkers:
     """Return what analyses snapshots: a context manager, to be entered as early as possible."""
-    work = partial(_analyse_or_refuse, parameters=options.parameters, method=options.method)
+    work = partial(
+        _analyse_or_refuse,
+        parameters=options.parameters,
+        method=options.method,
+        voronoi="voronoi" in options.shown_layers,
+    )
     return Workers(work, options.workers)
 
 
@@ -230,6 +250,7 @@ def tracked_snapshots(
     workers: SnapshotWorkers,
     parameters: Parameters,
     totals: RunTotals,
+    path: RobotPath | None = None,
 ) -> Iterator[TrackedSnapshot]:
     """Yield every map of a log with its rooms and their identity.
 
@@ -245,6 +266,8 @@ def tracked_snapshots(
         Those that it was started with.
     totals : RunTotals
         Maps that cannot be analysed are left out and counted as invalid here.
+    path : RobotPath, optional
+        Where the robot was, to be told with the maps.
     """
     final_free_m2 = free_area_m2(last, parameters.occupancy)
     tracker = RoomTracker(parameters.tracking, parameters.occupancy)
@@ -268,7 +291,8 @@ def tracked_snapshots(
         track_ids, events = tracker.update(snapshot, analysis)
         change = layout.update(analysis.rooms, track_ids, map_motion(events))
         coverage = min(analysis.free_area_m2 / final_free_m2, 1.0) if final_free_m2 > 0 else 0.0
-        yield TrackedSnapshot(snapshot, analysis, coverage, track_ids, events, evidence, change)
+        way = None if path is None else path.until(snapshot.log_time_ns)
+        yield TrackedSnapshot(snapshot, analysis, coverage, track_ids, events, evidence, change, way)
 
 
 def is_same_to_analysis(
@@ -295,10 +319,10 @@ def free_area_m2(snapshot: OccupancySnapshot, parameters: OccupancyParameters) -
 
 
 def _analyse_or_refuse(
-    snapshot: OccupancySnapshot, parameters: Parameters, method: str
+    snapshot: OccupancySnapshot, parameters: Parameters, method: str, voronoi: bool
 ) -> tuple[SnapshotAnalysis, RoomEvidence] | InvalidMapError:
     try:
-        analysis = analyse(snapshot, parameters, method)
+        analysis = analyse(snapshot, parameters, method, voronoi=voronoi)
         return analysis, room_evidence(snapshot, analysis.rooms, parameters.occupancy)
     except InvalidMapError as error:
         return error
@@ -323,22 +347,27 @@ def _planned_files(folder: Path, stem: str, options: RunOptions) -> dict[str, Pa
     if options.recording:
         files["recording"] = folder / f"{stem}.rrd"
     if options.annotated_log:
-        files["annotated_log"] = folder / f"{stem}.rose2.mcap"
+        log = folder / f"{stem}.rose2.mcap"
+        files |= {"annotated_log": log, "foxglove": foxglove_path(log), "rviz": rviz_path(log)}
+        if options.bag:
+            files["bag"] = bag_metadata_path(log)
     files |= {name: folder / f"{name}.parquet" for name in TABLES}
     return files | {"summary": folder / SUMMARY}
 
 
 def _make_sinks(
-    planned: dict[str, Path], info: RunInfo, options: RunOptions, reader: LogReader
+    planned: dict[str, Path], info: RunInfo, options: RunOptions, tables: Tables, reader: LogReader
 ) -> list[Sink]:
     # Imported here: each brings a large library that the others do not need.
     sinks: list[Sink] = []
     if options.recording or options.live:
         from rose2_logs.sinks.rerun_recording import RerunRecording
 
-        sinks.append(RerunRecording(planned.get("recording"), info, live=options.live))
+        recording = planned.get("recording")
+        sinks.append(RerunRecording(recording, info, live=options.live, layers=options.layers, tables=tables))
     if options.annotated_log:
         from rose2_logs.sinks.annotated_mcap import AnnotatedMcap
 
-        sinks.append(AnnotatedMcap(planned["annotated_log"], info, reader.source))
+        log = planned["annotated_log"]
+        sinks.append(AnnotatedMcap(log, info, reader.source, is_bag=options.bag))
     return sinks

@@ -1,8 +1,9 @@
-"""Open a recording in Rerun's viewer without a screen and save what it shows as a PNG.
+"""Open a recording in Rerun's viewer without a screen and save what it shows as PNGs.
 
 Needs a Vulkan driver; Debian's ``mesa-vulkan-drivers`` draws in software.
 
     python tools/screenshot_recording.py results/office/office.rrd office.png --coverage 1.0
+    python tools/screenshot_recording.py results/office/office.rrd walls.png --tab Walls --view
 """
 
 from __future__ import annotations
@@ -11,6 +12,8 @@ import argparse
 import os
 import sys
 import time
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -22,42 +25,90 @@ PORT = 9899
 LOAD_TIMEOUT_S = 60.0
 SETTLE_S = 2.0
 """Time for the views to draw after the cursor has moved."""
+OF_THE_MACHINE = ("rasterizer", "Docker", "containerized")
+"""Words of warnings that are about the machine, not about the recording."""
 
 
-def screenshot(recording: Path, picture: Path, coverage: float = 1.0, port: int = PORT) -> None:
-    """Save the viewer's picture of a recording at a coverage.
+@dataclass(frozen=True)
+class Shot:
+    """One picture.
+
+    Attributes
+    ----------
+    picture : path
+        The PNG to write.
+    coverage : float
+        Where along the run, 0 to 1.
+    tabs : tuple of str
+        Names of views to bring to the front.
+    is_view : bool
+        Whether to show the first of them alone instead of the whole window.
+    """
+
+    picture: Path
+    coverage: float = 1.0
+    tabs: tuple[str, ...] = ()
+    is_view: bool = False
+
+
+def take(recording: Path, shots: Sequence[Shot], port: int = PORT, settle_s: float = SETTLE_S) -> list[str]:
+    """Take pictures of a recording and return what the viewer finds wrong with it.
 
     Raises
     ------
     RuntimeError
-        If a view reports an error, or the recording does not load.
+        If the recording does not load, or a tab is not there.
     """
     # The viewer is looked for on the path, where an environment that is not activated does not stand.
     os.environ["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', '')}"
+    problems: list[str] = []
     with ViewerClient.spawn(headless=True, port=port, detach_process=False) as viewer:
         viewer.open(str(recording.resolve()))
         _wait_until_loaded(viewer)
-        viewer.set_time("coverage", sequence=round(coverage / COVERAGE_UNIT), play_state="paused")
-        time.sleep(SETTLE_S)
-        problems = _reports(viewer)
-        picture.write_bytes(viewer.take_screenshot())
-    if problems:
-        raise RuntimeError(f"{recording}: the viewer reports: {problems}")
+        for shot in shots:
+            views = _bring_to_front(viewer, shot.tabs)
+            viewer.set_time("coverage", sequence=round(shot.coverage / COVERAGE_UNIT), play_state="paused")
+            time.sleep(settle_s)
+            shot.picture.write_bytes(viewer.take_screenshot(views[0] if shot.is_view else None))
+            problems += _reports(viewer)
+        problems += [
+            f"{entry.level}: {entry.message}"
+            for entry in viewer.get_logs()
+            if any(level in entry.level.upper() for level in ("WARN", "ERROR"))
+            and not any(word in entry.message for word in OF_THE_MACHINE)
+        ]
+    return problems
 
 
 def _wait_until_loaded(viewer: ViewerClient) -> None:
     end = time.monotonic() + LOAD_TIMEOUT_S
     while time.monotonic() < end:
-        state: Any = viewer.get_state()
-        if getattr(state, "views", None):
+        if viewer.get_state().views:
             return
         time.sleep(0.5)
     raise RuntimeError(f"the recording did not load within {LOAD_TIMEOUT_S:.0f} s")
 
 
+def _bring_to_front(viewer: ViewerClient, names: Sequence[str]) -> list[str]:
+    """Make each of some views the active one of its tabs; return their ids."""
+    if not names:
+        return []
+    ids = {view.name: str(view.view_id) for view in viewer.get_state().views}
+    if missing := [name for name in names if name not in ids]:
+        raise RuntimeError(f"the recording has no view {missing[0]!r}")
+    chosen = [ids[name] for name in names]
+    blueprint: dict[str, Any] = viewer.get_blueprint(of="recording").blueprint
+    for parts in blueprint.values():
+        container = parts.get("ContainerBlueprint", {})
+        for view in chosen:
+            if f"view/{view}" in container.get("contents", []):
+                container["active_tab"] = f"view/{view}"
+    viewer.set_blueprint(blueprint, of="recording")
+    return chosen
+
+
 def _reports(viewer: ViewerClient) -> list[str]:
-    state: Any = viewer.get_state()
-    return [str(report) for view in state.views for report in getattr(view, "reports", [])]
+    return [f"{view.name}: {report}" for view in viewer.get_state().views for report in view.reports]
 
 
 def main() -> int:
@@ -68,9 +119,16 @@ def main() -> int:
     parser.add_argument("recording", type=Path, help="the .rrd file")
     parser.add_argument("picture", type=Path, help="the PNG to write")
     parser.add_argument("--coverage", type=float, default=1.0, help="where along the run, 0 to 1 (default 1)")
+    parser.add_argument("--tab", action="append", default=[], help="name of a view to bring to the front")
+    parser.add_argument("--view", action="store_true", help="the first of these alone, not the whole window")
     arguments = parser.parse_args()
-    screenshot(arguments.recording, arguments.picture, arguments.coverage)
-    return 0
+    shot = Shot(arguments.picture, arguments.coverage, tuple(arguments.tab), arguments.view)
+    if arguments.view and not arguments.tab:
+        parser.error("--view needs --tab")
+    problems = take(arguments.recording, [shot])
+    if problems:
+        print(f"{arguments.recording}: the viewer reports: {problems}", file=sys.stderr)
+    return 1 if problems else 0
 
 
 if __name__ == "__main__":

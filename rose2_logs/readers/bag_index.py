@@ -154,10 +154,13 @@ class BagFile(LogFile):
             raise EOFError("it ends within the message")
         return data
 
-    def messages(self) -> Iterator[StoredMessage]:
-        """Yield every message that is whole, by log time."""
+    def messages(self, channel_ids: Collection[int] | None = None) -> Iterator[StoredMessage]:
+        """Yield every message that is whole, of some channels or of all, by log time."""
         sequence: Counter[int] = Counter()
-        for entry in self._index[np.argsort(self._index["time"], kind="stable")]:
+        index = self._index
+        if channel_ids is not None:
+            index = index[np.isin(index["connection"], list(channel_ids))]
+        for entry in index[np.argsort(index["time"], kind="stable")]:
             place = Place(*entry.item())
             with suppress(*_DAMAGE):
                 data = self._payload(place)

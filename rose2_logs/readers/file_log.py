@@ -15,7 +15,7 @@ from rose2_logs.parameters import ReadingParameters
 from rose2_logs.readers.log_file import LogFile, Place
 from rose2_logs.readers.messages import Decoder, Grid, Patch, decoder
 from rose2_logs.readers.selection import Times
-from rose2_logs.readers.source import LoggedMap, LogInfo, MessageSource, TopicInfo
+from rose2_logs.readers.source import LoggedBytes, LoggedMap, LogInfo, MessageSource, TopicInfo
 
 logger = logging.getLogger(__name__)
 
@@ -128,6 +128,16 @@ class FileLog(MessageSource):
         for time, number, place, topic, index in sorted(chosen, key=lambda found: found[:3]):
             decode = partial(self._decode, number, place)
             yield LoggedMap(time, topic, index, self._files[number].path, decode)
+
+    def stream(self, topics: Sequence[str]) -> Iterator[LoggedBytes]:
+        """Yield all messages of `topics` about in the order of log time, none of them held."""
+        for file in sorted(self._files, key=lambda each: each.start_ns or 0):
+            wanted = [each.id for each in file.channels.values() if each.topic in topics]
+            for message in file.messages(wanted) if wanted else ():
+                channel = message.channel
+                is_cdr = channel.message_encoding == "cdr"
+                read = partial(file.decompressed if is_cdr else memoryview, message.data)
+                yield LoggedBytes(message.log_time_ns, channel.topic, channel.message_encoding, read)
 
     def _topic_places(self, topic: str) -> list[tuple[Place, int]]:
         if topic not in self._places:

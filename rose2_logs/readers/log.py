@@ -16,6 +16,7 @@ from rose2_logs.occupancy import OccupancySnapshot
 from rose2_logs.readers.map_stream import MapStream, ReadCounts
 from rose2_logs.readers.messages import Patch, Remark, is_patch_type
 from rose2_logs.readers.oddities import Oddities
+from rose2_logs.readers.poses import RobotPath
 from rose2_logs.readers.selection import Selection, Times
 from rose2_logs.readers.source import DamagedMessageError, LoggedMap, LogInfo, MessageSource, TopicInfo
 
@@ -123,6 +124,16 @@ class LogReader:
             if snapshot is not None:
                 return dataclasses.replace(snapshot, index=-1)
         raise self._no_map(counts)
+
+    def robot_path(self, frame_id: str) -> RobotPath:
+        """Follow the robot through the selected time.
+
+        Parameters
+        ----------
+        frame_id : str
+            Frame of the map, in which its poses are wanted.
+        """
+        return RobotPath(self.source, frame_id, self._selection.start_ns)
 
     def _read(
         self, chosen: Times, counts: ReadCounts, min_change_m2: float | None = None, *, tell: bool = False

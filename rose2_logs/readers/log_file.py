@@ -128,8 +128,8 @@ class LogFile(ABC):
         """
 
     @abstractmethod
-    def messages(self) -> Iterator[StoredMessage]:
-        """Yield every message that is whole, of any channel, for a copy of the log."""
+    def messages(self, channel_ids: Collection[int] | None = None) -> Iterator[StoredMessage]:
+        """Yield every message that is whole, of some channels or of all, without holding them."""
 
     def decompressed(self, data: bytes | memoryview) -> memoryview:
         """Return a message of a ROS 2 bag that may have been compressed message by message.

@@ -187,8 +187,20 @@ class McapFile(LogFile):
             raise DamagedMessageError(f"damaged ({error})") from error
         return record[MESSAGE.size :]
 
-    def messages(self) -> Iterator[StoredMessage]:
-        """Yield every message that is whole, in the order of the file."""
+    def messages(self, channel_ids: Collection[int] | None = None) -> Iterator[StoredMessage]:
+        """Yield every message that is whole: of some channels chunk by chunk, or all in the file's order."""
+        if channel_ids is None:
+            yield from self._all_messages()
+        elif self.summary is None:
+            yield from (each for each in self._all_messages() if each.channel.id in channel_ids)
+        else:
+            for chunk in sorted(self.summary.chunks, key=lambda each: each.message_start_time):
+                if set(channel_ids) & set(chunk.message_index_offsets):
+                    with suppress(*DAMAGE):
+                        found = self.messages_in(chunk)
+                        yield from (each for each in found if each.channel.id in channel_ids)
+
+    def _all_messages(self) -> Iterator[StoredMessage]:
         for record in self._records():
             if record.opcode == Opcode.CHUNK:
                 try:

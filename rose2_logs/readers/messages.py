@@ -270,7 +270,7 @@ def _cost_table() -> Cells:
 _OCCUPANCY_OF_COST = _cost_table()
 
 
-def yaw_of(quaternion: tuple[float, float, float, float], remarks: list[Remark]) -> float:
+def flat_yaw_of(quaternion: tuple[float, float, float, float], remarks: list[Remark]) -> float:
     """Rotation about z, in radians, of a quaternion x, y, z, w; one of another length than 1 gets a remark.
 
     Raises
@@ -297,6 +297,12 @@ def yaw_of(quaternion: tuple[float, float, float, float], remarks: list[Remark])
             f"its origin is tilted by {math.degrees(tilt):.0f} degrees out of the plane; only flat maps can "
             "be read"
         )
+    return yaw_of(x, y, z, w)
+
+
+def yaw_of(x: float, y: float, z: float, w: float) -> float:
+    """Rotation about z, in radians, of a quaternion of any length; all zeros, as left unset, mean none."""
+    # No division by the length: it drops out of the two arguments.
     return math.atan2(2 * (w * z + x * y), w * w + x * x - y * y - z * z)
 
 
@@ -318,7 +324,7 @@ def make_grid(
         return None
     x, y, _, *quaternion = pose
     height, width = cells.shape
-    yaw_rad = yaw_of((quaternion[0], quaternion[1], quaternion[2], quaternion[3]), remarks)
+    yaw_rad = flat_yaw_of((quaternion[0], quaternion[1], quaternion[2], quaternion[3]), remarks)
     geometry = GridGeometry(resolution_m, (x, y), yaw_rad, frame_id, (height, width))
     return Grid(stamp_ns, geometry, cells, tuple(remarks))
 

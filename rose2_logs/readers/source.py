@@ -100,6 +100,26 @@ class LoggedMap:
     decode: Callable[[], Grid | Patch | None] = field(repr=False)
 
 
+@dataclass(frozen=True)
+class LoggedBytes:
+    """A message of any type, as it stands in the log.
+
+    Attributes
+    ----------
+    log_time_ns : int
+        When it was recorded.
+    topic, encoding : str
+        Where it was sent; ``cdr`` or ``ros1``.
+    data : callable
+        Gives its bytes; raises DamagedMessageError where they are lost.
+    """
+
+    log_time_ns: int
+    topic: str
+    encoding: str
+    data: Callable[[], bytes | memoryview] = field(repr=False)
+
+
 class MessageSource(ABC):
     """An open log: what it holds, and its map messages by topic and log time."""
 
@@ -112,6 +132,14 @@ class MessageSource(ABC):
     @abstractmethod
     def read(self, topics: Sequence[str], times: Times) -> Iterator[LoggedMap]:
         """Yield, in the order of log time, the messages of `topics` logged at `times` (sorted, distinct)."""
+
+    def stream(self, topics: Sequence[str]) -> Iterator[LoggedBytes]:
+        """Yield all messages of `topics` about in the order of log time, none of them held.
+
+        Parts of the log that overlap in time may follow one another; what is damaged is passed over. A log
+        that holds nothing but maps yields nothing.
+        """
+        return iter(())
 
     @abstractmethod
     def close(self) -> None:

@@ -109,10 +109,13 @@ class SqliteFile(LogFile):
             raise ValueError("its row is lost")
         return memoryview(found[0])
 
-    def messages(self) -> Iterator[StoredMessage]:
-        """Yield every message that is whole, by log time."""
+    def messages(self, channel_ids: Collection[int] | None = None) -> Iterator[StoredMessage]:
+        """Yield every message that is whole, of some channels or of all, by log time."""
         sequence: Counter[int] = Counter()
-        for entry in self._rows[np.argsort(self._rows["time"], kind="stable")]:
+        rows = self._rows
+        if channel_ids is not None:
+            rows = rows[np.isin(rows["channel"], list(channel_ids))]
+        for entry in rows[np.argsort(rows["time"], kind="stable")]:
             time, row, channel_id = entry.item()
             try:
                 data, channel = self._payload(row), self.channels[channel_id]

@@ -12,6 +12,9 @@ from scipy import fft, ndimage, signal
 from rose2_logs.occupancy import BoolArray, FloatArray
 from rose2_logs.parameters import SpectrumParameters
 
+PICTURE_SIDE = 160
+"""Pixels along the side of the spectrum's picture: its ridges are told apart, and it stays small."""
+
 
 @dataclass(frozen=True, eq=False)
 class Spectrum:
@@ -55,6 +58,30 @@ def compute_spectrum(occupied: BoolArray, resolution_m: float, parameters: Spect
     frequency_x = fft.rfftfreq(shape[1], resolution_m).astype(np.float32)[None, :]
     frequency_y = fft.fftfreq(shape[0], resolution_m).astype(np.float32)[:, None]
     return Spectrum(values, frequency_x, frequency_y, (shape[0], shape[1]))
+
+
+def spectrum_picture(spectrum: Spectrum, parameters: SpectrumParameters) -> NDArray[np.uint8]:
+    """Draw the spectrum for people: the logarithm of its magnitude around frequency zero.
+
+    Returns
+    -------
+    picture : (S, S) uint8
+        S is `PICTURE_SIDE`. Columns are x, rows y frequencies from `-1 / shortest_wave_m` to as much above 0,
+        the waves that directions are looked for in; 0 is the median of the magnitudes, 255 the greatest.
+    """
+    step_x, step_y = float(spectrum.frequency_x[0, 1]), float(spectrum.frequency_y[1, 0])
+    height, width = spectrum.values.shape
+    columns = min(max(round(1 / parameters.shortest_wave_m / step_x), 1), width)
+    rows = min(max(round(1 / parameters.shortest_wave_m / step_y), 1), height // 2)
+    # The transform holds the half of positive x; a real map's spectrum is the same turned by half a circle.
+    part = np.concatenate([spectrum.values[-rows:, :columns], spectrum.values[:rows, :columns]])
+    half = cv2.resize(np.abs(part), (PICTURE_SIDE // 2, PICTURE_SIDE), interpolation=cv2.INTER_AREA)
+    logarithm = np.log1p(np.concatenate([half[::-1, ::-1], half], axis=1))
+    low, high = float(np.median(logarithm)), float(logarithm.max())
+    if high <= low:
+        return np.zeros(logarithm.shape, np.uint8)
+    shown: NDArray[np.uint8] = (255 * np.clip((logarithm - low) / (high - low), 0, 1)).astype(np.uint8)
+    return shown
 
 
 def _walls_of_one_thickness(occupied: BoolArray, resolution_m: float, sigma_m: float) -> NDArray[np.float32]:

@@ -15,6 +15,7 @@ from rose2_logs.rose.spectrum import (
     angular_energy,
     compute_spectrum,
     dominant_directions,
+    spectrum_picture,
 )
 
 
@@ -33,6 +34,7 @@ class RoseResult:
     clean: BoolArray
     attached: BoolArray
     supported: BoolArray
+    spectrum: NDArray[np.uint8]
 
 
 def find_structure(
@@ -48,6 +50,7 @@ def find_structure(
     """
     spectrum = compute_spectrum(occupied, resolution_m, parameters)
     directions, strengths = dominant_directions(angular_energy(spectrum, parameters), parameters)
+    picture = spectrum_picture(spectrum, parameters)
     score = structure_score(spectrum, occupied, directions, parameters)
     del spectrum  # as large as the rest of the stage needs
     supported = supported_cells(score, occupied, resolution_m, parameters)
@@ -56,4 +59,4 @@ def find_structure(
     )
     clean = supported & (score >= threshold)
     attached = attached_cells(clean, supported & (score >= parameters.attached_share * threshold))
-    return RoseResult(directions, strengths, score, threshold, clean, attached, supported)
+    return RoseResult(directions, strengths, score, threshold, clean, attached, supported, picture)

@@ -24,6 +24,8 @@ class Structure:
         Cells with at least this score make the clean map.
     scores, clean_cells : CanvasPart
         What `score` and `clean` hold, of the explored part alone.
+    spectrum : (S, S) uint8
+        Picture of the spectrum in the grid's frame, see `rose.spectrum.spectrum_picture`.
     """
 
     directions_rad: FloatArray
@@ -31,6 +33,7 @@ class Structure:
     threshold: float
     scores: CanvasPart[np.float32]
     clean_cells: CanvasPart[np.bool_]
+    spectrum: NDArray[np.uint8]
 
     @property
     def score(self) -> NDArray[np.float32]:

@@ -19,6 +19,8 @@ from rose2_logs.notices import notice
 from rose2_logs.readers import open_source
 from rose2_logs.readers.mcap_index import DAMAGE
 from rose2_logs.readers.source import MessageSource
+from rose2_logs.sinks.extent import Extent
+from rose2_logs.sinks.mcap_bag_metadata import write_bag_metadata
 from rose2_logs.sinks.mcap_input import (
     LATCHED_QOS,
     CopiedChannel,
@@ -30,6 +32,7 @@ from rose2_logs.sinks.mcap_input import (
 from rose2_logs.sinks.mcap_writer import McapWriter
 from rose2_logs.sinks.ros_messages import ROOMS_TYPE, MessageMaker
 from rose2_logs.sinks.sink import RunInfo
+from rose2_logs.sinks.viewer_layouts import MapScene, bag_metadata_path, write_layouts
 from rose2_logs.tracking.frames import TrackedSnapshot
 
 logger = logging.getLogger(__name__)
@@ -63,20 +66,28 @@ class AnnotatedMcap:
         The run.
     source : MessageSource, optional
         The log if it is open already, which it then stays.
+    is_bag : bool
+        Whether to describe the file in a ``metadata.yaml``, so that its folder is a bag of ROS 2.
 
     Raises
     ------
     OutputError
-        If the file cannot be written, or the input holds ``/rose2/`` topics already.
+        If the file cannot be written, or the input holds ``/rose2/`` topics already, or messages that no bag
+        of ROS 2 can hold.
     LogError
         If the input cannot be copied.
     """
 
-    def __init__(self, path: Path, info: RunInfo, source: MessageSource | None = None) -> None:
+    def __init__(
+        self, path: Path, info: RunInfo, source: MessageSource | None = None, *, is_bag: bool = False
+    ) -> None:
         self._path = path
         self._part = part_of(path)
         self._info = info
         self._source = source
+        self._is_bag = is_bag
+        self._extent = Extent()
+        self._frame_id = ""
         self._file: IO[bytes] | None = None
 
     def __enter__(self) -> Self:
@@ -141,6 +152,8 @@ class AnnotatedMcap:
     def write(self, frame: TrackedSnapshot) -> None:
         """Copy the input up to the map's log time, then add what was found in the map."""
         time_ns = frame.snapshot.log_time_ns
+        self._extent.add(frame)
+        self._frame_id = frame.analysis.geometry.frame_id
         with self._writing():
             self._copy_until(time_ns)
             made = {
@@ -171,8 +184,17 @@ class AnnotatedMcap:
                 if self._file is not None:
                     self._file.close()
                 self._part.replace(self._path)
+                self._describe()
         finally:
             self._abandon()
+
+    def _describe(self) -> None:
+        """Write what opens the file: layouts of viewers, and the bag's description."""
+        extent = self._extent
+        scene = MapScene(self._frame_id, self._info.topic, extent.low_m, extent.high_m, self._qos)
+        write_layouts(self._path, scene)
+        if self._is_bag:
+            write_bag_metadata(self._path, bag_metadata_path(self._path))
 
     def _copy_until(self, time_ns: int | None) -> None:
         """Copy what was logged up to a time; a chunk that goes on after it is taken apart."""
@@ -225,6 +247,11 @@ class AnnotatedMcap:
             if channel.topic.startswith(PREFIX):
                 raise OutputError(
                     f"{self._info.log_path}: holds {channel.topic} already; analyse the log it was made from"
+                )
+            if self._is_bag and channel.message_encoding != "cdr":
+                raise OutputError(
+                    f"{self._info.log_path}: {channel.topic} holds {channel.message_encoding or 'unknown'} "
+                    "messages, which no bag of ROS 2 can hold; leave --bag out"
                 )
             schema = (channel.schema_name, channel.schema_encoding, channel.schema_data)
             # The chunks that are copied name channels and schemas by their ids.

@@ -2,66 +2,101 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterable
+
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
 from rose2_logs.occupancy import FloatArray
+from rose2_logs.sinks.rerun_lives import FINAL_IOU, FINAL_SHARE, LIVES
+from rose2_logs.sinks.rerun_world import (
+    CLEAN,
+    FACES,
+    FILLS,
+    LINES,
+    PATH,
+    PREDICTED,
+    ROBOT,
+    ROOMS,
+    SCORE,
+    SEGMENTS,
+    SPECTRUM,
+    VORONOI,
+)
+from rose2_logs.sinks.sink import RECORDING_LAYERS
 
 COVERAGE_UNIT = 1e-4
 """Step of the coverage timeline, which counts in whole numbers."""
-EYE_HEIGHT = 0.9
-"""Height of the eye over the longer side of the map: it fills the view at the viewer's field of view."""
-HIDDEN = ("/world/clean_map", "/world/lines", "/world/edges")
-"""Layers that are there to be switched on."""
+EYE_HEIGHT = 1.02
+"""Height of the eye over the side of the map that fills the view: the viewer sees 1.04 times its height."""
+MAP_ASPECT = 1.3
+"""Width over height of the view of the map in a window of usual shape."""
+SWITCHED = (CLEAN, SCORE, SEGMENTS, LINES, FACES, VORONOI)
+"""Layers of the map's view that are off at first and can be switched on."""
+TIMELINES = ("message_log_time", "ros2_timestamp", "snapshot", "coverage")
+Overrides = list[rrb.EntityBehavior | rrb.VisibleTimeRanges]
+PAPER, DARK = (236, 236, 236), (12, 12, 16)
 
 
-def make_blueprint(low_m: FloatArray, high_m: FloatArray) -> rrb.Blueprint:
-    """Map from above beside curves, events and the summary; time runs along coverage.
+def make_blueprint(
+    low_m: FloatArray, high_m: FloatArray, layers: Collection[str] = RECORDING_LAYERS
+) -> rrb.Blueprint:
+    """Map from above, a tab for each stage of the method, beside curves, lives of rooms, events, summary.
 
     Parameters
     ----------
     low_m, high_m : (2,) float
-        Corners of the explored part in world metres.
+        Corners of what is shown, world metres.
+    layers : collection of str
+        The optional layers that the recording has; tabs without any are left out.
     """
-    centre = (low_m + high_m) / 2
-    height = EYE_HEIGHT * float(max(high_m[0] - low_m[0], high_m[1] - low_m[1], 1.0))
-    eye = rrb.EyeControls3D(
-        kind=rrb.Eye3DKind.Orbital,
-        position=[centre[0], centre[1] - 1e-3 * height, height],
-        look_target=[centre[0], centre[1], 0.0],
-        eye_up=[0.0, 1.0, 0.0],
+    stages = (
+        ("Rooms", (), ()),
+        ("Clean map", ("clean_map",), (CLEAN,)),
+        ("Structure score", ("score",), (SCORE,)),
+        ("Walls", ("segments", "lines"), (SEGMENTS, LINES)),
+        ("Faces", ("faces",), (FACES,)),
+        ("Voronoi graph", ("voronoi",), (VORONOI,)),
     )
-    whole_run = rr.encodings.TimeRange(
-        start=rr.encodings.TimeRangeBoundary.absolute(seq=0),
-        end=rr.encodings.TimeRangeBoundary.absolute(seq=round(1 / COVERAGE_UNIT)),
-    )
-
-    def curves(name: str, origin: str) -> rrb.TimeSeriesView:
-        axis = rrb.archetypes.TimeAxis(link="Independent", view_range=whole_run)
-        return rrb.TimeSeriesView(name=name, origin=origin, axis_x=axis)
-
-    hidden = rrb.EntityBehavior(visible=False)
+    views: list[rrb.View] = [
+        _map_view(name, low_m, high_m, shown)
+        for name, needed, shown in stages
+        if not needed or set(needed) & set(layers)
+    ]
+    if "spectrum" in layers:
+        eye = _eye(np.array([-1.0, -1.0]), np.array([1.0, 1.0]))
+        views.append(
+            rrb.Spatial3DView(
+                name="Spectrum", origin=SPECTRUM, eye_controls=eye, line_grid=False, background=DARK
+            )
+        )
     return rrb.Blueprint(
         rrb.Horizontal(
-            rrb.Spatial3DView(
-                name="Rooms",
-                origin="/world",
-                eye_controls=eye,
-                line_grid=False,
-                background=[236, 236, 236],
-                overrides=dict.fromkeys(HIDDEN, hidden),
-            ),
+            rrb.Tabs(*views, active_tab=0),
             rrb.Vertical(
-                curves("Coverage", "/run/coverage"),
-                curves("Number of rooms", "/run/rooms"),
-                curves("Area of each room, m2", "/run/area"),
+                _curves("How right the layout was", ("/run/coverage", FINAL_SHARE, FINAL_IOU), (0.0, 1.05)),
                 rrb.Tabs(
-                    rrb.TextLogView(name="Events", origin="/events"),
-                    rrb.TextDocumentView(name="Summary", origin="/summary"),
+                    _lives(),
+                    _curves("Area, m²", ("/run/area/**",), legend=False),
+                    _curves("Count", ("/run/rooms",)),
+                    _curves("Change", ("/run/variation_bits",)),
+                    active_tab=0,
                 ),
+                rrb.Tabs(
+                    rrb.TextDocumentView(name="Summary", origin="/summary"),
+                    rrb.TextLogView(
+                        name="Events",
+                        origin="/events",
+                        columns=rrb.TextLogColumns(
+                            timeline_columns=["snapshot"], text_log_columns=["loglevel", "body"]
+                        ),
+                    ),
+                    active_tab=0,
+                ),
+                row_shares=[3, 5, 4],
             ),
-            column_shares=[3, 2],
+            column_shares=[7, 3],
         ),
         rrb.TimePanel(timeline="coverage", state="collapsed"),
         rrb.BlueprintPanel(state="collapsed"),
@@ -70,6 +105,67 @@ def make_blueprint(low_m: FloatArray, high_m: FloatArray) -> rrb.Blueprint:
     )
 
 
-def corners_of(known_corners_m: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Low and high corner (2,) of a set of points (K, 2)."""
-    return np.min(known_corners_m, axis=0), np.max(known_corners_m, axis=0)
+def _map_view(name: str, low_m: FloatArray, high_m: FloatArray, shown: Collection[str]) -> rrb.Spatial3DView:
+    """View of the map with some of the switched layers on; rooms step back where others are looked at."""
+    hidden = [path for path in SWITCHED if path not in shown]
+    if shown:
+        hidden += [PREDICTED, PATH, ROBOT]
+    if set(shown) & {CLEAN, SCORE, SEGMENTS, LINES, VORONOI}:
+        hidden += [FILLS, ROOMS]
+    overrides: dict[rr.EntityPath | str, Overrides] = {
+        path: [rrb.EntityBehavior(visible=False)] for path in hidden
+    }
+    # The way so far: the pieces of all maps up to the present one.
+    overrides[PATH] = [*overrides.get(PATH, []), _up_to_now()]
+    return rrb.Spatial3DView(
+        name=name,
+        origin="/world",
+        eye_controls=_eye(low_m, high_m),
+        line_grid=False,
+        background=DARK if SCORE in shown else PAPER,
+        overrides=overrides,
+    )
+
+
+def _up_to_now() -> rrb.VisibleTimeRanges:
+    before = rr.encodings.TimeRangeBoundary.infinite()
+    now = rr.encodings.TimeRangeBoundary.cursor_relative(seq=0)
+    return rrb.VisibleTimeRanges([rrb.VisibleTimeRange(name, start=before, end=now) for name in TIMELINES])
+
+
+def _eye(low: FloatArray, high: FloatArray) -> rrb.EyeControls3D:
+    """Look from above so that a rectangle fills the view."""
+    centre, size = (low + high) / 2, high - low
+    height = EYE_HEIGHT * float(max(size[0] / MAP_ASPECT, size[1], 1e-3))
+    return rrb.EyeControls3D(
+        kind=rrb.Eye3DKind.Orbital,
+        position=[centre[0], centre[1] - 1e-3 * height, height],
+        look_target=[centre[0], centre[1], 0.0],
+        eye_up=[0.0, 1.0, 0.0],
+    )
+
+
+def _axis() -> rrb.archetypes.TimeAxis:
+    """Return an axis over the whole run; without its range a plot opens zoomed in."""
+    whole_run = rr.encodings.TimeRange(
+        start=rr.encodings.TimeRangeBoundary.absolute(seq=0),
+        end=rr.encodings.TimeRangeBoundary.absolute(seq=round(1 / COVERAGE_UNIT)),
+    )
+    return rrb.archetypes.TimeAxis(link="Independent", view_range=whole_run)
+
+
+def _curves(
+    name: str, paths: Iterable[str], span: tuple[float, float] | None = None, legend: bool = True
+) -> rrb.TimeSeriesView:
+    return rrb.TimeSeriesView(
+        name=name,
+        origin="/run",
+        contents=list(paths),
+        axis_x=_axis(),
+        axis_y=None if span is None else rrb.ScalarAxis(range=span),
+        plot_legend=rrb.PlotLegend(visible=legend, corner=rrb.Corner2D.LeftTop),
+    )
+
+
+def _lives() -> rrb.StateTimelineView:
+    return rrb.StateTimelineView(name="Lives of rooms", origin=LIVES, time_view=_axis())

@@ -7,6 +7,7 @@ until those of an entity are worth a chunk.
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -75,6 +76,11 @@ class Layers:
         self._stamps_went_back, self._latest_stamp_ns = goes_back, max(stamp_ns, latest_ns)
         self._now = Instant(log_time_ns, stamp_ns, snapshot, max(coverage, self._now.coverage))
 
+    @property
+    def now(self) -> Instant:
+        """Where the present snapshot stands on each timeline."""
+        return self._now
+
     def show(self, path: str, layer: LayerKind) -> None:
         """Let an entity show a layer from the present snapshot on; the layers of one are all of one kind."""
         entity = self._entities.get(path)
@@ -105,6 +111,10 @@ class Layers:
         self._recording.set_time("coverage", sequence=now.coverage)
         self._recording.log(path, rr.Clear(recursive=True))
 
+    def count_below(self, path: str) -> int:
+        """Return how many entities under a path show something."""
+        return sum(each.startswith(f"{path}/") for each in self._entities)
+
     def flush(self) -> None:
         """Write all rows that wait."""
         for path, entity in self._entities.items():
@@ -113,17 +123,21 @@ class Layers:
     def _write(self, path: str, entity: _Entity) -> None:
         if not entity.rows:
             return
-        columns = {
-            name: np.array(times)
-            for name, times in zip(Instant._fields, zip(*entity.instants, strict=True), strict=True)
-        }
-        times = [
-            rr.TimeColumn(name, timestamp=columns[name].astype("datetime64[ns]"))
-            for name in ("message_log_time", "ros2_timestamp")
-        ]
-        times += [rr.TimeColumn(name, sequence=columns[name]) for name in ("snapshot", "coverage")]
-        self._recording.send_columns(path, times, columns_of(entity.rows))
+        self._recording.send_columns(path, time_columns(entity.instants), columns_of(entity.rows))
         entity.instants, entity.rows, entity.nbytes = [], [], 0
+
+
+def time_columns(instants: Sequence[Instant]) -> list[rr.TimeColumn]:
+    """Times of some rows on every timeline; at least one."""
+    columns = {
+        name: np.array(times)
+        for name, times in zip(Instant._fields, zip(*instants, strict=True), strict=True)
+    }
+    times = [
+        rr.TimeColumn(name, timestamp=columns[name].astype("datetime64[ns]"))
+        for name in ("message_log_time", "ros2_timestamp")
+    ]
+    return times + [rr.TimeColumn(name, sequence=columns[name]) for name in ("snapshot", "coverage")]
 
 
 def _values(layer: LayerKind) -> list[Any]:

@@ -15,7 +15,8 @@ from rose2_logs.tracking.frames import TrackedSnapshot
 
 FILL_OPACITY = 0.6
 """Share of a room's colour in its cells: the map shows through."""
-CLEAN_COLOUR = (150, 0, 60)
+CLUTTER_VALUE = 20
+"""Occupancy that cells left out of the clean map are drawn with: they can be seen and do not matter."""
 UNKNOWN_SHADE = 205
 """Grey of unknown cells, as map_server draws them."""
 
@@ -52,10 +53,15 @@ class MapPictures:
         return self._picture(self._painted(labels, [shades, *painted]), height_m)
 
     def clean_map(self, clean: NDArray[np.bool_], height_m: float) -> Picture:
-        """Draw the map faintly with the cells of a mask (H, W) over it."""
-        faint = 255 - (255 - _shades()) / 4
-        colours = [faint, np.full_like(faint, CLEAN_COLOUR)]
-        return self._picture(self._painted(clean[self._part], colours), height_m)
+        """Draw the clean map (H, W): structure black, what was left out of it light grey."""
+        known = np.where(self._cells.view(np.int8) > 0, np.uint8(CLUTTER_VALUE), self._cells)
+        cells = np.where(clean[self._part], np.uint8(100), known)
+        return self._picture(cells, height_m, rr.components.Colormap.RvizMap)
+
+    def score(self, score: NDArray[np.float32], height_m: float) -> Picture:
+        """Draw the structure score (H, W) of occupied cells, from dark to bright."""
+        shown = np.rint(255 * score[self._part]).astype(np.uint8)
+        return self._picture(shown, height_m, rr.components.Colormap.Inferno)
 
     def _painted(
         self, labels: NDArray[np.integer] | NDArray[np.bool_], colours: Iterable[FloatArray]
@@ -72,6 +78,14 @@ class MapPictures:
     ) -> Picture:
         place = self._place
         return Picture(pixels, place.resolution_m, (*place.origin_xy_m, height_m), place.yaw_rad, colormap)
+
+
+def spectrum_picture(spectrum: NDArray[np.uint8], yaw_rad: float) -> Picture:
+    """Draw a spectrum (S, S) around the origin, from -1 to 1 in both directions, turned into the world."""
+    cosine, sine = np.cos(yaw_rad), np.sin(yaw_rad)
+    corner = (float(sine - cosine), float(-sine - cosine), 0.0)
+    pixels = np.ascontiguousarray(spectrum[::-1])
+    return Picture(pixels, 2 / len(spectrum), corner, yaw_rad, rr.components.Colormap.Magma)
 
 
 def _shades() -> FloatArray:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -40,6 +40,9 @@ FILL_OPACITY = 0.45
 LABEL_HEIGHT_M = 0.5
 OUTLINE_WIDTH_M = 0.06
 LINE_WIDTH_M = 0.03
+MARKER_LAYERS = ("rooms", "lines", "walls", "outlines", "doorways", "labels")
+"""Namespaces of markers, the lowest first."""
+LAYER_STEP_M = 0.01
 TOUCH_M = 1e-3
 """How much wider a shape is drawn that cannot be triangulated as it is: far below a cell."""
 ADD, DELETE_ALL = 0, 3
@@ -154,9 +157,11 @@ class MessageMaker:
             made.append(Marker("lines", 0, LINE_LIST, lines, (0.2, 0.4, 0.9, 0.35), LINE_WIDTH_M))
         doors = np.array([door.ends_m for door in rooms.doorways]).reshape(-1, 2)
         made.append(Marker("doorways", 0, LINE_LIST, doors, (0.9, 0.3, 0.1, 1.0), OUTLINE_WIDTH_M))
+        # One above the other, so that none flickers through another or through the map.
+        heights = {name: LAYER_STEP_M * (layer + 1) for layer, name in enumerate(MARKER_LAYERS)}
         message = CdrWriter()
         message.numbers("I", len(made))
-        for marker in made:
+        for marker in (replace(each, height_m=heights.get(each.ns, 0.0)) for each in made):
             marker.write(message, frame.snapshot.stamp_ns, analysis.geometry.frame_id)
         return message.message()
 
@@ -183,6 +188,8 @@ class Marker:
         What it says.
     position_m : (float, float)
         Where the text stands.
+    height_m : float
+        How far it lies above the map.
     """
 
     ns: str
@@ -194,13 +201,14 @@ class Marker:
     action: int = ADD
     text: str = ""
     position_m: tuple[float, float] = (0.0, 0.0)
+    height_m: float = 0.0
 
     def write(self, message: CdrWriter, stamp_ns: int, frame_id: str) -> None:
         """Append the marker, with the stamp and frame of its map."""
         message.header(stamp_ns, frame_id)
         message.string(self.ns)
         message.numbers("i", self.number, self.kind, self.action)
-        message.numbers("d", *self.position_m, 0.0, *NO_TURN, *[self.width_m] * 3)
+        message.numbers("d", *self.position_m, self.height_m, *NO_TURN, *[self.width_m] * 3)
         message.numbers("f", *self.colour)
         message.numbers("i", 0, 0)  # lifetime: for ever
         message.numbers("B", 0)  # frame_locked

@@ -10,6 +10,19 @@ from typing import Any, Protocol, Self
 from rose2_logs.parameters import Parameters
 from rose2_logs.tracking.frames import TrackedSnapshot
 
+RECORDING_LAYERS = (
+    "predicted",
+    "path",
+    "clean_map",
+    "score",
+    "spectrum",
+    "segments",
+    "lines",
+    "faces",
+    "voronoi",
+)
+"""Layers of a recording that can be left out; map, rooms and doorways are always there."""
+
 
 @dataclass(frozen=True)
 class RunInfo:

@@ -30,7 +30,7 @@ class Tables:
     lives : RoomLives
         What is known of every room over the run.
     hindsight : Hindsight or None
-        What the last map tells of the ones before, once the tables are whole.
+        What the last map tells of the ones before, after `look_back`.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -79,18 +79,30 @@ class Tables:
     ) -> None:
         with self._stack:
             if kind is None:
-                along, *others = self._tables.values()
-                for name in ("along", "rooms", "events", "doorways"):
-                    self._tables[name].close()
-                self.hindsight = write_hindsight(
-                    self.lives,
-                    rooms_path=self._tables["rooms"].part,
-                    along_path=along.part,
-                    snapshots=self._tables["snapshots"],
-                    tracks=self._tables["tracks"],
-                )
-                for table in others:
+                self.look_back()
+                _, *tables = self._tables.values()
+                for table in tables:
                     table.publish()
+
+    def look_back(self) -> None:
+        """Find what the last map tells of the ones before: after the last snapshot; the end does it else.
+
+        Raises
+        ------
+        OutputError
+            If a file cannot be written or read back.
+        """
+        if self.hindsight is not None:
+            return
+        for name in ("along", "rooms", "events", "doorways"):
+            self._tables[name].close()
+        self.hindsight = write_hindsight(
+            self.lives,
+            rooms_path=self._tables["rooms"].part,
+            along_path=self._tables["along"].part,
+            snapshots=self._tables["snapshots"],
+            tracks=self._tables["tracks"],
+        )
 
 
 def _snapshot_row(frame: TrackedSnapshot, moment: Moment) -> Row:

@@ -12,9 +12,11 @@ from scipy import ndimage
 from skimage.morphology import skeletonize
 from skimage.segmentation import watershed
 
-from rose2_logs.occupancy import BoolArray, FloatArray
+from rose2_logs.occupancy import BoolArray, FloatArray, straight_runs
 from rose2_logs.parameters import TopologyParameters
 
+DRAWN_BLOCK = 2
+"""The graph is drawn by every so many cells: a passage of 30 cm is three of 10 cm wide."""
 SMOOTH_CELLS = 1.0
 """Blur of the clearance, so that the steps of the raster are no summits of their own."""
 
@@ -76,6 +78,45 @@ def voronoi_graph(
     clear = (labels > 0) & (clearance_m(walls, resolution_m) >= min_clearance_m)
     skeleton = skeletonize(clear)  # type: ignore[no-untyped-call]
     return np.argwhere(skeleton).astype(np.int32)
+
+
+def voronoi_lines(
+    inside: BoolArray, walls: BoolArray, resolution_m: float, min_clearance_m: float
+) -> FloatArray:
+    """Draw the Voronoi graph of a map as straight lines between the middles of its cells.
+
+    Of every block of `DRAWN_BLOCK` by `DRAWN_BLOCK` cells one is looked at: enough for the eye.
+
+    Parameters
+    ----------
+    inside : (H, W) bool
+        The cells of all rooms.
+    walls : (H, W) bool
+        Wall cells.
+    resolution_m : float
+        Side of a cell.
+    min_clearance_m : float
+        Points nearer to a wall are left out, and with them what only they connect.
+
+    Returns
+    -------
+    (N, 4) float
+        x0, y0, x1, y1 in metres, in the frame of the cells.
+    """
+    clear = inside & (clearance_m(walls, resolution_m) >= min_clearance_m)
+    skeleton = np.pad(skeletonize(clear[::DRAWN_BLOCK, ::DRAWN_BLOCK]), 1)  # type: ignore[no-untyped-call]
+    row, column = np.nonzero(skeleton)
+    found = []
+    for down, right in ((0, 1), (1, 0), (1, 1), (1, -1)):
+        linked = skeleton[row + down, column + right]
+        if down and right:
+            # Where a cell at the corner links the two already, a diagonal would close a triangle.
+            linked = linked & ~skeleton[row + down, column] & ~skeleton[row, column + right]
+        first, last = straight_runs(row[linked], column[linked], (down, right))
+        found.append(np.concatenate([first, last + np.array([down, right])], axis=1))
+    # The frame of padding is one cell wide; each cell stands for the middle of the first of its block.
+    cells = (np.concatenate(found) - 1) * float(DRAWN_BLOCK) + 0.5
+    return cells[:, [1, 0, 3, 2]] * resolution_m
 
 
 def clearance_m(walls: BoolArray, resolution_m: float) -> NDArray[np.float32]:

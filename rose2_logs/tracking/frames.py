@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-from rose2_logs.occupancy import OccupancySnapshot
+from rose2_logs.occupancy import FloatArray, OccupancySnapshot
 from rose2_logs.pipeline import SnapshotAnalysis
 from rose2_logs.room_evidence import RoomEvidence
 from rose2_logs.tracking.alignment import RigidMotion
@@ -75,6 +75,8 @@ class TrackedSnapshot:
         How sure the rooms are.
     change : LayoutChange, optional
         How the layout changed since the map before.
+    path : (K, 3) float, optional
+        Poses of the robot since the map before: x, y in world metres, yaw in radians.
     """
 
     snapshot: OccupancySnapshot
@@ -84,3 +86,4 @@ class TrackedSnapshot:
     events: tuple[RoomEvent, ...]
     evidence: RoomEvidence | None = None
     change: LayoutChange | None = None
+    path: FloatArray | None = None

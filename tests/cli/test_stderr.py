@@ -163,10 +163,10 @@ def test_a_map_that_the_method_stumbles_over_is_left_out(monkeypatch, tmp_path):
     maps = save_run(tmp_path / "maps")
     analyse = run.analyse
 
-    def stumbling(snapshot, *others):
+    def stumbling(snapshot, *others, **more):
         if snapshot.index == 1:
             raise IndexError("out of bounds")
-        return analyse(snapshot, *others)
+        return analyse(snapshot, *others, **more)
 
     monkeypatch.setattr(run, "analyse", stumbling)
     options = run.RunOptions(recording=False, annotated_log=False)

@@ -1,5 +1,6 @@
 """Stage A: directions, score, clean map."""
 
+import cv2
 import numpy as np
 import pytest
 from drawn_maps import SIZE_M, office
@@ -8,7 +9,13 @@ from hypothesis import strategies as st
 
 from rose2_logs.parameters import SpectrumParameters
 from rose2_logs.rose.clean_map import attached_cells, clean_threshold, structure_score, supported_cells
-from rose2_logs.rose.spectrum import angular_energy, compute_spectrum, dominant_directions
+from rose2_logs.rose.spectrum import (
+    PICTURE_SIDE,
+    angular_energy,
+    compute_spectrum,
+    dominant_directions,
+    spectrum_picture,
+)
 
 PARAMETERS = SpectrumParameters()
 
@@ -76,3 +83,29 @@ def test_small_pieces_are_left_out_unless_they_lie_in_line_with_walls():
     assert supported[20].sum() == 180
     assert supported[60].sum() == 0
     assert supported[80].sum() == 10
+
+
+@pytest.mark.parametrize("turn_deg", [0, 30, 75])
+def test_the_picture_of_the_spectrum_has_a_ridge_across_the_walls(turn_deg):
+    """Bright along the line at right angles to the walls; the same turned by half a circle."""
+    occupied = np.zeros((300, 300), np.uint8)
+    turn = np.deg2rad(turn_deg)
+    centre, along = np.array([150, 150]), np.array([np.cos(turn), np.sin(turn)])
+    ends = np.rint([centre - 100 * along, centre + 100 * along]).astype(int)
+    cv2.line(occupied, tuple(ends[0].tolist()), tuple(ends[1].tolist()), 1)
+    picture = spectrum_picture(compute_spectrum(occupied.astype(bool), 0.05, PARAMETERS), PARAMETERS)
+    assert picture.shape == (PICTURE_SIDE, PICTURE_SIDE)
+    assert (picture == picture[::-1, ::-1]).all()
+    middle, radii = (PICTURE_SIDE - 1) / 2, np.arange(8, 40)
+
+    def mean_along(angle_deg: float) -> float:
+        x, y = np.cos(np.deg2rad(angle_deg)), np.sin(np.deg2rad(angle_deg))
+        row, column = np.rint(middle + radii * y).astype(int), np.rint(middle + radii * x).astype(int)
+        return float(picture[row, column].mean())
+
+    assert mean_along(turn_deg + 90) > 3 * max(mean_along(turn_deg + other) for other in (0, 45, 135))
+
+
+def test_the_picture_of_an_empty_map_is_black():
+    empty = compute_spectrum(np.zeros((50, 50), bool), 0.05, PARAMETERS)
+    assert not spectrum_picture(empty, PARAMETERS).any()

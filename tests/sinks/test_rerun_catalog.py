@@ -139,7 +139,7 @@ def test_the_viewer_opens_a_run_of_the_catalog_in_our_layout(results, tmp_path, 
         (dataset,) = CatalogClient(url).datasets()
         viewer.open(dataset.segment_url(dataset.segment_ids()[0]))
         end = time.monotonic() + 60
-        while not {"Rooms", "Coverage"} <= {view.name for view in viewer.get_state().views}:
+        while not {"Rooms", "Lives of rooms"} <= {view.name for view in viewer.get_state().views}:
             assert time.monotonic() < end
             time.sleep(0.2)
         assert not [report for view in viewer.get_state().views for report in view.reports]

@@ -5,7 +5,7 @@ import pytest
 
 from rose2_logs.parameters import TopologyParameters
 from rose2_logs.topology.splitting import split_rooms
-from rose2_logs.topology.voronoi import clearance_m, parts_of_room, voronoi_graph
+from rose2_logs.topology.voronoi import clearance_m, parts_of_room, voronoi_graph, voronoi_lines
 
 PARAMETERS = TopologyParameters()
 NO_LINES = np.zeros((0, 4))
@@ -49,6 +49,24 @@ def test_the_voronoi_graph_runs_in_the_middle_of_a_corridor():
     middle = graph[(graph[:, 1] > 30) & (graph[:, 1] < 170)]
     assert len(middle) > 100
     assert np.abs(middle[:, 0] - 19.5).max() <= 1
+
+
+def test_the_drawn_voronoi_graph_is_a_straight_line_in_a_corridor_and_goes_through_doors():
+    """Two corridors of 1 m that a gap of 0.5 m connects: one line along each, joined by the gap."""
+    walls = np.ones((60, 200), bool)
+    walls[5:25] = walls[35:55] = False
+    walls[25:35, 100:110] = False
+    lines = voronoi_lines(~walls, walls, 0.05, 0.15)
+    lengths = np.hypot(*(lines[:, 2:] - lines[:, :2]).T)
+    in_corridors = lines[lengths > 1.5]
+    assert len(in_corridors) >= 2
+    for y in (in_corridors[:, 1], in_corridors[:, 3]):
+        assert np.minimum(np.abs(y - 0.75), np.abs(y - 2.25)).max() <= 0.1
+    # What crosses the wall between them does so in the gap.
+    crossing = lines[(lines[:, [1, 3]].min(axis=1) < 1.6) & (lines[:, [1, 3]].max(axis=1) > 1.4)]
+    assert len(crossing)
+    assert np.abs(crossing[:, [0, 2]] - 5.25).max() < 0.3
+    assert len(voronoi_lines(np.zeros((5, 5), bool), np.ones((5, 5), bool), 0.05, 0.15)) == 0
 
 
 def parts(walls):

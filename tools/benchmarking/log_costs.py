@@ -112,14 +112,17 @@ def sink_costs(log: Path, parameters: Parameters, folder: Path) -> SinkCosts:
     with ExitStack() as stack:
         reader = stack.enter_context(open_log(log))
         workers = stack.enter_context(start_workers(options))
+        tables = Tables(folder)
         sinks: dict[str, Sink] = {
-            "tables": Tables(folder),
-            "recording": RerunRecording(files["recording"], info),
+            "tables": tables,
+            "recording": RerunRecording(files["recording"], info, tables=tables),
             "annotated log": AnnotatedMcap(files["annotated log"], info),
         }
         for name, sink in sinks.items():
             spent[name] += timed(sink.__enter__)[1].cpu_s
-        frames = tracked_snapshots(reader, reader.last(), workers, parameters, totals := RunTotals())
+        last, totals = reader.last(), RunTotals()
+        path = reader.robot_path(last.geometry.frame_id)
+        frames = tracked_snapshots(reader, last, workers, parameters, totals, path)
         while True:
             frame, took = timed(partial(next, frames, None))
             if frame is None:

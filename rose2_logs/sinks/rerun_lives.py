@@ -1,0 +1,91 @@
+"""Each room's life as a lane over the run, and how right the layout was: known when the run is over."""
+
+from __future__ import annotations
+
+import numpy as np
+import rerun as rr
+
+from rose2_logs.sinks.palette import track_colour
+from rose2_logs.sinks.rerun_layers import Instant, time_columns
+from rose2_logs.tracking.hindsight import Hindsight
+from rose2_logs.tracking.lives import Moment
+
+LIVES, FINAL_SHARE, FINAL_IOU = "/room", "/run/final_share", "/run/final_iou"
+FORMING, SHAPED, SETTLED = "forming", "shape right", "settled"
+STATE_TINTS = {FORMING: 0.3, SHAPED: 0.65, SETTLED: 1.0}
+"""States of a room, and the share of its colour that each is shown with."""
+LOST = ""
+"""Ends a state: a gap in the lane."""
+
+
+class Lives:
+    """Gathers when which rooms were there: some numbers a map.
+
+    Parameters
+    ----------
+    recording : RecordingStream
+        Where to.
+    """
+
+    def __init__(self, recording: rr.RecordingStream) -> None:
+        self._recording = recording
+        self._instants: list[Instant] = []
+        # For each track the indices of instants at which it appears and is gone, in turns.
+        self._turns: dict[int, list[int]] = {}
+        self._shown: set[int] = set()
+
+    def add(self, instant: Instant, track_ids: tuple[int, ...]) -> None:
+        """Take one map."""
+        now = set(track_ids)
+        for track in sorted(now ^ self._shown):
+            self._turns.setdefault(track, []).append(len(self._instants))
+        self._shown = now
+        self._instants.append(instant)
+
+    def log(self, hindsight: Hindsight | None) -> None:
+        """Log everything, once, after the last map."""
+        number = {instant.snapshot: index for index, instant in enumerate(self._instants)}
+        for track, turns in sorted(self._turns.items()):
+            changes = self._changes(track, turns, number, hindsight)
+            path = f"{LIVES}/{track:03d}"
+            colour = np.array(track_colour(track))
+            tints = [255 - (255 - colour) * tint for tint in STATE_TINTS.values()]
+            self._recording.log(
+                path,
+                rr.StateConfiguration(
+                    values=list(STATE_TINTS), colors=[tuple(int(v) for v in tint) for tint in tints]
+                ),
+                static=True,
+            )
+            instants = [self._instants[index] for index in changes]
+            states = rr.StateChange.columns(state=list(changes.values()))
+            self._recording.send_columns(path, time_columns(instants), states)
+        if hindsight is not None:
+            for path, figures in (
+                (FINAL_SHARE, hindsight.final_share),
+                (FINAL_IOU, hindsight.final_iou),
+            ):
+                known = [(at, figures.get(at.snapshot)) for at in self._instants]
+                points = [(at, value) for at, value in known if value is not None]
+                if points:
+                    values = rr.Scalars.columns(scalars=np.array([value for _, value in points]))
+                    self._recording.send_columns(path, time_columns([at for at, _ in points]), values)
+
+    def _changes(
+        self, track: int, turns: list[int], number: dict[int, int], hindsight: Hindsight | None
+    ) -> dict[int, str]:
+        """State of a room from each index on where it changes, in order."""
+
+        def index_of(moment: Moment | None) -> int:
+            return len(self._instants) if moment is None else number[moment.snapshot]
+
+        shaped = index_of(None if hindsight is None else hindsight.shape_right.get(track))
+        settled = index_of(None if hindsight is None else hindsight.area_settled.get(track))
+        ends = [*turns, len(self._instants)] if len(turns) % 2 else turns
+        changes: dict[int, str] = {}
+        for begin, end in zip(ends[::2], ends[1::2], strict=True):
+            for index in sorted({begin, *(each for each in (shaped, settled) if begin < each < end)}):
+                changes[index] = SETTLED if index >= settled else SHAPED if index >= shaped else FORMING
+            if end < len(self._instants):
+                changes[end] = LOST
+        return changes

@@ -1,0 +1,36 @@
+"""What tests that look at a recording need: a driver, a browser, a way to compare pictures."""
+
+from __future__ import annotations
+
+import importlib.util
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from PIL import Image
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+
+needs_vulkan = pytest.mark.skipif(
+    not list(Path("/usr/share/vulkan/icd.d").glob("lvp_icd*")),
+    reason="the headless viewer needs a Vulkan driver (mesa-vulkan-drivers)",
+)
+needs_chromium = pytest.mark.skipif(
+    CHROMIUM is None or importlib.util.find_spec("playwright") is None,
+    reason="needs a browser (chromium) and the package playwright",
+)
+
+
+def coloured_share(picture: Path, window: tuple[slice, slice]) -> float:
+    """Share of a picture's pixels in a window, of rows and columns, that have a colour."""
+    pixels = np.asarray(Image.open(picture).convert("RGB")).astype(int)[window]
+    return float(((pixels.max(-1) - pixels.min(-1)) > 40).mean())
+
+
+def small(picture: Path, width: int) -> NDArray[np.uint8]:
+    """Pixels (H, width, 3) of a picture made small, so that letters and thin lines do not count."""
+    image = Image.open(picture).convert("RGB")
+    size = (width, round(image.height * width / image.width))
+    return np.asarray(image.resize(size, Image.Resampling.BOX))

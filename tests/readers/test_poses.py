@@ -1,0 +1,216 @@
+"""The robot's way from transforms, odometry or poses, of ROS 1 and ROS 2, whole logs and cut ones."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mcap.writer import Writer
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+from rose2_logs.readers import Selection, open_log
+from rose2_logs.readers.poses import BASE_FRAMES, POSE_STEP_M
+
+PROJECT = Path(__file__).parents[2]
+ROS2, ROS1 = get_typestore(Stores.ROS2_HUMBLE), get_typestore(Stores.ROS1_NOETIC)
+ROS1.register(get_types_from_msg("geometry_msgs/TransformStamped[] transforms", "tf2_msgs/msg/TFMessage"))
+SECOND = 10**9
+TF, ODOMETRY, POSE = "tf2_msgs/msg/TFMessage", "nav_msgs/msg/Odometry", "geometry_msgs/msg/PoseStamped"
+Message = tuple[int, str, str, object]
+"""Log time, topic, type, content."""
+
+
+def header(store, frame: str, time_ns: int):
+    stamp = store.types["builtin_interfaces/msg/Time"](time_ns // SECOND, time_ns % SECOND)
+    extra = {"seq": 0} if store is ROS1 else {}
+    return store.types["std_msgs/msg/Header"](**extra, stamp=stamp, frame_id=frame)
+
+
+def placed(store, kind: str, x: float, y: float, yaw: float):
+    names = {
+        "Pose": ("Point", "position", "orientation"),
+        "Transform": ("Vector3", "translation", "rotation"),
+    }
+    point, where, turn = names[kind]
+    types = store.types
+    return types[f"geometry_msgs/msg/{kind}"](
+        **{
+            where: types[f"geometry_msgs/msg/{point}"](x, y, 0.0),
+            turn: types["geometry_msgs/msg/Quaternion"](0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2)),
+        }
+    )
+
+
+def transform(store, time_ns: int, parent: str, child: str, x: float, y: float, yaw: float) -> object:
+    return store.types["geometry_msgs/msg/TransformStamped"](
+        header(store, parent, time_ns), child, placed(store, "Transform", x, y, yaw)
+    )
+
+
+def odometry(store, time_ns: int, x: float) -> object:
+    types = store.types
+    zero = types["geometry_msgs/msg/Vector3"](0.0, 0.0, 0.0)
+    twist = types["geometry_msgs/msg/Twist"](zero, zero)
+    return types[ODOMETRY](
+        header(store, "odom", time_ns),
+        "base_link",
+        types["geometry_msgs/msg/PoseWithCovariance"](placed(store, "Pose", x, 0.0, 0.0), np.zeros(36)),
+        types["geometry_msgs/msg/TwistWithCovariance"](twist, np.zeros(36)),
+    )
+
+
+def grid(store) -> object:
+    types = store.types
+    info = types["nav_msgs/msg/MapMetaData"](
+        types["builtin_interfaces/msg/Time"](0, 0), 0.05, 4, 4, placed(store, "Pose", 0.0, 0.0, 0.0)
+    )
+    return types["nav_msgs/msg/OccupancyGrid"](header(store, "map", 0), info, np.zeros(16, np.int8))
+
+
+def write(path: Path, messages: Iterator[Message], store=ROS2) -> Path:
+    """Write an MCAP of ROS 1 or ROS 2 messages, with a map at the beginning and one at the end."""
+    told = sorted(messages, key=lambda message: message[0])
+    ends = [(0, "/map", "nav_msgs/msg/OccupancyGrid", grid(store))]
+    with path.open("wb") as file:
+        writer, channels = Writer(file, chunk_size=2000), {}
+        writer.start("ros1" if store is ROS1 else "ros2", "test")
+        for time, topic, kind, content in [*ends, *told, (10**12, *ends[0][1:])]:
+            if topic not in channels:
+                name = kind.replace("/msg/", "/") if store is ROS1 else kind
+                encoding = ("ros1msg", "ros1") if store is ROS1 else ("ros2msg", "cdr")
+                text, _ = store.generate_msgdef(kind, ros_version=1 if store is ROS1 else 2)
+                schema = writer.register_schema(name, encoding[0], text.encode())
+                channels[topic] = writer.register_channel(topic, encoding[1], schema)
+            serialize = store.serialize_ros1 if store is ROS1 else store.serialize_cdr
+            writer.add_message(channels[topic], time, bytes(serialize(content, kind)), time)
+        writer.finish()
+    return path
+
+
+def way(path: Path, frame: str = "map", **selection) -> tuple[str, np.ndarray]:
+    with open_log(path, selection=Selection(**selection)) as log:
+        found = log.robot_path(frame)
+        return found.origin, found.until(2**62)
+
+
+def drive(store=ROS2, base: str = "base_link") -> Iterator[Message]:
+    """Drive along x of the odometry's frame, which lies turned in the map's; joints turn besides."""
+    kind = store.types[TF]
+    for tick in range(600):
+        time = tick * SECOND // 10
+        yield time, "/tf", TF, kind([transform(store, time, "odom", base, tick / 20, 0.0, 0.0)])
+        yield time + 1, "/tf", TF, kind([transform(store, time, base, "wheel", 0.0, 0.1, tick / 3)])
+        if tick % 10 == 5:
+            yield time, "/tf", TF, kind([transform(store, time, "map", "odom", 1.0, 2.0, math.pi / 2)])
+
+
+@pytest.mark.parametrize("store", [ROS1, ROS2], ids=["ros1", "ros2"])
+@pytest.mark.parametrize("base", ["base_link", "robot7/base_footprint"])
+def test_transforms_are_followed_from_the_map_to_the_robot(tmp_path, store, base):
+    """Two transforms, of different rates, one turned by a quarter: the way goes along y of the map."""
+    origin, found = way(write(tmp_path / "run.mcap", drive(store, base), store))
+    assert origin == "/tf"
+    assert found[:, 0] == pytest.approx(1.0)
+    assert found[:, 2] == pytest.approx(math.pi / 2)
+    steps = np.diff(found[:, 1])
+    assert (steps >= POSE_STEP_M - 1e-9).all()
+    assert steps.max() < 2 * POSE_STEP_M
+    assert found[-1, 1] == pytest.approx(2 + 59.9 / 2, abs=2 * POSE_STEP_M)
+
+
+def test_a_fixed_transform_stands_on_its_own_topic_and_frames_may_have_a_slash(tmp_path):
+    def messages() -> Iterator[Message]:
+        kind = ROS2.types[TF]
+        yield 0, "/tf_static", TF, kind([transform(ROS2, 0, "/map", "/odom", 5.0, 0.0, 0.0)])
+        for second in range(10):
+            time = second * SECOND
+            yield time, "/tf", TF, kind([transform(ROS2, time, "/odom", "/base_link", second, 0.0, 0.0)])
+
+    origin, found = way(write(tmp_path / "run.mcap", messages()))
+    assert origin == "/tf, /tf_static"
+    assert found[:, 0].tolist() == [5.0 + second for second in range(10)]
+
+
+def test_without_transforms_to_the_map_it_is_odometry_and_then_poses(tmp_path):
+    def odometries() -> Iterator[Message]:
+        kind = ROS2.types[TF]
+        for second in range(10):
+            time = second * SECOND
+            yield time, "/odom", ODOMETRY, odometry(ROS2, time, float(second))
+            # Leads to no frame of the robot from that of the map.
+            yield time, "/tf", TF, kind([transform(ROS2, time, "odom", "base_link", 3.0, 3.0, 0.0)])
+
+    def poses() -> Iterator[Message]:
+        for second in range(10):
+            time = second * SECOND
+            pose = ROS2.types[POSE](header(ROS2, "map", time), placed(ROS2, "Pose", 0.0, second, 1.0))
+            yield time, "/robot_pose", POSE, pose
+            for topic in ("/goal_pose", "/initialpose"):
+                yield time, topic, POSE, ROS2.types[POSE](pose.header, placed(ROS2, "Pose", 99.0, 0.0, 0.0))
+                yield time + 1, topic, POSE, pose
+
+    origin, found = way(write(tmp_path / "odometry.mcap", odometries()))
+    assert (origin, found[:, 0].tolist()) == ("/odom", list(range(10)))
+    origin, found = way(write(tmp_path / "poses.mcap", poses()))
+    assert (origin, found[:, 1].tolist()) == ("/robot_pose", list(range(10)))
+    assert found[:, 2] == pytest.approx(1.0)
+
+
+def test_a_log_that_tells_nothing_of_the_robot_has_no_way(tmp_path):
+    origin, found = way(write(tmp_path / "run.mcap", iter(())))
+    assert (origin, found.shape) == ("", (0, 3))
+
+
+def test_the_way_begins_where_the_selection_does(tmp_path):
+    """With the transforms that came before it."""
+    path = write(tmp_path / "run.mcap", drive())
+    _, found = way(path, start_ns=30 * SECOND)
+    assert found[0, 1] == pytest.approx(2 + 15, abs=POSE_STEP_M)
+    assert found[:, 0] == pytest.approx(1.0)
+
+
+def test_broken_numbers_are_passed_over(tmp_path):
+    def messages() -> Iterator[Message]:
+        for second in range(6):
+            time, x = second * SECOND, math.nan if second == 3 else float(second)
+            yield time, "/odom", ODOMETRY, odometry(ROS2, time, x)
+
+    _, found = way(write(tmp_path / "run.mcap", messages()))
+    assert found[:, 0].tolist() == [0, 1, 2, 4, 5]
+
+
+def test_transforms_in_a_circle_end():
+    from rose2_logs.readers.poses import _base_in, _Edge
+
+    edges = {BASE_FRAMES[0]: _Edge("odom", (1.0, 0.0, 0.0)), "odom": _Edge(BASE_FRAMES[0], (1.0, 0.0, 0.0))}
+    assert _base_in("map", edges) == (None, ())
+
+
+@pytest.mark.parametrize("log", ["office.mcap", "wing.bag", "ring"])
+def test_the_ways_of_the_sample_logs_lie_in_their_free_space(log):
+    """Of MCAP, ROS 1 bag and SQLite: taken map by map, each pose is free in the map of its time or later."""
+    with open_log(PROJECT / "sample_logs" / log) as reader:
+        last = reader.last()
+        path = reader.robot_path(last.geometry.frame_id)
+        assert path.origin == "/tf"
+        pieces = [path.until(snapshot.log_time_ns) for snapshot in reader.snapshots()]
+    poses = np.concatenate(pieces)
+    assert sum(len(piece) > 0 for piece in pieces) > 30
+    row, column = np.moveaxis(last.geometry.world_to_cell(poses[:, :2]), -1, 0)
+    values = last.cells[row, column]
+    assert ((values >= 0) & (values < 50)).mean() > 0.97
+
+
+def test_a_log_that_was_cut_off_tells_the_way_so_far(tmp_path):
+    """Without its index, and with half of a message at its end."""
+    whole = PROJECT / "sample_logs" / "office.mcap"
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(whole.read_bytes()[: whole.stat().st_size // 2])
+    _, expected = way(whole)
+    origin, found = way(cut)
+    assert origin == "/tf"
+    assert 50 < len(found) < len(expected)
+    assert found == pytest.approx(expected[: len(found)])

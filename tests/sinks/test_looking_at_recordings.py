@@ -1,0 +1,140 @@
+"""Recordings as a person sees them: in Rerun's viewer, and in its web viewer in a browser.
+
+The kept pictures are made by this module itself: ``python tests/sinks/test_looking_at_recordings.py``.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from itertools import cycle, pairwise
+from pathlib import Path
+
+import numpy as np
+from looking import CHROMIUM, coloured_share, needs_chromium, needs_vulkan, small
+from numpy.typing import NDArray
+from PIL import Image
+
+from rose2_logs.readers import Selection
+from rose2_logs.run import RunOptions, analyse_log
+
+PROJECT = Path(__file__).parents[2]
+GOLDEN = Path(__file__).with_name("golden")
+BIN = Path(sys.executable).parent
+COVERAGES = (0.3, 0.6, 1.0)
+TABS = ("Clean map", "Structure score", "Walls", "Faces", "Voronoi graph", "Spectrum")
+PANELS = ("Lives of rooms", "Area, m²", "Count", "Change")
+TEXTS = ("Events", "Summary")
+GOLDEN_WIDTH = 160
+MOST_DIFFERENCE = 6.0
+"""Mean difference of two pictures of the same, in steps of 256: another version draws lines otherwise."""
+LOAD_S, LOOK_S = 180.0, 0.7
+BROWSER_FLAGS = (
+    "--no-sandbox",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--ignore-gpu-blocklist",
+)
+FROM_OUTSIDE = ("Failed to load resource", "Failed to fetch")
+"""Errors about fonts and examples that the viewer looks for on the network."""
+
+
+def record(folder: Path) -> Path:
+    options = RunOptions(selection=Selection(max_snapshots=8), annotated_log=False)
+    log = PROJECT / "sample_logs" / "office.mcap"
+    return analyse_log(log, folder, options).folder / "office.rrd"
+
+
+def shots(folder: Path) -> dict[str, Path]:
+    """Pictures of the view of rooms along the run, and of every other view; the viewer finds no fault."""
+    sys.path.insert(0, str(PROJECT / "tools"))
+    from screenshot_recording import Shot, take
+
+    along = {f"rooms_{100 * at:.0f}": Shot(folder / f"{at}.png", at, ("Rooms",), True) for at in COVERAGES}
+    others = {
+        tab: Shot(folder / f"{tab}.png", 1.0, (tab, panel, text), True)
+        for tab, panel, text in zip(TABS, cycle(PANELS), cycle(TEXTS), strict=False)
+    }
+    taken = along | others
+    problems = take(record(folder), list(taken.values()), port=9894, settle_s=LOOK_S)
+    assert not problems
+    return {name: shot.picture for name, shot in taken.items()}
+
+
+@needs_vulkan
+def test_the_viewer_shows_the_rooms_as_it_did_and_finds_no_fault_in_any_view(tmp_path, monkeypatch):
+    """At three coverages the rooms are those of the kept pictures; every view shows something."""
+    monkeypatch.setenv("HOME", str(tmp_path))
+    pictures = shots(tmp_path)
+    for at in COVERAGES:
+        name = f"rooms_{100 * at:.0f}"
+        now = small(pictures[name], GOLDEN_WIDTH).astype(int)
+        assert now.shape == kept(at).shape
+        assert np.abs(now - kept(at)).mean() < MOST_DIFFERENCE, name
+    # The map fills its view.
+    assert coloured_share(pictures["rooms_100"], (slice(None), slice(None))) > 0.35
+    for name in TABS:
+        assert np.asarray(Image.open(pictures[name]).convert("L")).std() > 5, name
+
+
+def test_the_kept_pictures_can_be_told_apart():
+    """By more than what two pictures of the same may differ by."""
+    for one, other in pairwise(COVERAGES):
+        assert np.abs(kept(one) - kept(other)).mean() > 2 * MOST_DIFFERENCE
+
+
+def kept(coverage: float) -> NDArray[np.int64]:
+    return np.asarray(Image.open(GOLDEN / f"rooms_{100 * coverage:.0f}.png").convert("RGB")).astype(int)
+
+
+@needs_chromium
+def test_the_web_viewer_draws_the_recording_without_an_error(tmp_path):
+    """As the command serves it, until the rooms are there; on this machine only."""
+    from playwright.sync_api import sync_playwright
+
+    recording = record(tmp_path)
+    view = subprocess.Popen(
+        [BIN / "rose2-logs", "view", recording.parent, "--web"],
+        stdout=subprocess.PIPE,
+        text=True,
+        env={name: value for name, value in os.environ.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY")},
+    )
+    faults: list[str] = []
+    try:
+        url = view.stdout.readline().split()[0]
+        assert url.startswith("http://127.0.0.1:")
+        with sync_playwright() as playwright:
+            browser = playwright.chromium.launch(executable_path=CHROMIUM, args=BROWSER_FLAGS)
+            page = browser.new_page(viewport={"width": 1000, "height": 640})
+            page.on("pageerror", lambda error: faults.append(str(error)))
+            page.on("console", lambda said: faults.append(said.text) if said.type == "error" else None)
+            page.goto(url)
+            page.wait_for_selector("canvas", timeout=1000 * LOAD_S)
+            end = time.monotonic() + LOAD_S
+            # The view of rooms takes the left of the page, below its bars.
+            view_of_rooms = (slice(80, 600), slice(0, 650))
+            picture = tmp_path / "page.png"
+            while True:
+                page.screenshot(path=picture)
+                if coloured_share(picture, view_of_rooms) > 0.3:
+                    break
+                assert time.monotonic() < end, "the rooms were not drawn"
+                time.sleep(1)
+            browser.close()
+    finally:
+        view.send_signal(signal.SIGINT)
+        view.wait(timeout=30)
+    assert not [fault for fault in faults if not any(known in fault for known in FROM_OUTSIDE)]
+    assert view.returncode == 0
+
+
+if __name__ == "__main__":
+    with tempfile.TemporaryDirectory() as folder:
+        for name, picture in shots(Path(folder)).items():
+            if name.startswith("rooms_"):
+                Image.fromarray(small(picture, GOLDEN_WIDTH)).save(GOLDEN / f"{name}.png", optimize=True)

@@ -1,0 +1,54 @@
+"""Lanes of rooms: forming, of their last shape, settled, and gaps where they were lost."""
+
+from __future__ import annotations
+
+import rerun as rr
+
+from rose2_logs.sinks.rerun_layers import Instant
+from rose2_logs.sinks.rerun_lives import FORMING, LOST, SETTLED, SHAPED, Lives
+from rose2_logs.tracking.hindsight import Hindsight
+from rose2_logs.tracking.lives import Moment
+
+
+def lanes(tmp_path, tracks_of_maps, hindsight) -> dict[str, list[tuple[int, str]]]:
+    """Snapshot and state of each change, by lane, as they stand in the recording."""
+    from rerun.chunk import RrdReader
+
+    recording = rr.RecordingStream("test")
+    recording.set_sinks(rr.FileSink(str(tmp_path / "run.rrd")))
+    lives = Lives(recording)
+    for index, tracks in enumerate(tracks_of_maps):
+        lives.add(Instant(index, index, 10 + index, 100 * index), tracks)
+    lives.log(hindsight)
+    recording.flush(timeout_sec=10)
+    recording.disconnect()
+    found = {}
+    for chunk in RrdReader(str(tmp_path / "run.rrd")).stream():
+        batch = chunk.to_record_batch()
+        if "StateChange:state" in batch.schema.names:
+            states = [row[0] for row in batch.column("StateChange:state").to_pylist()]
+            found[str(chunk.entity_path)] = list(
+                zip(batch.column("snapshot").to_pylist(), states, strict=True)
+            )
+    return found
+
+
+def moment(snapshot: int) -> Moment:
+    return Moment(snapshot, 0.0, 0.0)
+
+
+def test_states_follow_one_another_and_a_lost_room_leaves_a_gap(tmp_path):
+    """Room 1 is there throughout; 2 is lost for a map and comes back when it is settled; 3 comes and goes."""
+    maps = [(1,), (1, 2), (1, 2, 3), (1,), (1, 2), (1, 2)]
+    hindsight = Hindsight(
+        area_settled={1: moment(14), 2: moment(14), 3: moment(12)}, shape_right={1: moment(12)}
+    )
+    found = lanes(tmp_path, maps, hindsight)
+    assert found["/room/001"] == [(10, FORMING), (12, SHAPED), (14, SETTLED)]
+    assert found["/room/002"] == [(11, FORMING), (13, LOST), (14, SETTLED)]
+    assert found["/room/003"] == [(12, SETTLED), (13, LOST)]
+
+
+def test_without_hindsight_a_room_is_there_or_not(tmp_path):
+    found = lanes(tmp_path, [(1,), (), (1,)], None)
+    assert found["/room/001"] == [(10, FORMING), (11, LOST), (12, FORMING)]

@@ -1,0 +1,34 @@
+"""The text that a recording opens with."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import shapely
+
+from rose2_logs.parameters import Parameters
+from rose2_logs.sinks.rerun_summary import summary_text
+from rose2_logs.sinks.sink import RunInfo
+from rose2_logs.tracking.hindsight import Hindsight
+from rose2_logs.tracking.lives import Moment, RoomLife, RoomLives
+
+
+def test_the_summary_tells_rooms_and_since_when_they_were_right():
+    first, last = Moment(0, 0.0, 0.25), Moment(9, 90.0, 1.0)
+    lives = RoomLives()
+    lives.lives = {
+        1: RoomLife(first, last, area_m2=20.04, polygon=shapely.box(0, 0, 5, 5), outline_wall_share=0.9),
+        2: RoomLife(first, first),
+    }
+    lives.in_last_map, lives.last = (1,), last
+    hindsight = Hindsight(
+        area_settled={1: last}, shape_right={1: Moment(3, 30.0, 0.5)}, layout_final=Moment(7, 75.0, 0.8)
+    )
+    info = RunInfo(Path("a|b.mcap"), "/map", "rose2", Parameters(), {"tool": "1"}, {})
+    text = summary_text(info, lives, hindsight, 10)
+    assert text.startswith("# a/b.mcap\n")
+    assert "**1 rooms** at the end, 2 over the run; 10 maps, 1 min 30 s." in text
+    assert "**from 80 % coverage on** (1 min 15 s)" in text
+    assert "| 1 | 20.0 | 25 % | 50 % | 100 % | 90 % |" in text
+    assert "| version of tool | 1 |" in text
+    assert "as in the end" not in summary_text(info, lives, None, 10)
