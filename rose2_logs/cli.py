@@ -1,12 +1,7 @@
-"""The command line ``rose2-logs``: arguments in, one call, a report out.
-
-Exit codes: 0 done; 1 a fault of the tool itself; 2 a log, a file or an option cannot be used (one line says
-which); 130 interrupted.
-"""
+"""The command line ``rose2-logs``: arguments in, one call, a report out."""
 
 from __future__ import annotations
 
-import logging
 import sys
 from contextlib import suppress
 from pathlib import Path
@@ -15,7 +10,9 @@ from typing import Annotated
 import typer
 
 from rose2_logs import __version__, cli_batch, cli_compare, cli_results
+from rose2_logs.cli_messages import App
 from rose2_logs.cli_options import (
+    EXIT_CODES,
     EXIT_FAULT,
     EXIT_INTERRUPTED,
     EXIT_KNOWN,
@@ -31,6 +28,7 @@ from rose2_logs.cli_options import (
     NoRecording,
     Settings,
     Start,
+    Strict,
     Topic,
     Workers,
     chosen_layers,
@@ -39,9 +37,10 @@ from rose2_logs.cli_options import (
 )
 from rose2_logs.errors import ParameterError, Rose2LogsError
 
-app = typer.Typer(
+app = App(
     name="rose2-logs",
     help="Rooms and structure of buildings from the maps in robot logs.",
+    epilog=EXIT_CODES,
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
@@ -52,23 +51,38 @@ app = typer.Typer(
 
 def main() -> None:
     """Run the command line and exit."""
-    from rose2_logs import reporting
+    from rose2_logs import reporting_messages as messages
 
+    state["debug"] = False
     try:
         app()
     except Rose2LogsError as error:
-        reporting.error(str(error), debug=state["debug"])
+        _show(error)
         sys.exit(EXIT_KNOWN)
     except SystemExit as ended:
         # Typer ends so, without a word, upon Ctrl-C.
         if ended.code == EXIT_INTERRUPTED:
-            reporting.error("interrupted; unfinished results were removed")
+            messages.error("interrupted; unfinished results were removed")
         raise
+    except OSError as error:
+        where = f"{error.filename}: " if error.filename else ""
+        messages.error(f"{where}{error.strerror or error}", debug=state["debug"], file=error.filename)
+        sys.exit(EXIT_KNOWN)
+    except MemoryError:
+        text = "out of memory; use fewer --workers, or a lower --set reading.map_max_cells"
+        messages.error(text, debug=state["debug"])
+        sys.exit(EXIT_KNOWN)
     except Exception as error:
         if state["debug"]:
             raise
-        reporting.error(f"{type(error).__name__}: {error} (a fault of rose2-logs: --debug shows where)")
+        messages.error(f"{type(error).__name__}: {error} (a fault of rose2-logs: --debug shows where)")
         sys.exit(EXIT_FAULT)
+
+
+def _show(error: Rose2LogsError) -> None:
+    from rose2_logs import reporting_messages as messages
+
+    messages.error(str(error), debug=state["debug"], file=error.file, topic=error.topic, index=error.index)
 
 
 def _show_version(value: bool) -> None:
@@ -84,9 +98,9 @@ def _everything(
         bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version.")
     ] = False,
 ) -> None:
-    from rose2_logs import reporting
+    from rose2_logs.reporting_messages import show_messages
 
-    reporting.show_warnings(logging.getLogger("rose2_logs"))
+    show_messages()
 
 
 @app.command(epilog="Example: [bold]rose2-logs info run.mcap[/bold]")
@@ -126,6 +140,7 @@ def analyze(
     ] = False,
     no_rrd: NoRecording = False,
     no_mcap: NoAnnotatedLog = False,
+    strict: Strict = False,
     layers: Layers = "all",
     bag: Annotated[
         bool,
@@ -165,6 +180,7 @@ def analyze(
                 bag=bag,
                 live=live,
                 overwrite=overwrite,
+                strict=strict,
             )
             with reporting.run_progress(name) as on_snapshot:
                 result = analyse_log(log, out / name, options, on_snapshot)
@@ -173,7 +189,7 @@ def analyze(
             if len(logs) == 1:
                 raise
             failed = True
-            reporting.error(str(error), debug=state["debug"])
+            _show(error)
     if failed:
         raise typer.Exit(EXIT_KNOWN)
 

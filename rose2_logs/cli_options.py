@@ -14,6 +14,12 @@ if TYPE_CHECKING:
 
 EXIT_FAULT, EXIT_KNOWN, EXIT_INTERRUPTED = 1, 2, 130
 
+EXIT_CODES = (
+    "[bold]Exit codes:[/bold] 0 done, also with warnings, which summary.json counts; 1 a fault of "
+    "rose2-logs itself; 2 a log, a file or an option cannot be used, or with --strict a warning, and one "
+    "line says which; 130 interrupted."
+)
+
 state = {"debug": False}
 """What the options that every command takes have set."""
 
@@ -57,6 +63,13 @@ Layers = Annotated[
 ]
 NoAnnotatedLog = Annotated[bool, typer.Option("--no-mcap", help="Write no annotated MCAP.")]
 Method = Annotated[str, typer.Option(help="Segmentation: rose2, morphological, distance or voronoi.")]
+Strict = Annotated[
+    bool,
+    typer.Option(
+        "--strict",
+        help="Take the first warning about the log as an error; by default what is whole is analyzed.",
+    ),
+]
 Config = Annotated[
     Path | None,
     typer.Option(metavar="FILE.toml", help="Parameters, one table per stage.", show_default=False),

@@ -52,14 +52,14 @@ def report(
     debug: Debug = False,
 ) -> None:
     """Write what a run found as one HTML page: pictures, curves, tables; needs no network."""
-    from rose2_logs import reporting
+    from rose2_logs import reporting, reporting_messages
     from rose2_logs.report.overview import write_reports
 
     written = write_reports(folder, out, panels=panels, overwrite=overwrite)
     for page in written.pages:
         reporting.print_file(page)
     for error in written.failed:
-        reporting.error(str(error))
+        reporting_messages.error(str(error))
     if written.failed:
         raise typer.Exit(EXIT_KNOWN)
 

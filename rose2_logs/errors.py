@@ -1,8 +1,37 @@
 """One tree of exceptions; the message of each names what is wrong, where, and the remedy."""
 
+from __future__ import annotations
+
+from pathlib import Path
+
 
 class Rose2LogsError(Exception):
-    """A known failure: the command line prints its message as one line and exits non-zero."""
+    """A known failure: the command line prints its message as one line and exits non-zero.
+
+    Parameters
+    ----------
+    message : str
+        One line, complete in itself.
+    file : path, optional
+        The file that is concerned.
+    topic : str, optional
+        The topic.
+    index : int, optional
+        Number of the message on its topic, or of the snapshot, from 1.
+    """
+
+    def __init__(
+        self,
+        message: str,
+        *,
+        file: Path | str | None = None,
+        topic: str | None = None,
+        index: int | None = None,
+    ) -> None:
+        super().__init__(message)
+        self.file = None if file is None else str(file)
+        self.topic = topic
+        self.index = index
 
 
 class LogError(Rose2LogsError):

@@ -15,6 +15,10 @@ FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 Scalar = TypeVar("Scalar", bound=np.generic)
 UNKNOWN = -1
+SMALLEST_CELL_M, LARGEST_CELL_M = 1e-4, 100.0
+"""Sides of cells that maps are made of, in metres: a laser's noise is above, a building below."""
+FARTHEST_ORIGIN_M = 1e8
+"""No place on earth lies farther from the origin of its frame, in metres, in no projection."""
 COUNTED_AT_ONCE = 2**16
 """Cells whose labels are counted at once."""
 
@@ -47,11 +51,18 @@ class GridGeometry:
     shape: tuple[int, int]
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.resolution_m) and self.resolution_m > 0):
-            raise InvalidMapError(f"the map's resolution is {self.resolution_m} m; it must be positive")
+        if not SMALLEST_CELL_M <= self.resolution_m <= LARGEST_CELL_M:
+            raise InvalidMapError(
+                f"the map's resolution is {self.resolution_m:g} m; it must be positive, from "
+                f"{SMALLEST_CELL_M:g} to {LARGEST_CELL_M:g} m"
+            )
         if not np.all(np.isfinite([*self.origin_xy_m, self.yaw_rad])):
             raise InvalidMapError(
                 f"the map's origin {self.origin_xy_m}, yaw {self.yaw_rad} is not made of finite numbers"
+            )
+        if max(map(abs, self.origin_xy_m)) > FARTHEST_ORIGIN_M:
+            raise InvalidMapError(
+                f"the map's origin {self.origin_xy_m} is farther than {FARTHEST_ORIGIN_M:g} m away"
             )
 
     def part(self, window: tuple[slice, slice], block: int = 1) -> GridGeometry:

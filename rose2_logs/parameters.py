@@ -25,6 +25,24 @@ from rose2_logs.parameter_fields import choice, number
 
 
 @dataclass(frozen=True)
+class ReadingParameters:
+    """How much a log may claim before it is refused as damaged or hostile; real ones stay far below."""
+
+    map_max_cells: int = number(
+        2**27,
+        "cells",
+        "Largest map that is read: 579 m squared at 5 cm; of an image 2.7 GB are needed.",
+        1,
+    )
+    chunk_max_bytes: int = number(
+        2**28, "bytes", "Largest chunk or message once decompressed: a largest map; usual is 1 MB.", 1024
+    )
+    map_max_messages: int = number(
+        2_000_000, "messages", "Most messages of a map's topics: one a second for 23 days.", 1
+    )
+
+
+@dataclass(frozen=True)
 class OccupancyParameters:
     """Which cells count as occupied and which as free."""
 
@@ -221,6 +239,7 @@ class TrackingParameters:
 class Parameters:
     """All blocks."""
 
+    reading: ReadingParameters = field(default_factory=ReadingParameters)
     occupancy: OccupancyParameters = field(default_factory=OccupancyParameters)
     spectrum: SpectrumParameters = field(default_factory=SpectrumParameters)
     walls: WallParameters = field(default_factory=WallParameters)

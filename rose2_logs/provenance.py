@@ -11,6 +11,7 @@ from typing import Any
 
 from rose2_logs import __version__
 from rose2_logs.errors import LogError
+from rose2_logs.readers.descriptions import load_yaml
 from rose2_logs.readers.discovery import MAP_ENDINGS
 
 PACKAGES = (
@@ -53,14 +54,12 @@ def log_files(path: Path) -> tuple[Path, ...]:
 def _image_of(file: Path) -> tuple[Path, ...]:
     if file.suffix.lower() not in MAP_ENDINGS:
         return ()
-    import yaml
-
     try:
-        described = yaml.safe_load(file.read_text(encoding="utf-8"))
-        image = file.parent / str(described["image"])
-    except (OSError, UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError):
+        image = load_yaml(file).get("image")
+    except LogError:
         return ()
-    return (image,) if image.is_file() else ()
+    found = [file.parent / image] if isinstance(image, str) else []
+    return tuple(each for each in found if each.is_file())
 
 
 def fingerprint(path: Path) -> dict[str, Any]:

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import json
-import logging
 import sys
-import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.markup import escape
+
+from rose2_logs.reporting_messages import errors, printable, progress_line, style
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -32,43 +32,19 @@ PIPE_WIDTH = 120
 """Columns of tables that do not go to a terminal."""
 
 _out = Console(highlight=False, width=None if sys.stdout.isatty() else PIPE_WIDTH)
-_err = Console(stderr=True, highlight=False)
-
-
-def error(message: str, debug: bool = False) -> None:
-    """Print one line about an error, after its traceback if asked for."""
-    if debug:
-        _err.print(escape(traceback.format_exc()), soft_wrap=True)
-    _err.print(f"[bold red]error:[/] {escape(' '.join(message.split()))}", soft_wrap=True)
-
-
-def warning(message: str) -> None:
-    """Print one line about what is not as it should be."""
-    _err.print(f"[yellow]warning:[/] {escape(message)}", soft_wrap=True)
 
 
 def print_line(markup: str, to_error: bool = False) -> None:
     """Print a line with markup, beside the progress bar if it goes to stderr."""
-    (_err if to_error else _out).print(markup, soft_wrap=True)
+    if to_error:
+        progress_line(markup)
+    else:
+        _out.print(markup, soft_wrap=True)
 
 
 def print_table(table: Table) -> None:
     """Print a table."""
     _out.print(table)
-
-
-class _WarningHandler(logging.Handler):
-    """Shows warnings through the console of the progress bar, so that they do not break it."""
-
-    def emit(self, record: logging.LogRecord) -> None:
-        """Print one line."""
-        warning(record.getMessage())
-
-
-def show_warnings(logger: logging.Logger) -> None:
-    """Show the warnings of a logger as lines on stderr."""
-    logger.handlers = [_WarningHandler(logging.WARNING)]
-    logger.propagate = False
 
 
 def print_json(value: Any) -> None:
@@ -83,18 +59,22 @@ def print_log_facts(facts: LogFacts) -> None:
     info = facts.info
     _out.print(f"[bold]{escape(str(info.path))}[/]", soft_wrap=True)
     index = "" if info.indexed else ", no index: read from its beginning"
+    index += "" if info.whole else ", damaged: what is whole of it"
     _out.print(f"{info.format}, {_megabytes(info.size_bytes)}, {_duration(info.duration_s)}{index}")
     table = Table("topic", "type", "encoding", "messages", "map", box=None, pad_edge=False)
     for topic in info.topics:
         count = "?" if topic.message_count is None else str(topic.message_count)
         is_map = "yes" if topic.is_map else ""
-        table.add_row(topic.name, topic.message_type, topic.encoding, count, is_map)
+        told = (escape(printable(text)) for text in (topic.name, topic.message_type, topic.encoding))
+        table.add_row(*told, count, is_map)
     _out.print(table)
     for topic_facts in facts.maps:
         if topic_facts.first is None or topic_facts.last is None:
-            _out.print(f"[bold]{topic_facts.topic}[/]: {escape(topic_facts.trouble or '')}", soft_wrap=True)
+            trouble = escape(printable(topic_facts.trouble or ""))
+            _out.print(f"[bold]{escape(printable(topic_facts.topic))}[/]: {trouble}", soft_wrap=True)
             continue
-        _out.print(f"[bold]{topic_facts.topic}[/] in frame {escape(topic_facts.last.frame_id)}")
+        frame = escape(printable(topic_facts.last.frame_id))
+        _out.print(f"[bold]{escape(printable(topic_facts.topic))}[/] in frame {frame}")
         _out.print(f"  first map {_map_line(topic_facts.first)}")
         _out.print(f"  last map  {_map_line(topic_facts.last)}")
         if topic_facts.coverage_first is not None:
@@ -148,10 +128,10 @@ def progress_bar(text: str) -> Progress:
         TaskProgressColumn(),
         TextColumn(text, markup=False),
         TimeRemainingColumn(compact=True),
-        console=_err,
+        console=errors,
         # The bar goes when it is done or an error comes; in a file or a pipe there is none.
         transient=True,
-        disable=not _err.is_terminal,
+        disable=not style.shows_progress,
     )
 
 
@@ -175,6 +155,9 @@ def print_run(result: RunResult) -> None:
         table.add_row(
             "layout as in the end", f"from {since.coverage:.1%} coverage on, {_duration(since.time_s)}"
         )
+    if result.warnings.count:
+        kinds = ", ".join(f"{found.count} {kind}" for kind, found in result.warnings.kinds.items())
+        table.add_row("warnings", f"{kinds}; see warnings in summary.json")
     table.add_row("time", f"{result.seconds:.1f} s, {totals.snapshots / result.seconds:.2f} maps/s")
     _out.print(table)
     _out.print(f"results in [bold]{escape(str(result.folder))}[/]", soft_wrap=True)

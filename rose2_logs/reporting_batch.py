@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Self
 
 from rich.markup import escape
 
-from rose2_logs.reporting import error, print_line, print_table, progress_bar, warning
+from rose2_logs.reporting import print_line, print_table, progress_bar
+from rose2_logs.reporting_messages import error, warning
 
 if TYPE_CHECKING:
     from rich.progress import TaskID

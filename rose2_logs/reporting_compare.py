@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 from rich.markup import escape
 
-from rose2_logs.reporting import print_line, print_table, warning
+from rose2_logs.reporting import print_line, print_table
+from rose2_logs.reporting_messages import warning
 
 if TYPE_CHECKING:
     from rose2_logs.comparing import ComparisonResult

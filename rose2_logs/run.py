@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import logging
 import time
+import traceback
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass, field
@@ -16,6 +17,7 @@ import numpy as np
 from rose2_logs.errors import InvalidMapError
 from rose2_logs.explored import coarser_for_its_size
 from rose2_logs.files import refuse_existing
+from rose2_logs.notices import Notices, gathered, muted, notice
 from rose2_logs.occupancy import UNKNOWN, OccupancySnapshot, classify
 from rose2_logs.parameters import OccupancyParameters, Parameters
 from rose2_logs.pipeline import SnapshotAnalysis, analyse
@@ -70,6 +72,8 @@ class RunOptions:
         Whether results of an earlier run may be replaced.
     origin : str, optional
         What the summary names as the log; by default its path. For a log that was copied to be read.
+    strict : bool
+        Whether the first warning about the log is an error.
     """
 
     topic: str | None = None
@@ -84,6 +88,7 @@ class RunOptions:
     live: bool = False
     overwrite: bool = False
     origin: str | None = None
+    strict: bool = False
 
     @property
     def shown_layers(self) -> tuple[str, ...]:
@@ -93,13 +98,14 @@ class RunOptions:
 
 @dataclass(frozen=True)
 class RunResult:
-    """What a run has written, its totals, and since when the layout was as in the end."""
+    """What a run has written, its totals, since when the layout was as in the end, what was odd."""
 
     folder: Path
     files: tuple[Path, ...]
     totals: RunTotals
     seconds: float
     layout_final: Moment | None
+    warnings: Notices = field(default_factory=Notices)
 
 
 SnapshotWorkers = Workers[OccupancySnapshot, tuple[SnapshotAnalysis, RoomEvidence] | InvalidMapError]
@@ -124,7 +130,8 @@ def seconds_into_log(path: Path, start_s: float | None, end_s: float | None) -> 
     """
     if start_s is None and end_s is None:
         return None, None
-    first_ns = inspect_log(path).start_ns or 0
+    with muted():  # what is odd is told when the log is analysed
+        first_ns = inspect_log(path).start_ns or 0
     start_ns = None if start_s is None else first_ns + round(start_s * 1e9)
     return start_ns, None if end_s is None else first_ns + round(end_s * 1e9)
 
@@ -151,27 +158,51 @@ def analyse_log(
         If the log cannot be read or holds no map that can be analysed.
     OutputError
         If there are results already and they may not be replaced, or one cannot be written.
+    StrictError
+        If something is odd, where that is an error.
     """
+    with gathered(options.strict) as warnings:
+        return _analyse_log(path, folder, options, on_snapshot, warnings)
+
+
+def _analyse_log(
+    path: Path, folder: Path, options: RunOptions, on_snapshot: OnSnapshot | None, warnings: Notices
+) -> RunResult:
     start = time.perf_counter()
     planned = _planned_files(folder, log_stem(path), options)
     refuse_existing(planned.values(), overwrite=options.overwrite)
     totals = RunTotals()
     with (
-        open_log(path, topic=options.topic, selection=options.selection) as reader,
+        open_log(
+            path, topic=options.topic, selection=options.selection, limits=options.parameters.reading
+        ) as reader,
         start_workers(options) as workers,
     ):
+        logger.info(
+            "%s: %s, %d messages on %s",
+            path,
+            reader.info.format,
+            len(reader.source.log_times(reader.topic)),
+            reader.topic,
+        )
         last = reader.last()
         info = _run_info(path, reader, options)
         first_ns: int | None = None
         way = reader.robot_path(last.geometry.frame_id) if "path" in options.shown_layers else None
         with ExitStack() as stack:
             tables = Tables(folder)
-            others = _make_sinks(planned, info, options, tables)
+            others = _make_sinks(planned, info, options, tables, reader)
             sinks = [stack.enter_context(sink) for sink in (tables, *others)]
             for frame in tracked_snapshots(reader, last, workers, options.parameters, totals, way):
                 for sink in sinks:
                     sink.write(frame)
                 totals.add(frame)
+                logger.info(
+                    "snapshot %d: coverage %.1f %%, %d rooms",
+                    frame.snapshot.index,
+                    100 * frame.coverage,
+                    len(frame.track_ids),
+                )
                 if on_snapshot is not None:
                     now_ns = frame.snapshot.log_time_ns
                     first_ns = now_ns if first_ns is None else first_ns
@@ -180,6 +211,8 @@ def analyse_log(
                 raise InvalidMapError(f"{path}: none of its {totals.invalid} maps can be analysed")
             tables.look_back()
         messages = dataclasses.asdict(reader.counts)
+    if options.origin is not None:
+        warnings.rename(str(path), options.origin)
     seconds = time.perf_counter() - start
     files = {name: file for name, file in planned.items() if name != "summary"}
     write_summary(
@@ -191,11 +224,13 @@ def analyse_log(
         selection=dataclasses.asdict(options.selection),
         messages=messages,
         files=[file.name for file in files.values()],
+        warnings=warnings.as_json(),
         seconds=seconds,
         workers=options.workers,
     )
     layout_final = None if tables.hindsight is None else tables.hindsight.layout_final
-    return RunResult(folder, (*files.values(), planned["summary"]), totals, seconds, layout_final)
+    written = (*files.values(), planned["summary"])
+    return RunResult(folder, written, totals, seconds, layout_final, warnings)
 
 
 def start_workers(options: RunOptions) -> SnapshotWorkers:
@@ -242,7 +277,8 @@ def tracked_snapshots(
     for snapshot, found in workers.map(reader.snapshots(), is_same):
         if isinstance(found, InvalidMapError):
             totals.invalid += 1
-            logger.warning("snapshot %d is left out: %s", snapshot.index, found)
+            text = f"{reader.info.path}: snapshot {snapshot.index} is left out: {found}"
+            notice(logger, "snapshot_left_out", text, file=reader.info.path, topic=reader.topic)
             continue
         analysis, evidence = found
         note = coarser_for_its_size(snapshot.geometry, analysis.resolution_m, parameters.occupancy)
@@ -287,9 +323,15 @@ def _analyse_or_refuse(
 ) -> tuple[SnapshotAnalysis, RoomEvidence] | InvalidMapError:
     try:
         analysis = analyse(snapshot, parameters, method, voronoi=voronoi)
+        return analysis, room_evidence(snapshot, analysis.rooms, parameters.occupancy)
     except InvalidMapError as error:
         return error
-    return analysis, room_evidence(snapshot, analysis.rooms, parameters.occupancy)
+    except MemoryError:
+        raise
+    except Exception as error:  # a map that the method stumbles over does not cost the others of the run
+        at = traceback.extract_tb(error.__traceback__)[-1]
+        where = f"{Path(at.filename).name}:{at.lineno}"
+        return InvalidMapError(f"{type(error).__name__}: {error} ({where}, a fault of rose2-logs)")
 
 
 def _run_info(path: Path, reader: LogReader, options: RunOptions) -> RunInfo:
@@ -313,7 +355,9 @@ def _planned_files(folder: Path, stem: str, options: RunOptions) -> dict[str, Pa
     return files | {"summary": folder / SUMMARY}
 
 
-def _make_sinks(planned: dict[str, Path], info: RunInfo, options: RunOptions, tables: Tables) -> list[Sink]:
+def _make_sinks(
+    planned: dict[str, Path], info: RunInfo, options: RunOptions, tables: Tables, reader: LogReader
+) -> list[Sink]:
     # Imported here: each brings a large library that the others do not need.
     sinks: list[Sink] = []
     if options.recording or options.live:
@@ -324,5 +368,6 @@ def _make_sinks(planned: dict[str, Path], info: RunInfo, options: RunOptions, ta
     if options.annotated_log:
         from rose2_logs.sinks.annotated_mcap import AnnotatedMcap
 
-        sinks.append(AnnotatedMcap(planned["annotated_log"], info, is_bag=options.bag))
+        log = planned["annotated_log"]
+        sinks.append(AnnotatedMcap(log, info, reader.source, is_bag=options.bag))
     return sinks

@@ -17,10 +17,11 @@ from rose2_logs.exports.formats import planned_files, write_plan
 from rose2_logs.exports.geojson import plan_geojson
 from rose2_logs.files import refuse_existing
 from rose2_logs.occupancy import OccupancySnapshot
-from rose2_logs.parameters import Parameters
+from rose2_logs.parameters import Parameters, ReadingParameters
 from rose2_logs.pipeline import analyse
 from rose2_logs.readers import open_log
 from rose2_logs.readers.discovery import IMAGE_ENDINGS
+from rose2_logs.readers.opening import DEFAULT_LIMITS
 from rose2_logs.room_evidence import room_evidence
 from rose2_logs.room_plan import plan_of_analysis
 from rose2_logs.rooms import RoomMap
@@ -81,7 +82,7 @@ def segment_map(
     )
     more = planned_files([each for each in formats if each != "geojson"], folder, name)
     refuse_existing([*files, *more], overwrite=overwrite)
-    snapshot = read_static_map(map_file, resolution_m)
+    snapshot = read_static_map(map_file, resolution_m, parameters.reading)
     analysis = analyse(snapshot, parameters, method)
     note = coarser_for_its_size(snapshot.geometry, analysis.resolution_m, parameters.occupancy)
     if note is not None:
@@ -95,7 +96,9 @@ def segment_map(
     return StaticMapResult(analysis.rooms, folder, (*files, *more))
 
 
-def read_static_map(map_file: Path, resolution_m: float | None = None) -> OccupancySnapshot:
+def read_static_map(
+    map_file: Path, resolution_m: float | None = None, limits: ReadingParameters = DEFAULT_LIMITS
+) -> OccupancySnapshot:
     """Read a saved map; an image without a ``.yaml`` needs its resolution."""
     if not map_file.is_file():
         raise LogError(f"{map_file}: there is no such file")
@@ -104,7 +107,7 @@ def read_static_map(map_file: Path, resolution_m: float | None = None) -> Occupa
         raise ParameterError(f"{map_file}: no .yaml lies beside it; pass --resolution METRES_PER_CELL")
     if not is_bare and resolution_m is not None:
         raise ParameterError(f"{map_file}: its .yaml says the resolution; leave --resolution out")
-    with _described(map_file, resolution_m) as log, open_log(log) as reader:
+    with _described(map_file, resolution_m) as log, open_log(log, limits=limits) as reader:
         return reader.first()
 
 

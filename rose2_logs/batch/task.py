@@ -10,7 +10,6 @@ import os
 import platform
 import shutil
 import tempfile
-import threading
 import time
 import traceback
 import uuid
@@ -24,6 +23,7 @@ from rose2_logs import __version__
 from rose2_logs.batch.location import Location
 from rose2_logs.batch.record import BatchSettings, Record, Signature, signature_of
 from rose2_logs.errors import LogError, OutputError, Rose2LogsError
+from rose2_logs.notices import PACKAGE, Notices, gathered
 
 RETRY_PAUSE_S = 2.0
 """Before the second try after a fault of storage or network; doubled for each further one."""
@@ -166,9 +166,9 @@ def analyse_task(task: LogTask, report: Report) -> LogOutcome:
     report : callable
         Told of the progress.
     """
-    with _collected_warnings() as warnings:
+    with gathered() as notices, _own_messages():
         try:
-            outcome = _analyse(task, report)
+            outcome = _analyse(task, report, notices)
         except Exception as error:
             known = isinstance(error, Rose2LogsError)
             outcome = LogOutcome(
@@ -178,9 +178,9 @@ def analyse_task(task: LogTask, report: Report) -> LogOutcome:
                 is_transient=is_transient(error),
                 details=traceback.format_exc(),
             )
-    told = warnings[:MOST_WARNINGS]
-    if len(warnings) > MOST_WARNINGS:
-        told.append(f"{len(warnings) - MOST_WARNINGS} more warnings")
+    told = notices.texts()[:MOST_WARNINGS]
+    if notices.count > len(told):
+        told.append(f"{notices.count - len(told)} more warnings")
     return dataclasses.replace(outcome, warnings=tuple(told))
 
 
@@ -197,7 +197,7 @@ def is_transient(error: BaseException | None) -> bool:
     return False
 
 
-def _analyse(task: LogTask, report: Report) -> LogOutcome:
+def _analyse(task: LogTask, report: Report, notices: Notices) -> LogOutcome:
     if task.version != __version__:
         raise Rose2LogsError(f"the worker runs rose2-logs {__version__}, the batch {task.version}")
     if task.attempt > 1:
@@ -213,6 +213,9 @@ def _analyse(task: LogTask, report: Report) -> LogOutcome:
             if task.log.is_remote and str(path) in str(error):
                 raise type(error)(str(error).replace(str(path), task.log.address)) from error
             raise
+        finally:
+            if task.log.is_remote:
+                notices.rename(str(path), task.log.address)
 
 
 def _analyse_local(task: LogTask, path: Path, signature: Signature, report: Report) -> LogOutcome:
@@ -297,21 +300,11 @@ def _attempt_folder(task: LogTask) -> Iterator[Path]:
 
 
 @contextmanager
-def _collected_warnings() -> Iterator[list[str]]:
-    """Gather the warnings of this thread, which would be lost on another machine."""
-    told: list[str] = []
-    thread = threading.get_ident()
-
-    class Gather(logging.Handler):
-        def emit(self, record: logging.LogRecord) -> None:
-            if record.thread == thread:
-                told.append(record.getMessage())
-
-    logger, handler = logging.getLogger("rose2_logs"), Gather(logging.WARNING)
-    logger.addHandler(handler)
+def _own_messages() -> Iterator[None]:
+    """Keep this package's messages from what else shows messages in this process: they are sent back."""
+    logger = logging.getLogger(PACKAGE)
     before, logger.propagate = logger.propagate, False
     try:
-        yield told
+        yield
     finally:
-        logger.removeHandler(handler)
         logger.propagate = before

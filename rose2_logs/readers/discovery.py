@@ -8,9 +8,12 @@ from pathlib import PurePosixPath
 
 MAP_ENDINGS = (".yaml", ".yml")
 IMAGE_ENDINGS = (".pgm", ".png", ".bmp")
-STORAGE_ENDINGS = (".mcap", ".db3", ".bag")
+STORAGE_ENDINGS = (".mcap", ".db3", ".bag", ".bag.active")
+"""The last one is of a bag that its recorder did not close."""
 COMPRESSED_ENDING = ".zstd"
 """Of the files of a ROS 2 bag that was compressed file by file."""
+ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
+"""First bytes of what zstd compressed. No CDR message begins so: its first byte is 0."""
 ANNOTATED_ENDING = ".rose2.mcap"
 """Of our own annotated logs, which are results and no new logs."""
 BAG_DESCRIPTION = "metadata.yaml"

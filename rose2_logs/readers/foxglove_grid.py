@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -9,14 +10,25 @@ from numpy.typing import NDArray
 
 from rose2_logs.errors import InvalidMapError
 from rose2_logs.occupancy import UNKNOWN
-from rose2_logs.readers.messages import FOXGLOVE_GRID_TYPE, Cells, Decoder, Grid, make_grid, percent
+from rose2_logs.readers.messages import (
+    FOXGLOVE_GRID_TYPE,
+    LONGEST_NAME_BYTES,
+    MOST_CELLS,
+    Cells,
+    Decoder,
+    Grid,
+    Remark,
+    check_cells,
+    make_grid,
+    percent,
+)
 
 # foxglove.PackedElementField.NumericType
 _NUMERIC_TYPES = {1: "u1", 2: "i1", 3: "<u2", 4: "<i2", 5: "<u4", 6: "<i4", 7: "<f4", 8: "<f8"}
 _OCCUPANCY_FIELD = "occupancy"
 
 
-def grid_decoder(schema: bytes) -> Decoder:
+def grid_decoder(schema: bytes, most_cells: int = MOST_CELLS) -> Decoder:
     """Return the decoder of ``foxglove.Grid`` messages.
 
     Integers are percent with -1 (unsigned: all bits set) as unknown, like in a ROS occupancy grid; floating
@@ -26,6 +38,8 @@ def grid_decoder(schema: bytes) -> Decoder:
     ----------
     schema : bytes
         A serialized google.protobuf.FileDescriptorSet.
+    most_cells : int
+        Cells of the largest map that is read.
 
     Raises
     ------
@@ -41,16 +55,19 @@ def grid_decoder(schema: bytes) -> Decoder:
         for name in list(files):
             _add_with_imports(pool, files, name)
         message_class: Any = message_factory.GetMessageClass(pool.FindMessageTypeByName(FOXGLOVE_GRID_TYPE))
-    except (DecodeError, KeyError, TypeError) as error:
+    except (DecodeError, KeyError, TypeError, ValueError, RecursionError) as error:
         raise InvalidMapError(
             f"the protobuf schema of {FOXGLOVE_GRID_TYPE} cannot be read: {error}"
         ) from error
 
     def decode(data: memoryview) -> Grid | None:
         try:
-            return _grid(message_class.FromString(bytes(data)))
+            return _grid(message_class.FromString(bytes(data)), most_cells)
         except DecodeError as error:
             raise InvalidMapError(f"it cannot be decoded as {FOXGLOVE_GRID_TYPE}: {error}") from error
+        except (AttributeError, TypeError, ValueError, OverflowError) as error:
+            # By a schema of that name, but with other fields.
+            raise InvalidMapError(f"its schema is not that of {FOXGLOVE_GRID_TYPE}: {error}") from error
 
     return decode
 
@@ -64,15 +81,22 @@ def _add_with_imports(pool: Any, files: dict[str, Any], name: str) -> None:
         pool.Add(file)
 
 
-def _grid(message: Any) -> Grid | None:
-    if message.cell_size.x != message.cell_size.y:
+def _grid(message: Any, most_cells: int) -> Grid | None:
+    remarks: list[Remark] = []
+    if len(message.frame_id) > LONGEST_NAME_BYTES:
+        raise InvalidMapError(f"its frame_id is longer than {LONGEST_NAME_BYTES} bytes")
+    # Of one that is no number neither equals the other; that is told below.
+    if message.cell_size.x != message.cell_size.y and not math.isnan(message.cell_size.x):
         raise InvalidMapError(
             f"its cells are {message.cell_size.x} x {message.cell_size.y} m; only square ones can be read"
         )
     position, turn = message.pose.position, message.pose.orientation
     pose = (position.x, position.y, position.z, turn.x, turn.y, turn.z, turn.w)
     stamp_ns = message.timestamp.seconds * 10**9 + message.timestamp.nanos
-    return make_grid(stamp_ns, message.frame_id, message.cell_size.x, pose, _occupancy(_channel(message)))
+    values = _channel(message)
+    check_cells(values.shape[0], values.shape[1], most_cells)
+    cells = _occupancy(values, remarks)
+    return make_grid(stamp_ns, message.frame_id, message.cell_size.x, pose, cells, remarks)
 
 
 def _channel(message: Any) -> NDArray[Any]:
@@ -104,7 +128,7 @@ def _channel(message: Any) -> NDArray[Any]:
     return np.ndarray((rows, columns), dtype, data, field.offset, (message.row_stride, cell))
 
 
-def _occupancy(values: NDArray[Any]) -> Cells:
+def _occupancy(values: NDArray[Any], remarks: list[Remark]) -> Cells:
     if values.dtype.kind == "f":
         if values.size and np.nanmax(values, initial=0) > 1:
             raise InvalidMapError(
@@ -113,6 +137,6 @@ def _occupancy(values: NDArray[Any]) -> Cells:
         known = values >= 0
         return np.where(known, np.round(np.where(known, values, 0) * 100), UNKNOWN).astype(np.int8)
     if values.dtype.itemsize == 1:
-        return percent(np.ascontiguousarray(values).view(np.int8))
+        return percent(np.ascontiguousarray(values).view(np.int8), remarks)
     known = (values >= 0) & (values <= 100)
     return np.where(known, values, UNKNOWN).astype(np.int8)

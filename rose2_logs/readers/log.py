@@ -11,9 +11,11 @@ from typing import Self
 import numpy as np
 
 from rose2_logs.errors import InvalidMapError, LogError, NoMapTopicError
+from rose2_logs.notices import notice
 from rose2_logs.occupancy import OccupancySnapshot
 from rose2_logs.readers.map_stream import MapStream, ReadCounts
-from rose2_logs.readers.messages import is_patch_type
+from rose2_logs.readers.messages import Patch, Remark, is_patch_type
+from rose2_logs.readers.oddities import Oddities
 from rose2_logs.readers.poses import RobotPath
 from rose2_logs.readers.selection import Selection, Times
 from rose2_logs.readers.source import DamagedMessageError, LoggedMap, LogInfo, MessageSource, TopicInfo
@@ -39,6 +41,8 @@ class LogReader:
         What the log holds.
     topic : str
         The map topic that is read.
+    source : MessageSource
+        The open log.
     counts : ReadCounts
         About the latest call of `snapshots`.
     """
@@ -47,8 +51,9 @@ class LogReader:
         self.info = source.info
         self.topic = choose_topic(source.info, topic)
         self.counts = ReadCounts()
-        self._source = source
+        self.source = source
         self._selection = selection
+        self._first_failure: str | None = None
         self._topics = [self.topic] + [
             item.name
             for item in self.info.topics
@@ -65,27 +70,25 @@ class LogReader:
 
     def close(self) -> None:
         """Release the log's files."""
-        self._source.close()
+        self.source.close()
 
     def snapshots(self) -> Iterator[OccupancySnapshot]:
         """Yield the selected maps in the order of log time.
 
-        A map equal to the one before is dropped and counted. One map at a time is held, and the times of the
-        topic's messages.
+        A map equal to the one before is dropped and counted, one that is damaged or contradicts itself told,
+        left out and counted. One map at a time is held, and the times of the topic's messages.
 
         Raises
         ------
         LogError
-            If no map of the topic lies in the time range, or none can be read any more.
-        InvalidMapError
-            If a map contradicts itself; the text names the file, the message and the topic.
+            If no map of the topic lies in the time range, or none can be read.
         """
         times = self._times_in_range()
         chosen = self._selection.thin(np.unique(times))
         taken = int(np.isin(times, chosen).sum())
         self.counts = ReadCounts(messages=len(times), skipped=len(times) - taken)
         snapshot = None
-        for snapshot in self._read(chosen, self.counts, self._selection.min_change_m2):
+        for snapshot in self._read(chosen, self.counts, self._selection.min_change_m2, tell=True):
             yield snapshot
         if snapshot is None:
             raise self._no_map(self.counts)
@@ -95,7 +98,7 @@ class LogReader:
 
         Raises
         ------
-        LogError, InvalidMapError
+        LogError
             As `snapshots`.
         """
         counts = ReadCounts()
@@ -111,7 +114,7 @@ class LogReader:
 
         Raises
         ------
-        LogError, InvalidMapError
+        LogError
             As `snapshots`.
         """
         counts = ReadCounts()
@@ -130,27 +133,48 @@ class LogReader:
         frame_id : str
             Frame of the map, in which its poses are wanted.
         """
-        return RobotPath(self._source, frame_id, self._selection.start_ns)
+        return RobotPath(self.source, frame_id, self._selection.start_ns)
 
     def _read(
-        self, chosen: Times, counts: ReadCounts, min_change_m2: float | None = None
+        self, chosen: Times, counts: ReadCounts, min_change_m2: float | None = None, *, tell: bool = False
     ) -> Iterator[OccupancySnapshot]:
-        """Yield the distinct maps as they stand at the `chosen` times (sorted)."""
+        """Yield the distinct maps as they stand at the `chosen` times (sorted); `tell` what is odd."""
         wanted = set(chosen.tolist())
         stream = MapStream(self.topic, counts, min_change_m2)
-        for message in self._source.read(self._topics, self._needed(chosen)):
+        oddities = Oddities()
+        for message in self.source.read(self._topics, self._needed(chosen)):
             is_wanted = message.log_time_ns in wanted
+            remarks: tuple[Remark, ...] = ()
             try:
-                stream.apply(message.decode())
-            except DamagedMessageError as error:
-                if not counts.damaged:
-                    logger.warning("%s: %s; reading goes on without it", self._place(message), error)
-                counts.damaged += is_wanted
+                decoded = message.decode()
+                if isinstance(decoded, Patch) and stream.is_empty:
+                    remarks = (Remark("patch_without_map", "a patch without a map before it; left out"),)
+                else:
+                    remarks = oddities.of(decoded, message.log_time_ns)
+                stream.apply(decoded)
+            except LogError as error:
+                is_damaged = isinstance(error, DamagedMessageError)
+                counts.damaged += is_wanted and is_damaged
+                counts.invalid += is_wanted and not is_damaged
+                if message.topic == self.topic:
+                    stream.forget()
+                self._first_failure = self._first_failure or f"{self._place(message)}: {error}"
+                kind = "damaged_message" if is_damaged else "invalid_map"
+                self._tell(message, Remark(kind, f"{error}; it is left out"), tell)
                 continue
-            except InvalidMapError as error:
-                raise InvalidMapError(f"{self._place(message)}: {error}") from error
+            for remark in remarks:
+                self._tell(message, remark, tell)
             if is_wanted and (snapshot := stream.snapshot(message.log_time_ns)) is not None:
                 yield snapshot
+
+    def _place(self, message: LoggedMap) -> str:
+        total = len(self.source.log_times(message.topic))
+        return f"{self.info.path}: message {message.number} of {total} on {message.topic}"
+
+    def _tell(self, message: LoggedMap, remark: Remark, tell: bool) -> None:
+        if tell:
+            text = f"{self._place(message)}: {remark.text}"
+            notice(logger, remark.kind, text, file=message.file, topic=message.topic, index=message.number)
 
     def _needed(self, chosen: Times) -> Times:
         """Times of the messages that the maps at the `chosen` times are made of.
@@ -159,7 +183,7 @@ class LogReader:
         """
         if len(self._topics) == 1 or not len(chosen):
             return chosen
-        grids, patches = (np.unique(self._source.log_times(topic)) for topic in self._topics)
+        grids, patches = (np.unique(self.source.log_times(topic)) for topic in self._topics)
         last_grid = np.searchsorted(grids, chosen, "right") - 1
         begins = np.where(last_grid >= 0, grids[last_grid], chosen) if len(grids) else chosen
         # A patch is needed if some chosen map is made of it: its grid began before, the map stands after it.
@@ -169,7 +193,7 @@ class LogReader:
         return np.unique(np.concatenate([chosen, begins, patches[begins[following] <= patches]]))
 
     def _times_in_range(self) -> Times:
-        times = np.sort(np.concatenate([self._source.log_times(topic) for topic in self._topics]))
+        times = np.sort(np.concatenate([self.source.log_times(topic) for topic in self._topics]))
         if not len(times):
             raise LogError(f"{self.info.path}: there is no message on {self.topic}; choose another topic")
         in_range = self._selection.in_range(times)
@@ -180,17 +204,16 @@ class LogReader:
             )
         return in_range
 
-    def _place(self, message: LoggedMap) -> str:
-        times = self._source.log_times(message.topic)
-        number = int(np.searchsorted(times, message.log_time_ns)) + 1
-        return f"{self.info.path}: message {number} of {len(times)} on {message.topic}"
-
     def _no_map(self, counts: ReadCounts) -> LogError:
-        why = f"; {counts.damaged} messages are damaged" if counts.damaged else ""
-        return LogError(
-            f"{self.info.path}: no message on {self.topic} in the time range holds a map{why}; "
-            "choose another topic or time range"
-        )
+        where = f"no message on {self.topic} in the time range holds a map"
+        if self._first_failure is None:
+            text = f"{self.info.path}: {where}; choose another topic or time range"
+            return LogError(text, file=self.info.path, topic=self.topic)
+        why = [f"{counts.damaged} messages are damaged"] if counts.damaged else []
+        why += [f"{counts.invalid} maps contradict themselves"] if counts.invalid else []
+        kind = InvalidMapError if counts.invalid else LogError
+        text = f"{self._first_failure}; {where}: {', '.join(why)}"
+        return kind(text, file=self.info.path, topic=self.topic)
 
 
 def choose_topic(info: LogInfo, asked: str | None = None) -> str:
@@ -201,6 +224,7 @@ def choose_topic(info: LogInfo, asked: str | None = None) -> str:
     NoMapTopicError
         If there is none, or there are several and none was asked for; the text lists them.
     """
+    where = str(info.path) if info.whole else f"{info.path}: is damaged; of what can be read of it"
     maps = {topic.name: topic for topic in info.topics if topic.is_map}
     listed = ", ".join(maps)
     if asked is not None:
@@ -212,12 +236,12 @@ def choose_topic(info: LogInfo, asked: str | None = None) -> str:
     if not maps:
         others = ", ".join(sorted({topic.message_type for topic in info.topics})[:MOST_LISTED]) or "nothing"
         raise NoMapTopicError(
-            f"{info.path}: no topic holds occupancy grids (nav_msgs/OccupancyGrid); it holds {others}; "
+            f"{where}: no topic holds occupancy grids (nav_msgs/OccupancyGrid); it holds {others}; "
             "record the topic of the mapping node, often /map, as well"
         )
     filled = {name: topic for name, topic in maps.items() if topic.message_count != 0}
     if not filled:
-        raise NoMapTopicError(f"{info.path}: no message was recorded on the map topics {listed}")
+        raise NoMapTopicError(f"{where}: no message was recorded on the map topics {listed}")
     for name in filled:
         if name.lstrip("/") == PREFERRED_TOPIC:
             return name

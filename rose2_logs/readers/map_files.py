@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import logging
-import math
 import re
+import reprlib
+import sys
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
@@ -15,12 +16,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rose2_logs.errors import InvalidMapError, LogError
+from rose2_logs.notices import notice
 from rose2_logs.occupancy import UNKNOWN
-from rose2_logs.readers.messages import Cells, Grid, make_grid
+from rose2_logs.parameters import ReadingParameters
+from rose2_logs.readers.descriptions import load_yaml
+from rose2_logs.readers.messages import MOST_CELLS, Cells, Grid, check_cells, make_grid
 from rose2_logs.readers.selection import Times
 from rose2_logs.readers.source import LoggedMap, LogInfo, MessageSource, TopicInfo
 
 logger = logging.getLogger(__name__)
+
+DEFAULT_LIMITS = ReadingParameters()
+_repr = reprlib.Repr()
 
 TOPIC = "/map"
 FRAME_ID = "map"
@@ -30,6 +37,8 @@ STEP_NS = 10**9
 OCCUPIED_THRESH = 0.65
 FREE_THRESH = 0.196
 MODES = ("trinary", "scale", "raw")
+FORMATS = ("PNG", "PPM", "BMP", "JPEG", "TIFF")
+"""Image formats that are opened, by Pillow's names (PPM is also PGM): what map savers write, and no more."""
 # What map savers write in trinary mode for free, unknown and occupied.
 SAVED_FREE, SAVED_UNKNOWN, SAVED_OCCUPIED = 254, 205, 0
 
@@ -43,10 +52,13 @@ class MapFilesSource(MessageSource):
         Name of the log.
     files : sequence of Path
         The ``.yaml`` files; each is read when its turn comes.
+    limits : ReadingParameters
+        How large a map may be.
     """
 
-    def __init__(self, path: Path, files: Sequence[Path]) -> None:
+    def __init__(self, path: Path, files: Sequence[Path], limits: ReadingParameters = DEFAULT_LIMITS) -> None:
         self._files = list(files)
+        self._limits = limits
         self.info = LogInfo(
             path,
             "map_server map" if len(files) == 1 else "map_server maps",
@@ -67,7 +79,11 @@ class MapFilesSource(MessageSource):
     def read(self, topics: Sequence[str], times: Times) -> Iterator[LoggedMap]:
         """Yield the maps at `times`."""
         for time in times.tolist():
-            yield LoggedMap(time, TOPIC, partial(read_map, self._files[time // STEP_NS], time))
+            number = time // STEP_NS
+            file = self._files[number]
+            yield LoggedMap(
+                time, TOPIC, number + 1, file, partial(read_map, file, time, self._limits.map_max_cells)
+            )
 
 
 def natural_order(path: Path) -> tuple[list[tuple[int, str]], str]:
@@ -79,13 +95,13 @@ def natural_order(path: Path) -> tuple[list[tuple[int, str]], str]:
 def is_map_file(path: Path) -> bool:
     """Whether a YAML file describes a map: it names an image and a resolution."""
     try:
-        described = _load_yaml(path)
+        described = load_yaml(path)
     except LogError:
         return False
     return "image" in described and "resolution" in described
 
 
-def read_map(path: Path, stamp_ns: int = 0) -> Grid | None:
+def read_map(path: Path, stamp_ns: int = 0, most_cells: int = MOST_CELLS) -> Grid | None:
     """Read one saved map as map_server would.
 
     Parameters
@@ -94,6 +110,8 @@ def read_map(path: Path, stamp_ns: int = 0) -> Grid | None:
         The ``.yaml`` file: image, resolution, origin (x, y, yaw), negate, occupied_thresh, free_thresh, mode.
     stamp_ns : int
         Stamp to give to the map.
+    most_cells : int
+        Pixels of the largest image that is read, by what it claims.
 
     Returns
     -------
@@ -105,17 +123,21 @@ def read_map(path: Path, stamp_ns: int = 0) -> Grid | None:
     InvalidMapError
         If the file or its image cannot be used.
     """
-    described = _load_yaml(path)
+    described = load_yaml(path)
     resolution = _number(path, described, "resolution", None)
     origin = described.get("origin")
     if not (isinstance(origin, Sequence) and len(origin) == 3 and all(_is_finite(part) for part in origin)):
-        raise InvalidMapError(f"{path}: origin is {origin!r}; it must be three finite numbers: x, y, yaw")
+        raise InvalidMapError(
+            f"{path}: origin is {_short(origin)}; it must be three finite numbers: x, y, yaw", file=path
+        )
     x, y, yaw = (float(part) for part in origin)
-    shade, opaque = _load_image(_image_path(path, described))
+    shade, opaque = _load_image(_image_path(path, described), most_cells)
     pose = (x, y, 0.0, 0.0, 0.0, float(np.sin(yaw / 2)), float(np.cos(yaw / 2)))
-    return make_grid(
-        stamp_ns, FRAME_ID, resolution, pose, _cells(path, described, shade, opaque)[::-1].copy()
-    )
+    cells = _cells(path, described, shade, opaque)[::-1].copy()
+    try:
+        return make_grid(stamp_ns, FRAME_ID, resolution, pose, cells, [])
+    except InvalidMapError as error:
+        raise InvalidMapError(f"{path}: {error}", file=path) from error
 
 
 def _cells(
@@ -124,13 +146,13 @@ def _cells(
     """Occupancy of pixels of brightness `shade` in 0..1, by the mode and the thresholds of the file."""
     mode = str(described.get("mode", "trinary")).lower()
     if mode not in MODES:
-        raise InvalidMapError(f"{path}: mode is {mode!r}; it must be one of {', '.join(MODES)}")
+        raise InvalidMapError(f"{path}: mode is {_short(mode)}; it must be one of {', '.join(MODES)}")
     if mode == "raw":
         value = np.round(shade * 255)
         return np.where(value <= 100, value, UNKNOWN).astype(np.int8)
     negate = described.get("negate", 0)
     if negate not in (0, 1):
-        raise InvalidMapError(f"{path}: negate is {negate!r}; it must be 0 or 1")
+        raise InvalidMapError(f"{path}: negate is {_short(negate)}; it must be 0 or 1")
     occupied_above = _number(path, described, "occupied_thresh", OCCUPIED_THRESH)
     free_below = _number(path, described, "free_thresh", FREE_THRESH)
     if not 0 <= free_below < occupied_above <= 1:
@@ -152,12 +174,11 @@ def _cells(
         and saved_as_unknown.any()
     ):
         # nav2 before mid 2025 saved free_thresh 0.25 with such images, by which unknown cells load as free.
-        logger.warning(
-            "%s: by its free_thresh %g unknown pixels (%d) would be free; they are read as unknown",
-            path,
-            free_below,
-            SAVED_UNKNOWN,
+        text = (
+            f"{path}: by its free_thresh {free_below:g} unknown pixels ({SAVED_UNKNOWN}) would be free; they "
+            "are read as unknown"
         )
+        notice(logger, "free_thresh", text, file=path)
         unknown |= saved_as_unknown
     cells = np.where(occupancy > occupied_above, np.int8(100), np.int8(UNKNOWN))
     cells[occupancy < free_below] = 0
@@ -170,69 +191,62 @@ def _is_saved_trinary(shade: NDArray[np.float32]) -> bool:
     return bool(np.isin(np.round(shade * 255), (SAVED_FREE, SAVED_UNKNOWN, SAVED_OCCUPIED)).all())
 
 
-def _load_image(path: Path) -> tuple[NDArray[np.float32], NDArray[np.bool_] | None]:
+def _load_image(path: Path, most_cells: int) -> tuple[NDArray[np.float32], NDArray[np.bool_] | None]:
     """Brightness (H, W) in 0..1, the mean of the colours, and which pixels are opaque if the image tells."""
-    from PIL import Image, UnidentifiedImageError
+    from PIL import Image
 
     try:
         with warnings.catch_warnings():
             # Large maps are wanted; Pillow still refuses those of more than 180 million pixels.
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)
-            with Image.open(path) as image:
+            with Image.open(path, formats=FORMATS) as image:
+                check_cells(image.height, image.width, most_cells)
                 if image.mode.startswith("I"):
                     return np.asarray(image, np.float32) / np.float32(2**16 - 1), None
                 has_alpha = "A" in image.getbands() or "transparency" in image.info
                 pixels = np.asarray(
                     image.convert("RGBA" if has_alpha else "RGB" if image.mode != "L" else "L")
                 )
-    except (OSError, ValueError, SyntaxError, UnidentifiedImageError, Image.DecompressionBombError) as error:
-        raise InvalidMapError(f"{path}: cannot be read as the image of a map: {error}") from error
+    except InvalidMapError as error:
+        raise InvalidMapError(f"{path}: {error}", file=path) from error
+    except Exception as error:  # whatever a decoder raises on bytes that are not what they should be
+        raise InvalidMapError(f"{path}: cannot be read as the image of a map: {error}", file=path) from error
     if pixels.ndim == 2:
         return pixels.astype(np.float32) / np.float32(255), None
     shade = pixels[..., :3].mean(axis=-1, dtype=np.float32) / np.float32(255)
     return shade, pixels[..., 3] == 255 if has_alpha else None
 
 
-def _load_yaml(path: Path) -> dict[str, Any]:
-    import yaml
-
-    try:
-        described = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise LogError(f"{path}: cannot be read: {error}") from error
-    except yaml.YAMLError as error:
-        raise InvalidMapError(f"{path}: is not YAML: {' '.join(str(error).split())}") from error
-    if not isinstance(described, dict):
-        raise InvalidMapError(f"{path}: does not describe a map; it needs image, resolution and origin")
-    return described
-
-
 def _image_path(path: Path, described: Mapping[str, Any]) -> Path:
     image = described.get("image")
     if not isinstance(image, str) or not image:
-        raise InvalidMapError(f"{path}: image is {image!r}; it must name the map's image file")
+        raise InvalidMapError(f"{path}: image is {_short(image)}; it must name the map's image file")
     return path.parent / image
 
 
-def _is_number(value: object) -> TypeGuard[float]:
-    return isinstance(value, (int, float)) and not isinstance(value, bool)
+def _is_finite(value: object) -> TypeGuard[float]:
+    # Not by conversion: whole numbers have no end in YAML.
+    if not isinstance(value, (int, float)) or isinstance(value, bool):
+        return False
+    return -sys.float_info.max <= value <= sys.float_info.max
 
 
-def _is_finite(value: object) -> bool:
-    return _is_number(value) and -math.inf < value < math.inf
+def _short(value: object) -> str:
+    """Show a value from a file, which may be anything, in a line."""
+    return _repr.repr(value)
 
 
 def _number(path: Path, described: Mapping[str, Any], name: str, default: float | None) -> float:
     value = described.get(name, default)
-    if not _is_number(value):
-        raise InvalidMapError(f"{path}: {name} is {value!r}; it must be a number")
+    if not _is_finite(value):
+        raise InvalidMapError(f"{path}: {name} is {_short(value)}; it must be a finite number", file=path)
     return float(value)
 
 
 def _size(path: Path) -> int:
     """Bytes of a saved map, as far as its files exist."""
     try:
-        image = _image_path(path, _load_yaml(path))
+        image = _image_path(path, load_yaml(path))
         return path.stat().st_size + (image.stat().st_size if image.exists() else 0)
     except LogError:
         return path.stat().st_size if path.exists() else 0

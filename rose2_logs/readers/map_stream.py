@@ -15,7 +15,7 @@ from rose2_logs.readers.messages import Cells, Grid, Patch
 class ReadCounts:
     """What became of the map messages in the time range; filled while the snapshots are read.
 
-    Once all are read, `messages` is the number of snapshots plus repeats, skipped and damaged.
+    Once all are read, `messages` is the number of snapshots plus repeats, skipped, damaged and invalid.
 
     Attributes
     ----------
@@ -29,6 +29,8 @@ class ReadCounts:
         Patches written into the grid before them, taken or not.
     damaged : int
         Cannot be read any more: checksum or compression wrong.
+    invalid : int
+        Contradict themselves, or reach out of the map before them.
     """
 
     messages: int = 0
@@ -36,6 +38,7 @@ class ReadCounts:
     skipped: int = 0
     updates_applied: int = 0
     damaged: int = 0
+    invalid: int = 0
 
 
 class MapStream:
@@ -61,6 +64,15 @@ class MapStream:
         self._yielded: Grid | None = None
         self._index = 0
         self._repeats = 0
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether there is no map: none came yet, or the last one was lost."""
+        return self._map is None
+
+    def forget(self) -> None:
+        """Have no map until the next whole one: the one that came was lost, and patches are for it."""
+        self._map = None
 
     def apply(self, message: Grid | Patch | None) -> None:
         """Bring the map up to date; None and a patch without a grid before it leave no map.

@@ -3,28 +3,53 @@
 from __future__ import annotations
 
 import glob
+import logging
 import shutil
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path, PurePosixPath
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rose2_logs.errors import LogError
-from rose2_logs.readers.discovery import IMAGE_ENDINGS, MAP_ENDINGS, STORAGE_ENDINGS
+from rose2_logs.notices import notice
+from rose2_logs.parameters import ReadingParameters
+from rose2_logs.readers.descriptions import load_yaml
+from rose2_logs.readers.discovery import (
+    BAG_DESCRIPTION,
+    COMPRESSED_ENDING,
+    IMAGE_ENDINGS,
+    MAP_ENDINGS,
+    STORAGE_ENDINGS,
+    ZSTD_MAGIC,
+)
 from rose2_logs.readers.log import LogReader
 from rose2_logs.readers.selection import Selection
 from rose2_logs.readers.source import LogInfo, MessageSource
 
+if TYPE_CHECKING:
+    from rose2_logs.readers.file_log import FileLog, OpenFile
+
+logger = logging.getLogger(__name__)
+
 LogPath = str | Path | Sequence[str | Path]
 
 EVERYTHING = Selection()
+DEFAULT_LIMITS = ReadingParameters()
+DISK_LEFT_BYTES = 1 << 30
+"""Of the disk with the temporary folder, left free when a bag is decompressed there."""
 _FORMATS = (
     "an .mcap file, a ROS 1 .bag, a ROS 2 bag directory or .db3, a map_server .yaml or a folder of those"
 )
 _MAGIC = {b"\x89MCAP0\r\n": ".mcap", b"#ROSBAG ": ".bag", b"SQLite f": ".db3"}
 
 
-def open_log(path: LogPath, *, topic: str | None = None, selection: Selection = EVERYTHING) -> LogReader:
+def open_log(
+    path: LogPath,
+    *,
+    topic: str | None = None,
+    selection: Selection = EVERYTHING,
+    limits: ReadingParameters = DEFAULT_LIMITS,
+) -> LogReader:
     """Open a log for reading its maps.
 
     Parameters
@@ -37,6 +62,8 @@ def open_log(path: LogPath, *, topic: str | None = None, selection: Selection = 
         The map topic; by default ``/map``, else the only one.
     selection : Selection
         Which of its maps to take.
+    limits : ReadingParameters
+        How much it may claim before it is refused.
 
     Returns
     -------
@@ -50,7 +77,7 @@ def open_log(path: LogPath, *, topic: str | None = None, selection: Selection = 
     LogError
         If the log cannot be opened.
     """
-    source = open_source(path)
+    source = open_source(path, limits)
     try:
         return LogReader(source, topic, selection)
     except BaseException:
@@ -58,12 +85,12 @@ def open_log(path: LogPath, *, topic: str | None = None, selection: Selection = 
         raise
 
 
-def inspect_log(path: LogPath) -> LogInfo:
+def inspect_log(path: LogPath, limits: ReadingParameters = DEFAULT_LIMITS) -> LogInfo:
     """Tell what a log holds, also one without any map.
 
     Parameters
     ----------
-    path : str, Path or a sequence of them
+    path, limits
         As for `open_log`.
 
     Raises
@@ -71,17 +98,17 @@ def inspect_log(path: LogPath) -> LogInfo:
     LogError
         If the log cannot be opened.
     """
-    source = open_source(path)
+    source = open_source(path, limits)
     source.close()
     return source.info
 
 
-def open_source(path: LogPath) -> MessageSource:
+def open_source(path: LogPath, limits: ReadingParameters = DEFAULT_LIMITS) -> MessageSource:
     """Open a log for looking at several of its topics; to be closed.
 
     Parameters
     ----------
-    path : str, Path or a sequence of them
+    path, limits
         As for `open_log`.
 
     Raises
@@ -89,67 +116,138 @@ def open_source(path: LogPath) -> MessageSource:
     LogError
         If the log cannot be opened.
     """
+    try:
+        return _open_source(path, limits)
+    except OSError as error:
+        where = error.filename or path
+        raise LogError(f"{where}: cannot be read: {error.strerror or error}", file=str(where)) from error
+
+
+def _open_source(path: LogPath, limits: ReadingParameters) -> MessageSource:
     if not isinstance(path, (str, Path)):
         files = [Path(each) for each in path]
         if not files:
             raise LogError("no log was given")
-        return _open_files(files[0], files) if len(files) > 1 else open_source(files[0])
+        return _open_files(files[0], files, limits) if len(files) > 1 else _open_source(files[0], limits)
     log = Path(path)
     if log.is_dir():
-        return _open_directory(log)
+        return _open_directory(log, limits)
     if not log.exists():
         found = [Path(each) for each in glob.glob(str(path))]  # noqa: PTH207 (may be absolute)
         if not found:
-            raise LogError(f"{path}: there is no such file or directory")
-        return _open_files(log, found, in_natural_order=True)
-    return _open_files(log, [log])
+            raise LogError(f"{path}: there is no such file or directory", file=str(path))
+        return _open_files(log, _in_natural_order(found), limits)
+    return _open_files(log, [log], limits)
 
 
-def _open_files(log: Path, files: list[Path], in_natural_order: bool = False) -> MessageSource:
+def _open_files(
+    log: Path, files: list[Path], limits: ReadingParameters, *, is_bag: bool = False
+) -> MessageSource:
     """Open files of one kind as one log."""
-    from rose2_logs.readers.map_files import MapFilesSource, natural_order
-
     if missing := [file for file in files if not file.is_file()]:
-        raise LogError(f"{missing[0]}: is not a file; several logs are read as one only if all are files")
-    if in_natural_order:
-        files = sorted(files, key=natural_order)
-    kinds = {_kind(file) for file in files}
+        what = "is not a file; several logs are read as one only if all are files"
+        raise LogError(f"{missing[0]}: {what}", file=missing[0])
+    kinds = _kinds(files)
     if len(kinds) > 1:
-        raise LogError(f"{log}: files of different kinds ({', '.join(sorted(kinds))}) cannot be one log")
-    size = sum(file.stat().st_size for file in files)
+        raise LogError(
+            f"{log}: files of different kinds ({', '.join(sorted(kinds))}) cannot be one log", file=log
+        )
     match kinds.pop():
         case ".yaml":
-            return MapFilesSource(log, files)
+            from rose2_logs.readers.map_files import MapFilesSource
+
+            return MapFilesSource(log, files, limits)
         case "image":
-            return MapFilesSource(log, [_yaml_beside(file) for file in files])
-        case ".mcap":
-            from rose2_logs.readers.mcap_log import McapSource
+            from rose2_logs.readers.map_files import MapFilesSource
 
-            return McapSource(log, files)
+            return MapFilesSource(log, [_yaml_beside(file) for file in files], limits)
         case kind:
-            from rose2_logs.readers.bag_log import BagSource
+            return _open_storage(log, files, kind, limits, is_bag=is_bag)
 
-            return BagSource(log, files, "ROS 1 bag" if kind == ".bag" else "ROS 2 database (sqlite3)", size)
+
+def _open_storage(
+    log: Path, files: list[Path], kind: str, limits: ReadingParameters, *, is_bag: bool
+) -> FileLog:
+    """Open MCAP files, bags or databases; compressed ones are decompressed beside the log first."""
+    from rose2_logs.readers.file_log import FileLog
+
+    open_file, name, bag_name = _formats()[kind]
+    size = sum(each.stat().st_size for each in (log.iterdir() if log.is_dir() else files) if each.is_file())
+    scratch = tempfile.TemporaryDirectory(prefix="rose2_logs_") if any(map(_is_packed, files)) else None
+    try:
+        if scratch is not None:
+            files = [_decompressed(file, Path(scratch.name)) if _is_packed(file) else file for file in files]
+        return FileLog(
+            log,
+            files,
+            open_file,
+            limits,
+            format_name=bag_name if is_bag else name,
+            size_bytes=size,
+            on_close=(lambda: None) if scratch is None else scratch.cleanup,
+        )
+    except BaseException:
+        if scratch is not None:
+            scratch.cleanup()
+        raise
+
+
+def _formats() -> dict[str, tuple[OpenFile, str, str]]:
+    """How each kind of file is opened, and its name, alone and as a ROS 2 bag."""
+    from rose2_logs.readers.bag_index import BagFile
+    from rose2_logs.readers.mcap_index import McapFile
+    from rose2_logs.readers.sqlite_index import SqliteFile
+
+    return {
+        ".mcap": (McapFile, "MCAP", "ROS 2 bag (mcap)"),
+        ".bag": (BagFile, "ROS 1 bag", "ROS 1 bag"),
+        ".db3": (SqliteFile, "ROS 2 database (sqlite3)", "ROS 2 bag (sqlite3)"),
+    }
+
+
+def _kinds(files: list[Path]) -> set[str]:
+    """Kinds of files by how they begin, else by their names; of several, those that tell none do not count.
+
+    Raises
+    ------
+    LogError
+        If none tells its kind.
+    """
+    kinds, failures = set(), []
+    for file in files:
+        try:
+            kinds.add(_kind(file))
+        except LogError as error:
+            failures.append(error)
+    if not kinds:
+        raise failures[0]
+    return kinds
 
 
 def _kind(file: Path) -> str:
     """Kind of a file by how it begins, else by its name."""
-    try:
-        with file.open("rb") as stream:
-            begin = stream.read(8)
-    except OSError as error:
-        raise LogError(f"{file}: cannot be opened: {error.strerror}") from error
-    suffix = file.suffix.lower()
+    with file.open("rb") as stream:
+        begin = stream.read(8)
     if begin in _MAGIC:
         return _MAGIC[begin]
+    name = file.name.lower()
+    if _is_packed(file) and begin.startswith(ZSTD_MAGIC):
+        return PurePosixPath(name.removesuffix(COMPRESSED_ENDING)).suffix
+    suffix = file.suffix.lower()
     if suffix in MAP_ENDINGS:
         return ".yaml"
     if suffix in IMAGE_ENDINGS:
         return "image"
-    if suffix in STORAGE_ENDINGS:
+    if _is_packed(file) or name.endswith(STORAGE_ENDINGS):
         what = "is empty" if not begin else f"does not begin as {suffix} files do"
-        raise LogError(f"{file}: {what}; was it copied whole?")
-    raise LogError(f"{file}: is not a kind of log that can be read; give {_FORMATS}")
+        raise LogError(f"{file}: {what}; was it copied whole?", file=file)
+    raise LogError(f"{file}: is not a kind of log that can be read; give {_FORMATS}", file=file)
+
+
+def _is_packed(file: Path) -> bool:
+    """Whether a file is that of a ROS 2 bag compressed file by file."""
+    name = file.name.lower()
+    return name.endswith(COMPRESSED_ENDING) and name.removesuffix(COMPRESSED_ENDING).endswith(STORAGE_ENDINGS)
 
 
 def _yaml_beside(image: Path) -> Path:
@@ -157,78 +255,88 @@ def _yaml_beside(image: Path) -> Path:
         if (beside := image.with_suffix(suffix)).exists():
             return beside
     raise LogError(
-        f"{image}: needs {image.stem}.yaml beside it with its resolution and origin (map_server's format)"
+        f"{image}: needs {image.stem}.yaml beside it with its resolution and origin (map_server's format)",
+        file=image,
     )
 
 
-def _open_directory(log: Path) -> MessageSource:
-    """Open a ROS 2 bag, or a folder of saved maps, or of the files of a recording that was not closed."""
+def _in_natural_order(files: list[Path]) -> list[Path]:
+    from rose2_logs.readers.map_files import natural_order
+
+    return sorted(files, key=natural_order)
+
+
+def _open_directory(log: Path, limits: ReadingParameters) -> MessageSource:
+    """Open a ROS 2 bag, also one whose recorder died before it was described, or a folder of saved maps."""
     from rose2_logs.readers.map_files import is_map_file
 
-    if (log / "metadata.yaml").exists():
-        return _open_rosbag2(log)
+    if (log / BAG_DESCRIPTION).exists():
+        return _open_files(log, _files_of_bag(log), limits, is_bag=True)
+    if files := _stored_in(log):
+        return _open_files(log, files, limits)
     inside = sorted(each for each in log.iterdir() if each.is_file())
+    # One with an image of its name is a map even if it cannot be read, which is told then.
+    images = {each.stem for each in inside if each.suffix.lower() in IMAGE_ENDINGS}
+    described = [each for each in inside if each.suffix.lower() in MAP_ENDINGS]
+    if maps := [each for each in described if each.stem in images or is_map_file(each)]:
+        return _open_files(log, _in_natural_order(maps), limits)
+    raise LogError(
+        f"{log}: holds neither a bag ({BAG_DESCRIPTION}) nor saved maps; give {_FORMATS}", file=log
+    )
+
+
+def _stored_in(log: Path) -> list[Path]:
+    """Files of the first kind of storage that a folder holds."""
+    inside = [each for each in log.iterdir() if each.is_file()]
     for suffix in STORAGE_ENDINGS:
-        if files := [each for each in inside if each.suffix == suffix]:
-            return _open_files(log, files, in_natural_order=True)
-    if maps := [each for each in inside if each.suffix.lower() in MAP_ENDINGS and is_map_file(each)]:
-        return _open_files(log, maps, in_natural_order=True)
-    raise LogError(f"{log}: holds neither a bag (metadata.yaml) nor saved maps; give {_FORMATS}")
+        endings = (suffix, suffix + COMPRESSED_ENDING)
+        if files := [each for each in inside if each.name.lower().endswith(endings)]:
+            return _in_natural_order(files)
+    return []
 
 
-def _open_rosbag2(log: Path) -> MessageSource:
-    described = _rosbag2_metadata(log)
-    size = sum(each.stat().st_size for each in log.iterdir() if each.is_file())
-    if described.get("storage_identifier") != "mcap":
-        from rose2_logs.readers.bag_log import BagSource
-
-        return BagSource(log, [log], "ROS 2 bag (sqlite3)", size)
-    # rosbags refuses MCAP files with other than ROS 2 channels beside the map.
-    from rose2_logs.readers.mcap_log import McapSource
-
-    files = [log / PurePosixPath(name).name for name in described.get("relative_file_paths") or []]
-    if missing := [file for file in files if not file.exists()]:
-        raise LogError(f"{missing[0]}: is missing, but {log / 'metadata.yaml'} names it")
-    mode = str(described.get("compression_mode") or "none").lower()
-    if mode != "none" and described.get("compression_format") != "zstd":
-        raise LogError(f"{log}: its compression {described.get('compression_format')!r} is unknown; use zstd")
-    if mode != "file":
-        return McapSource(
-            log, files, format_name="ROS 2 bag (mcap)", size_bytes=size, messages_are_zstd=mode == "message"
-        )
-    scratch = tempfile.TemporaryDirectory(prefix="rose2_logs_")
+def _files_of_bag(log: Path) -> list[Path]:
+    """Files of a ROS 2 bag by its description; those that are missing are said to be."""
+    path = log / BAG_DESCRIPTION
     try:
-        files = [_decompressed(file, Path(scratch.name)) for file in files]
-        return McapSource(
-            log, files, format_name="ROS 2 bag (mcap)", size_bytes=size, on_close=scratch.cleanup
-        )
-    except BaseException:
-        scratch.cleanup()
-        raise
+        named = [log / PurePosixPath(name).name for name in _described_files(path)]
+    except LogError as error:
+        if not (files := _stored_in(log)):
+            raise
+        notice(logger, "description", f"{error}; the files beside it are read", file=path)
+        return files
+    files = [file for file in named if file.is_file()]
+    for missing in [file for file in named if not file.is_file()]:
+        text = f"{missing}: is missing, but {path} names it"
+        if not files:
+            raise LogError(text, file=missing)
+        notice(logger, "file_missing", f"{text}; the other files are read", file=missing)
+    if not files:
+        raise LogError(f"{path}: names no file; run `ros2 bag reindex` on {log}", file=path)
+    return files
 
 
-def _rosbag2_metadata(log: Path) -> dict[str, Any]:
-    import yaml
-
-    path = log / "metadata.yaml"
+def _described_files(path: Path) -> list[str]:
     try:
-        described = yaml.safe_load(path.read_text(encoding="utf-8"))["rosbag2_bagfile_information"]
-    except OSError as error:
-        raise LogError(f"{path}: cannot be read: {error.strerror}") from error
-    except (yaml.YAMLError, UnicodeDecodeError, KeyError, TypeError) as error:
-        raise LogError(f"{path}: does not describe a ROS 2 bag; run `ros2 bag reindex` on {log}") from error
-    if not isinstance(described, dict):
-        raise LogError(f"{path}: does not describe a ROS 2 bag; run `ros2 bag reindex` on {log}")
-    return described
+        described: Any = load_yaml(path)["rosbag2_bagfile_information"]
+        return [str(name) for name in described["relative_file_paths"] or []]
+    except (KeyError, TypeError, LogError) as error:
+        raise LogError(
+            f"{path}: does not describe a ROS 2 bag; run `ros2 bag reindex` on {path.parent}", file=path
+        ) from error
 
 
 def _decompressed(file: Path, directory: Path) -> Path:
-    import zstandard
+    from zstandard import ZstdError
+
+    from rose2_logs.readers.decompression import TooLargeError, decompress_file
 
     target = directory / file.stem
     try:
-        with file.open("rb") as packed, target.open("wb") as plain:
-            shutil.copyfileobj(zstandard.ZstdDecompressor().stream_reader(packed), plain)
-    except (zstandard.ZstdError, OSError) as error:
-        raise LogError(f"{file}: cannot be decompressed: {error}") from error
+        decompress_file(file, target, max(shutil.disk_usage(directory).free - DISK_LEFT_BYTES, 0))
+    except (ZstdError, ValueError, OSError) as error:
+        text = f"{file}: cannot be decompressed: {error}"
+        if not target.exists() or not target.stat().st_size or isinstance(error, TooLargeError):
+            raise LogError(text, file=file) from error
+        notice(logger, "cut_off", f"{text}; what is whole before is read", file=file)
     return target

@@ -51,6 +51,8 @@ class LogInfo:
         Sorted by name.
     indexed : bool
         Whether the log has a usable index; without one it was scanned from the beginning.
+    whole : bool
+        Whether nothing was found to be missing when it was opened.
     """
 
     path: Path
@@ -60,6 +62,7 @@ class LogInfo:
     end_ns: int | None
     topics: tuple[TopicInfo, ...]
     indexed: bool
+    whole: bool = True
 
     @property
     def duration_s(self) -> float:
@@ -81,6 +84,10 @@ class LoggedMap:
         When it was recorded.
     topic : str
         Where it was sent.
+    number : int
+        Of the message on its topic, from 1, in the order of log time.
+    file : Path
+        Where it lies.
     decode : callable
         Gives the message, or None if its grid has no cells; raises InvalidMapError where the message
         contradicts itself and DamagedMessageError where its bytes are lost.
@@ -88,6 +95,8 @@ class LoggedMap:
 
     log_time_ns: int
     topic: str
+    number: int
+    file: Path
     decode: Callable[[], Grid | Patch | None] = field(repr=False)
 
 

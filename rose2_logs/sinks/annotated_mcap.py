@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -14,22 +15,27 @@ from mcap.exceptions import McapError
 
 from rose2_logs.errors import OutputError
 from rose2_logs.files import part_of
+from rose2_logs.notices import notice
+from rose2_logs.readers import open_source
+from rose2_logs.readers.mcap_index import DAMAGE
+from rose2_logs.readers.source import MessageSource
 from rose2_logs.sinks.extent import Extent
 from rose2_logs.sinks.mcap_bag_metadata import write_bag_metadata
 from rose2_logs.sinks.mcap_input import (
-    DAMAGE,
     LATCHED_QOS,
     CopiedChannel,
     CopiedChunk,
     CopiedLog,
     CopiedMessage,
-    open_copied_log,
+    copied_log,
 )
 from rose2_logs.sinks.mcap_writer import McapWriter
 from rose2_logs.sinks.ros_messages import ROOMS_TYPE, MessageMaker
 from rose2_logs.sinks.sink import RunInfo
 from rose2_logs.sinks.viewer_layouts import MapScene, bag_metadata_path, write_layouts
 from rose2_logs.tracking.frames import TrackedSnapshot
+
+logger = logging.getLogger(__name__)
 
 PREFIX = "/rose2/"
 GRID_TYPE = "nav_msgs/msg/OccupancyGrid"
@@ -58,6 +64,8 @@ class AnnotatedMcap:
         Where to; written beside and renamed when whole.
     info : RunInfo
         The run.
+    source : MessageSource, optional
+        The log if it is open already, which it then stays.
     is_bag : bool
         Whether to describe the file in a ``metadata.yaml``, so that its folder is a bag of ROS 2.
 
@@ -70,17 +78,23 @@ class AnnotatedMcap:
         If the input cannot be copied.
     """
 
-    def __init__(self, path: Path, info: RunInfo, *, is_bag: bool = False) -> None:
+    def __init__(
+        self, path: Path, info: RunInfo, source: MessageSource | None = None, *, is_bag: bool = False
+    ) -> None:
         self._path = path
         self._part = part_of(path)
         self._info = info
+        self._source = source
         self._is_bag = is_bag
         self._extent = Extent()
         self._frame_id = ""
         self._file: IO[bytes] | None = None
 
     def __enter__(self) -> Self:
-        self._log: CopiedLog = open_copied_log(self._info.log_path)
+        self._opened_source: MessageSource | None = None
+        if self._source is None:
+            self._opened_source = self._source = open_source(self._info.log_path)
+        self._log: CopiedLog = copied_log(self._source)
         try:
             with self._writing():
                 self._path.parent.mkdir(parents=True, exist_ok=True)
@@ -192,17 +206,41 @@ class AnnotatedMcap:
                 return
             self._waiting = None
             if isinstance(item, CopiedMessage):
-                self._writer.add_message(
-                    self._register(item.channel), item.log_time, item.data, item.publish_time, item.sequence
-                )
+                self._add_message(item)
             elif time_ns is None or item.end_time <= time_ns:
-                self._writer.copy_chunk(item.stream, item.index)
+                self._copy_chunk(item)
             else:
                 try:
                     self._opened.extend(item.messages())
                 except DAMAGE:
                     # Nothing of it can be told apart any more; it stays what it is.
-                    self._writer.copy_chunk(item.stream, item.index)
+                    self._copy_chunk(item)
+
+    def _copy_chunk(self, chunk: CopiedChunk) -> None:
+        """Copy a chunk as it is, or message by message where the index behind it is damaged."""
+        try:
+            self._writer.copy_chunk(chunk.stream, chunk.index)
+            return
+        except ValueError:
+            pass
+        try:
+            messages = chunk.messages()
+        except DAMAGE as error:
+            begin = chunk.index.chunk_start_offset
+            text = f"{self._info.log_path}: the chunk at byte {begin} is damaged ({error}); it is not copied"
+            notice(logger, "not_copied", text, file=self._info.log_path)
+            return
+        for message in messages:
+            self._add_message(message)
+
+    def _add_message(self, message: CopiedMessage) -> None:
+        self._writer.add_message(
+            self._register(message.channel),
+            message.log_time,
+            message.data,
+            message.publish_time,
+            message.sequence,
+        )
 
     def _register(self, channel: CopiedChannel) -> int:
         if channel.key not in self._channels:
@@ -242,7 +280,8 @@ class AnnotatedMcap:
         self._writer.add_message(channel, time_ns, data, time_ns, self._sequence)
 
     def _abandon(self) -> None:
-        self._log.close()
+        if self._opened_source is not None:
+            self._opened_source.close()
         if self._file is not None:
             self._file.close()
         self._part.unlink(missing_ok=True)

@@ -2,29 +2,28 @@
 
 from __future__ import annotations
 
-import struct
+import heapq
+import logging
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
-import zstandard
-from mcap.data_stream import ReadDataStream
-from mcap.exceptions import McapError
-from mcap.reader import NonSeekingReader, make_reader
-from mcap.records import Attachment, Chunk, ChunkIndex, Message, Metadata
-from mcap.stream_reader import breakup_chunk
-from mcap.summary import Summary
+from mcap.records import Attachment, ChunkIndex, Metadata
 
-from rose2_logs.errors import LogError
+from rose2_logs.notices import notice
+from rose2_logs.readers.file_log import FileLog
+from rose2_logs.readers.log_file import Channel, LogFile, StoredMessage
+from rose2_logs.readers.mcap_index import McapFile
+from rose2_logs.readers.mcap_records import Summary
+from rose2_logs.readers.source import MessageSource
 from rose2_logs.sinks.ros_messages import ros2_typestore
 
 if TYPE_CHECKING:
-    from rosbags.highlevel import AnyReader
-    from rosbags.interfaces import Connection
+    from rosbags.typesys.store import Typestore
+
+logger = logging.getLogger(__name__)
 
 LATCHED_QOS = (
     "- history: 1\n  depth: 1\n  reliability: 1\n  durability: 1\n"
@@ -34,12 +33,8 @@ LATCHED_QOS = (
     "  avoid_ros_namespace_conventions: false"
 )
 """Keep last, depth 1, reliable, transient local: how ROS 2 publishes maps; rosbag2's spelling."""
-RECORD_HEAD_BYTES = 9
-"""Of an MCAP record: opcode and length."""
 INDEX_RECORD_BYTES, INDEX_ENTRY_BYTES = 15, 16
 """Of an MCAP's message index: record head, channel, length of the entries; log time and offset."""
-DAMAGE = (McapError, zstandard.ZstdError, ValueError, RuntimeError, KeyError, EOFError, struct.error)
-"""What the mcap package and its decompressors raise on bytes that are not what they should be."""
 
 
 @dataclass(frozen=True)
@@ -124,26 +119,13 @@ class CopiedLog(ABC):
         """Yield the metadata records."""
         return iter(())
 
-    def close(self) -> None:
-        """Release the files."""
-        return
 
-
-def open_copied_log(path: Path) -> CopiedLog:
-    """Open the input for copying; saved maps have nothing to copy and are written by the sink itself.
-
-    Raises
-    ------
-    LogError
-        If the log cannot be opened.
-    """
-    if path.is_file() and path.suffix == ".mcap":
-        return _McapLog(path)
-    if path.suffix in (".bag", ".db3") or (path.is_dir() and (path / "metadata.yaml").exists()):
-        inside = sorted(path.glob("*.mcap")) if path.is_dir() else []
-        # rosbags cannot read an MCAP with channels of other encodings; a single file is copied as it is.
-        return _McapLog(inside[0]) if len(inside) == 1 else _BagLog(path)
-    return _NoLog()
+def copied_log(source: MessageSource) -> CopiedLog:
+    """Return an open log for copying; saved maps have nothing to copy and are written by the sink itself."""
+    if not isinstance(source, FileLog):
+        return _NoLog()
+    first = source.files[0]
+    return _McapLog(first) if len(source.files) == 1 and isinstance(first, McapFile) else _Files(source.files)
 
 
 class _NoLog(CopiedLog):
@@ -156,98 +138,61 @@ class _NoLog(CopiedLog):
         return iter(())
 
 
+def _copied(channel: Channel, key: int) -> CopiedChannel:
+    return CopiedChannel(
+        key,
+        channel.topic,
+        channel.message_encoding,
+        channel.schema_id,
+        channel.schema_name,
+        channel.schema_encoding,
+        channel.schema_data,
+        channel.metadata,
+    )
+
+
 class _McapLog(CopiedLog):
     """An MCAP file: chunk by chunk, or message by message where its index does not tell of every message."""
 
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        self._file = path.open("rb")
-        try:
-            reader = make_reader(self._file, validate_crcs=False)
-            header = reader.get_header()
-            self.profile, self.library = header.profile, header.library
-            self._summary = reader.get_summary()
-        except (McapError, ValueError):
-            # Cut off: what is whole at the beginning is copied.
-            self._summary = None
-            self._file.seek(0)
-            header = NonSeekingReader(self._file).get_header()
-            self.profile, self.library = header.profile, header.library
+    def __init__(self, file: McapFile) -> None:
+        self._file = file
+        header = file.header()
+        self.profile, self.library = header.profile, header.library
         self._channels: dict[int, CopiedChannel] = {}
 
     def channels(self) -> list[CopiedChannel]:
-        if self._summary is None:
-            return []
-        schemas = self._summary.schemas
-        return [self._channel(item, schemas.get(item.schema_id)) for item in self._summary.channels.values()]
+        return [self._channel(channel) for channel in self._file.channels.values()]
 
     def messages(self) -> Iterator[CopiedMessage | CopiedChunk]:
-        if self._summary is not None and _is_all_in_indexed_chunks(self._summary):
-            for index in sorted(self._summary.chunk_indexes, key=lambda index: index.chunk_start_offset):
-                yield CopiedChunk(
-                    index.message_start_time,
-                    index.message_end_time,
-                    self._file,
-                    index,
-                    partial(self._messages_in, index),
-                )
+        summary = self._file.summary
+        if summary is None or not _is_all_in_indexed_chunks(summary):
+            for message in self._file.messages():
+                yield self._message(message)
             return
-        self._file.seek(0)
-        reader = make_reader(self._file) if self._summary else NonSeekingReader(self._file)
-        try:
-            for schema, channel, message in reader.iter_messages(log_time_order=self._summary is not None):
-                yield CopiedMessage(
-                    self._channel(channel, schema),
-                    message.log_time,
-                    message.publish_time,
-                    message.sequence,
-                    message.data,
-                )
-        except DAMAGE as error:
-            if self._summary is not None:
-                raise LogError(f"{self._path}: cannot be copied: {error}") from error
+        for index in sorted(summary.chunks, key=lambda index: index.chunk_start_offset):
+            yield CopiedChunk(
+                index.message_start_time,
+                index.message_end_time,
+                self._file.stream,
+                index,
+                partial(self._messages_in, index),
+            )
 
     def _messages_in(self, index: ChunkIndex) -> list[CopiedMessage]:
-        self._file.seek(index.chunk_start_offset + RECORD_HEAD_BYTES)
-        records = breakup_chunk(Chunk.read(ReadDataStream(self._file)), validate_crc=True)
-        found = [record for record in records if isinstance(record, Message)]
-        return [
-            CopiedMessage(
-                self._channels[message.channel_id],
-                message.log_time,
-                message.publish_time,
-                message.sequence,
-                message.data,
-            )
-            for message in sorted(found, key=lambda message: message.log_time)
-        ]
+        return [self._message(message) for message in self._file.messages_in(index)]
 
     def attachments(self) -> Iterator[Attachment]:
-        if self._summary is not None:
-            self._file.seek(0)
-            yield from make_reader(self._file).iter_attachments()
+        return self._file.attachments()
 
     def metadata(self) -> Iterator[Metadata]:
-        if self._summary is not None:
-            self._file.seek(0)
-            yield from make_reader(self._file).iter_metadata()
+        return self._file.metadata()
 
-    def close(self) -> None:
-        self._file.close()
+    def _message(self, message: StoredMessage) -> CopiedMessage:
+        return CopiedMessage(self._channel(message.channel), *message[1:])
 
-    def _channel(self, channel: Any, schema: Any) -> CopiedChannel:
+    def _channel(self, channel: Channel) -> CopiedChannel:
         if channel.id not in self._channels:
-            name, encoding, data = (schema.name, schema.encoding, schema.data) if schema else ("", "", b"")
-            self._channels[channel.id] = CopiedChannel(
-                channel.id,
-                channel.topic,
-                channel.message_encoding,
-                channel.schema_id,
-                name,
-                encoding,
-                data,
-                channel.metadata,
-            )
+            self._channels[channel.id] = _copied(channel, channel.id)
         return self._channels[channel.id]
 
 
@@ -257,80 +202,121 @@ def _is_all_in_indexed_chunks(summary: Summary) -> bool:
     An index record is 15 bytes and 16 for each message, so that its length tells how many there are.
     """
     indexed = 0
-    for chunk in summary.chunk_indexes:
+    for chunk in summary.chunks:
         offsets = chunk.message_index_offsets
         if offsets and min(offsets.values()) != chunk.chunk_start_offset + chunk.chunk_length:
             return False
         indexed += (chunk.message_index_length - INDEX_RECORD_BYTES * len(offsets)) // INDEX_ENTRY_BYTES
     return (
-        summary.statistics is not None
-        and summary.statistics.message_count == indexed
-        and summary.statistics.chunk_count == len(summary.chunk_indexes)
+        summary.statistics.message_count == indexed
+        and summary.statistics.chunk_count == len(summary.chunks)
         and summary.statistics.channel_count == len(summary.channels)
     )
 
 
-class _BagLog(CopiedLog):
-    """A ROS 1 or ROS 2 bag, its messages as CDR."""
+class _Files(CopiedLog):
+    """Bags, databases, or several MCAP files; messages of ROS 1 as CDR."""
 
-    def __init__(self, path: Path) -> None:
-        from rosbags.highlevel import AnyReader, AnyReaderError
-        from rosbags.typesys import Stores, get_typestore
-
-        self._stack = ExitStack()
-        default = get_typestore(Stores.ROS2_HUMBLE)
-        try:
-            self._reader: AnyReader = self._stack.enter_context(AnyReader([path], default_typestore=default))
-        except (AnyReaderError, KeyError, UnicodeDecodeError, OSError) as error:
-            raise LogError(f"{path}: cannot be copied: {error}") from error
-        self._target = ros2_typestore(self._reader.typestore.fielddefs)
-        types = sorted({item.msgtype for item in self._reader.connections})
-        self._schema_ids = {name: number for number, name in enumerate(types, start=1)}
-        self._channels = {
-            self._connection_key(item): self._as_channel(number, item)
-            for number, item in enumerate(self._reader.connections, start=1)
-        }
+    def __init__(self, files: Sequence[LogFile]) -> None:
+        self._files = files
+        channels = [
+            (number, channel) for number, file in enumerate(files) for channel in file.channels.values()
+        ]
+        self._bag_types = _definitions([channel for _, channel in channels])
+        self._target = ros2_typestore(self._bag_types)
+        self._schema_ids: dict[tuple[str, bytes], int] = {}
+        self._channels: dict[tuple[int, int], CopiedChannel] = {}
+        self._converters: dict[int, Callable[[Any], bytes | memoryview]] = {}
+        for key, (number, channel) in enumerate(channels, start=1):
+            made = self._as_channel(key, channel)
+            self._channels[number, channel.id] = made
+            if channel.message_encoding == "ros1" and made.message_encoding == "cdr":
+                # Through the definitions with ROS 2's Header: the sequence number of ROS 1's is left out.
+                self._converters[key] = partial(self._target.ros1_to_cdr, typename=made.schema_name)
 
     def channels(self) -> list[CopiedChannel]:
         return list(self._channels.values())
 
     def messages(self) -> Iterator[CopiedMessage | CopiedChunk]:
-        sequence: dict[int, int] = {}
-        for connection, time_ns, data in self._reader.messages():
-            channel = self._channels[self._connection_key(connection)]
-            number = sequence[channel.key] = sequence.get(channel.key, -1) + 1
-            yield CopiedMessage(channel, time_ns, time_ns, number, self._converter(connection)(data))
+        streams = [self._messages_of(number) for number in range(len(self._files))]
+        yield from heapq.merge(*streams, key=lambda message: message.log_time)
 
-    def close(self) -> None:
-        self._stack.close()
+    def _messages_of(self, number: int) -> Iterator[CopiedMessage]:
+        file = self._files[number]
+        for message in file.messages():
+            channel = self._channels[number, message.channel.id]
+            data = message.data
+            try:
+                if message.channel.message_encoding == "cdr":
+                    data = file.decompressed(data)
+                if channel.key in self._converters:
+                    data = self._converters[channel.key](bytes(data))
+            except Exception as error:  # whatever a deserialiser raises on bytes that are not what they say
+                text = f"{file.path}: a message on {channel.topic} cannot be copied ({error}); it is left out"
+                notice(logger, "not_copied", text, file=file.path, topic=channel.topic)
+                continue
+            yield CopiedMessage(channel, message.log_time_ns, message.publish_time_ns, message.sequence, data)
 
-    @staticmethod
-    def _connection_key(connection: Connection) -> tuple[int, int]:
-        return connection.id, id(connection.owner)
-
-    def _as_channel(self, number: int, connection: Connection) -> CopiedChannel:
-        from rosbags.interfaces import ConnectionExtRosbag2
-        from rosbags.rosbag2.metadata import dump_qos_v8
-
-        qos = "[]"
-        if isinstance(connection.ext, ConnectionExtRosbag2):
-            qos = dump_qos_v8(connection.ext.offered_qos_profiles)
-        elif connection.ext.latching:
-            qos = LATCHED_QOS
-        text, _ = self._target.generate_msgdef(connection.msgtype, ros_version=2)
+    def _as_channel(self, key: int, channel: Channel) -> CopiedChannel:
+        name = _ros2_name(channel.schema_name)
+        metadata = dict(channel.metadata)
+        definition = channel.schema_data
+        encoding, language = channel.message_encoding, channel.schema_encoding
+        if encoding == "ros1":
+            metadata = {"offered_qos_profiles": LATCHED_QOS if metadata.get("latching") == "1" else "[]"}
+            converted = self._definition(name)
+            if converted is not None:
+                encoding, language, definition = "cdr", "ros2msg", converted
+        elif encoding == "cdr":
+            metadata["offered_qos_profiles"] = _qos_of_version_8(metadata.get("offered_qos_profiles", "[]"))
+            if not definition and (known := self._definition(name)) is not None:
+                language, definition = "ros2msg", known
+        schema_id = self._schema_ids.setdefault((name, definition), len(self._schema_ids) + 1)
         return CopiedChannel(
-            number,
-            connection.topic,
-            "cdr",
-            self._schema_ids[connection.msgtype],
-            connection.msgtype,
-            "ros2msg",
-            text.encode(),
-            {"offered_qos_profiles": qos},
+            key, channel.topic, encoding, schema_id, name, language or "ros2msg", definition, metadata
         )
 
-    def _converter(self, connection: Connection) -> Callable[[bytes], bytes | memoryview]:
-        if self._reader.is2:
-            return bytes
-        # Through the definitions with ROS 2's Header: the sequence number that ROS 1's has is left out.
-        return partial(self._target.ros1_to_cdr, typename=connection.msgtype)
+    def _definition(self, name: str) -> bytes | None:
+        """Definition of a type in ROS 2's terms, None if it is not known."""
+        try:
+            text, _ = self._target.generate_msgdef(name, ros_version=2)
+        except Exception:  # a type that no definition was found for, or that uses one
+            return None
+        return text.encode()
+
+
+def _ros2_name(name: str) -> str:
+    package, _, rest = name.partition("/")
+    return f"{package}/msg/{rest.removeprefix('msg/')}" if rest else name
+
+
+def _definitions(channels: Sequence[Channel]) -> dict[str, Any]:
+    """Message types by the definitions in a log, over those that every ROS has."""
+    from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
+
+    is_ros1 = any(channel.message_encoding == "ros1" for channel in channels)
+    store: Typestore = get_typestore(Stores.ROS1_NOETIC if is_ros1 else Stores.ROS2_HUMBLE)
+    types: dict[str, Any] = dict(store.fielddefs)
+    for channel in channels:
+        name = _ros2_name(channel.schema_name)
+        text = channel.schema_data.decode(errors="replace")
+        try:
+            if channel.schema_encoding in ("ros1msg", "ros2msg") and text:
+                types.update(get_types_from_msg(text, name))
+            elif channel.schema_encoding == "ros2idl":
+                types.update(get_types_from_idl(text))
+        except Exception as error:  # whatever a parser raises on a text that is none
+            why = " ".join(str(error).split())
+            text = f"the definition of {channel.schema_name} on {channel.topic} cannot be read ({why})"
+            notice(logger, "definition", f"{text}; the standard one is taken", topic=channel.topic)
+    return types
+
+
+def _qos_of_version_8(text: str) -> str:
+    """Quality of service as the readers of MCAP files know it; newer bags spell it otherwise."""
+    from rosbags.rosbag2.metadata import dump_qos_v8, parse_qos
+
+    try:
+        return str(dump_qos_v8(parse_qos(text)))
+    except Exception:  # whatever the parser raises; what nobody understands says nothing
+        return "[]"

@@ -123,21 +123,23 @@ class McapWriter:
         ------
         OSError
             If the file ends before the chunk does, or cannot be read or written.
+        ValueError
+            If the message index is damaged; nothing is written then.
         """
+        source.seek(index.chunk_start_offset + index.chunk_length)
+        counts = _indexed_messages(_read(source, index.message_index_length))
         self.flush()
         moved = self._offset - index.chunk_start_offset
         source.seek(index.chunk_start_offset)
-        for left in range(index.chunk_length, 0, -COPIED_AT_ONCE):
+        for left in range(index.chunk_length + index.message_index_length, 0, -COPIED_AT_ONCE):
             self._write(_read(source, min(left, COPIED_AT_ONCE)))
-        message_index = _read(source, index.message_index_length)
-        self._write(message_index)
         offsets = {channel: offset + moved for channel, offset in index.message_index_offsets.items()}
         self._chunks.append(
             dataclasses.replace(
                 index, chunk_start_offset=index.chunk_start_offset + moved, message_index_offsets=offsets
             )
         )
-        self._counts.update(_indexed_messages(message_index))
+        self._counts.update(counts)
 
     def add_attachment(
         self, create_time: int, log_time: int, name: str, media_type: str, data: bytes
@@ -275,12 +277,15 @@ def _read(source: IO[bytes], length: int) -> bytes:
 
 
 def _indexed_messages(message_index: bytes) -> Counter[int]:
-    """Messages by channel that a row of message index records counts."""
+    """Messages by channel that a row of message index records counts; ValueError if it is no such row."""
     counts: Counter[int] = Counter()
     place = 0
     while place < len(message_index):
+        if place + _INDEX.size > len(message_index):
+            raise ValueError("a message index is damaged")
         opcode, length, channel, entries = _INDEX.unpack_from(message_index, place)
-        if opcode == Opcode.MESSAGE_INDEX:
-            counts[channel] += entries // 16
+        if opcode != Opcode.MESSAGE_INDEX or length != _INDEX.size - _RECORD.size + entries:
+            raise ValueError("a message index is damaged")
+        counts[channel] += entries // 16
         place += _RECORD.size + length
     return counts

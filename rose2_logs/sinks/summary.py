@@ -116,6 +116,7 @@ def write_summary(
     selection: dict[str, Any],
     messages: dict[str, int],
     files: list[str],
+    warnings: dict[str, Any],
     seconds: float,
     workers: int,
 ) -> None:
@@ -135,6 +136,8 @@ def write_summary(
         Which maps were asked for, and what became of the log's messages.
     files : list of str
         Names of the other results, beside this one.
+    warnings : dict
+        What was odd about the log: how often, by kind, and the first ones.
     seconds : float
         Wall-clock time of the run. Times stand under ``seconds``; the rest is the same each time.
     workers : int
@@ -154,6 +157,7 @@ def write_summary(
         "selection": selection,
         "parameters": info.parameters.resolved(),
         "messages": messages,
+        "warnings": warnings,
         "results": {
             "snapshots": totals.snapshots,
             "invalid_maps": totals.invalid,

@@ -18,7 +18,8 @@ from rose2_logs.cli import main
 from rose2_logs.sinks.label_image import write_label_image
 
 VERBS = (
-    "info", "analyze", "batch", "view", "serve", "report", "figure", "export", "compare", "segment", "evaluate"
+    "info", "analyze", "batch", "view", "serve",
+    "report", "figure", "export", "compare", "segment", "evaluate",
 )  # fmt: skip
 
 

@@ -14,6 +14,7 @@ from rose2_logs.readers.discovery import logs_among
         (["bag/metadata.yaml", "bag/bag_0.mcap", "bag/bag_1.mcap"], ["bag"]),
         (["bag/metadata.yaml", "bag/bag_0.db3.zstd"], ["bag"]),
         (["bag/metadata.yaml", "bag/sub/more.mcap"], ["bag/sub/more.mcap"]),
+        (["died.bag.active"], ["died.bag.active"]),
         (["crashed/crashed_0.mcap", "crashed/crashed_1.mcap"], ["crashed"]),
         (["robot/robot_1.mcap", "robot/robot_2.mcap"], ["robot/robot_1.mcap", "robot/robot_2.mcap"]),
         (["maps/m1.yaml", "maps/m1.pgm", "maps/m2.yaml", "maps/m2.pgm"], ["maps"]),

@@ -1,6 +1,7 @@
 """Every format of a log gives the same maps; damaged, foreign and mapless logs end well."""
 
 import contextlib
+import errno
 import itertools
 import logging
 import shutil
@@ -31,6 +32,7 @@ from scipy.ndimage import binary_dilation
 from test_messages import SCHEMA, foxglove_message
 
 from rose2_logs.errors import InvalidMapError, LogError, NoMapTopicError
+from rose2_logs.notices import StrictError, gathered
 from rose2_logs.readers import Selection, inspect_log, open_log
 
 needs_shared = pytest.mark.skipif(
@@ -249,7 +251,7 @@ def test_without_index_a_damaged_chunk_is_left_out_and_said(tmp_path, caplog):
     path = FORMATS["mcap-no-summary"](tmp_path, messages)
     flip(path, path.stat().st_size // 2)
     assert len(read(path)) == 4
-    assert "1 damaged" in caplog.text
+    assert "is damaged (its checksum is wrong)" in caplog.text
 
 
 def test_when_all_maps_are_damaged_the_reading_fails_and_says_so(tmp_path):
@@ -280,16 +282,22 @@ def test_the_last_map_and_a_time_range_are_reached_past_damage_that_is_never_rea
 
 
 @pytest.mark.parametrize("name", ["bag", "mcap-zstd", "rosbag2-sqlite3-none"])
-def test_an_invalid_map_names_the_file_the_message_and_the_topic(name, tmp_path):
+def test_an_invalid_map_is_left_out_and_told_or_an_error_where_that_is_asked_for(name, tmp_path):
     log = [
         ("/map", START_NS, growing_maps(1)[0]),
         ("/map", START_NS + 1, Map(np.zeros((2, 2)), resolution=-1)),
     ]
     path = FORMATS[name](tmp_path, log)
-    with open_log(path) as reader, pytest.raises(InvalidMapError) as caught:
+    with gathered() as notices, open_log(path) as reader:
+        assert_are(list(reader.snapshots()), growing_maps(1))
+        assert (reader.counts.messages, reader.counts.invalid) == (2, 1)
+    (told,) = notices.kinds["invalid_map"].first
+    assert f"{path}: message 2 of 2 on /map: the map's resolution is -1" in told["message"]
+    assert "\n" not in told["message"]
+    assert (told["topic"], told["index"]) == ("/map", 2)
+    with gathered(strict=True), open_log(path) as reader, pytest.raises(StrictError) as caught:
         list(reader.snapshots())
-    assert f"{path}: message 2 of 2 on /map: the map's resolution is -1.0" in str(caught.value)
-    assert "\n" not in str(caught.value)
+    assert told["message"] in str(caught.value)
 
 
 def test_several_files_are_read_as_one_log(tmp_path):
@@ -323,7 +331,13 @@ def test_a_split_ros2_bag_is_read_through_all_its_files(storage, tmp_path):
     (bag / "metadata.yaml").write_text(metadata.replace(entry, f"{entry}{indent}- run_1.{suffix}\n", 1))
     assert_are(read(bag), growing_maps())
     (bag / f"run_1.{suffix}").unlink()
-    with pytest.raises(LogError, match=f"run_1.{suffix}"):
+    with gathered() as notices:
+        assert_are(read(bag), growing_maps()[:3])
+    assert f"run_1.{suffix}: is missing" in notices.kinds["file_missing"].first[0]["message"]
+    with gathered(strict=True), pytest.raises(StrictError, match=f"run_1.{suffix}"):
+        open_log(bag)
+    (bag / f"run.{suffix}").unlink()
+    with pytest.raises(LogError, match=f"run.{suffix}"):
         open_log(bag)
 
 
@@ -383,7 +397,7 @@ def test_a_map_topic_on_which_nothing_was_recorded_is_said_to_be_empty(tmp_path)
         ("text.mcap", b"just some text", "does not begin as .mcap"),
         ("text.bag", b"just some text", "does not begin as .bag"),
         ("text.db3", b"just some text", "does not begin as .db3"),
-        ("short.bag", b"#ROSBAG V2.0\n", "cannot be read as a bag"),
+        ("short.bag", b"#ROSBAG V2.0\n", "is damaged"),
         ("short.mcap", b"\x89MCAP0\r\n", None),
         ("short.db3", b"SQLite format 3\0", "cannot be read as a bag"),
         ("laser.log", b"FLASER 1 2 3", "not a kind of log"),
@@ -505,3 +519,34 @@ def test_a_third_party_log_without_maps_says_so_in_one_line(name):
         open_log(path)
     assert "\n" not in str(caught.value)
     assert inspect_log(path).topics
+
+
+def test_a_sector_that_cannot_be_read_is_damage_and_a_lost_network_is_not(tmp_path, monkeypatch):
+    """The first costs a map; the second may pass, so it is no verdict on the log."""
+    from rose2_logs.readers import checked_file
+
+    maps, messages = noisy_run()
+    path = FORMATS["mcap-uncompressed"](tmp_path, messages)
+    at = path.read_bytes().index(serialized(maps[2], 2)[-2000:-1000])
+    read_file = checked_file.io.FileIO.read
+    for number, code in enumerate((errno.EIO, errno.ESTALE)):
+
+        class FailingFile(checked_file.io.FileIO):
+            failure = code
+
+            def read(self, size=-1, /):
+                if self.tell() <= at < self.tell() + size:
+                    raise OSError(self.failure, "broken")
+                return read_file(self, size)
+
+        class Checked(checked_file.CheckedFile, FailingFile):
+            pass
+
+        monkeypatch.setattr("rose2_logs.readers.mcap_index.CheckedFile", Checked)
+        with open_log(path) as log:
+            if number == 0:
+                assert len(list(log.snapshots())) == 4
+                assert log.counts.damaged == 1
+            else:
+                with pytest.raises(OSError, match="broken"):
+                    list(log.snapshots())

@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from reader_logs import START_NS, Map, Update, growing_maps, write_bag, write_mcap, write_rosbag2
 
-from rose2_logs.errors import InvalidMapError, LogError, ParameterError
+from rose2_logs.errors import LogError, ParameterError
+from rose2_logs.notices import gathered
 from rose2_logs.occupancy import GridGeometry
 from rose2_logs.readers import Selection, open_log
 from rose2_logs.readers.map_stream import known_area_change_m2
@@ -28,7 +29,7 @@ def read(path, selection=None):
     with open_log(path, selection=selection or Selection()) as log:
         snapshots = list(log.snapshots())
         counts = log.counts
-    accounted = len(snapshots) + counts.repeats + counts.skipped + counts.damaged
+    accounted = len(snapshots) + counts.repeats + counts.skipped + counts.damaged + counts.invalid
     assert counts.messages == accounted, f"{counts} and {len(snapshots)} snapshots"
     return snapshots, counts
 
@@ -246,17 +247,19 @@ def test_a_patch_that_changes_nothing_is_a_repeat(tmp_path):
 
 
 @pytest.mark.parametrize("place", [(-1, 0), (0, -1), (7, 0), (0, 6)])
-def test_a_patch_that_reaches_out_of_the_map_is_an_error_that_names_the_message(place, tmp_path):
+def test_a_patch_that_reaches_out_of_the_map_is_left_out_and_told(place, tmp_path):
     log = [
         ("/map", START_NS, Map(np.zeros((6, 8)))),
         ("/map_updates", START_NS + 1, Update(*place, np.zeros((1, 2)))),
     ]
     path = write_bag(tmp_path / "run.bag", log)
-    with (
-        open_log(path) as reader,
-        pytest.raises(InvalidMapError, match=r"message 1 of 1 on /map_updates.*out of"),
-    ):
-        list(reader.snapshots())
+    with gathered() as notices:
+        snapshots, counts = read(path)
+    assert (len(snapshots), counts.invalid) == (1, 1)
+    assert not snapshots[0].cells.any()
+    text = notices.kinds["invalid_map"].first[0]["message"]
+    assert "message 1 of 1 on /map_updates: the patch of 2 x 1 cells" in text
+    assert "reaches out of the map of 8 x 6" in text
 
 
 def test_patches_of_another_topic_are_not_applied(tmp_path):
