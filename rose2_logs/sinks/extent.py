@@ -24,13 +24,13 @@ class Extent:
 
     def add(self, frame: TrackedSnapshot) -> None:
         """Take one map."""
-        bounds = shapely.total_bounds(np.array(frame.analysis.rooms.polygons, object)).reshape(2, 2)
-        has_rooms = bool(np.isfinite(bounds).all())
+        shapes = [shape for shape in frame.analysis.rooms.polygons if not shape.is_empty]
+        has_rooms = len(shapes) > 0
         if has_rooms and not self._has_rooms:
             self._has_rooms = True
             self.low_m, self.high_m = np.full(2, np.inf), np.full(2, -np.inf)
         if has_rooms:
-            self._grow(bounds)
+            self._grow(shapely.total_bounds(shapes).reshape(2, 2))
         elif not self._has_rooms:
             self._grow(frame.analysis.geometry.corners_m())
 
