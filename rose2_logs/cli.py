@@ -26,6 +26,7 @@ from rose2_logs.cli_options import (
     MinChange,
     NoAnnotatedLog,
     NoRecording,
+    Resume,
     Settings,
     Start,
     Strict,
@@ -35,7 +36,7 @@ from rose2_logs.cli_options import (
     resolve_parameters,
     state,
 )
-from rose2_logs.errors import ParameterError, Rose2LogsError
+from rose2_logs.errors import AlreadyWholeError, ParameterError, Rose2LogsError
 
 app = App(
     name="rose2-logs",
@@ -138,6 +139,7 @@ def analyze(
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace results of an earlier run.")
     ] = False,
+    resume: Resume = False,
     no_rrd: NoRecording = False,
     no_mcap: NoAnnotatedLog = False,
     strict: Strict = False,
@@ -181,10 +183,13 @@ def analyze(
                 live=live,
                 overwrite=overwrite,
                 strict=strict,
+                resume=resume,
             )
             with reporting.run_progress(name) as on_snapshot:
                 result = analyse_log(log, out / name, options, on_snapshot)
             reporting.print_run(result)
+        except AlreadyWholeError as whole:
+            reporting.print_text(str(whole))
         except Rose2LogsError as error:
             if len(logs) == 1:
                 raise

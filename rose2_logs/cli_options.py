@@ -52,6 +52,14 @@ MaxSnapshots = Annotated[
     int | None, typer.Option(metavar="N", help="Most maps, spread evenly.", show_default=False)
 ]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace what an earlier call has written.")]
+Resume = Annotated[
+    bool,
+    typer.Option(
+        "--resume",
+        help="Go on after the last map of a run of the same log and parameters that was stopped; "
+        "results that are whole stay as they are.",
+    ),
+]
 NoRecording = Annotated[bool, typer.Option("--no-rrd", help="Write no Rerun recording.")]
 Layers = Annotated[
     str,

@@ -56,3 +56,7 @@ class CasesError(Rose2LogsError):
 
 class OutputError(Rose2LogsError):
     """A result cannot be written."""
+
+
+class AlreadyWholeError(OutputError):
+    """Results that were to be completed are whole: nothing is left to do."""

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from rose2_logs.errors import OutputError
+
+logger = logging.getLogger(__name__)
 
 
 def part_of(path: Path) -> Path:
@@ -58,3 +61,39 @@ def refuse_existing(files: Iterable[Path], *, overwrite: bool) -> None:
     """
     if not overwrite and (existing := [file for file in files if file.exists()]):
         raise OutputError(f"{existing[0]}: exists already; choose another folder or pass --overwrite")
+
+
+@contextmanager
+def locked(path: Path, refusal: str) -> Iterator[None]:
+    """Hold a lock, whose file goes with it; that of a process that was killed does not hold.
+
+    Parameters
+    ----------
+    path : path
+        Of the lock's file; its folder is there.
+    refusal : str
+        Said if another process holds it.
+
+    Raises
+    ------
+    OutputError
+        If another process holds it, or it cannot be made.
+    """
+    from filelock import FileLock, Timeout
+
+    lock = FileLock(path)
+    try:
+        lock.acquire(timeout=0)
+    except Timeout as error:
+        raise OutputError(refusal) from error
+    except NotImplementedError:
+        logger.warning(
+            "%s: its file system has no locks; let nothing else write there meanwhile", path.parent
+        )
+    except OSError as error:
+        raise OutputError(f"{path.parent}: cannot be written: {error}") from error
+    try:
+        yield
+    finally:
+        path.unlink(missing_ok=True)
+        lock.release()

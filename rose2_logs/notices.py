@@ -20,6 +20,8 @@ FIRST_KEPT = 5
 FIELDS = ("kind", "file", "topic", "index")
 """What a record of the log tells beside its text: see `notice`."""
 
+UNCOUNTED = {"is_counted": False}
+"""Passed as `extra` with what is said of how a run goes on, which does not belong to its results."""
 
 _is_muted: ContextVar[bool] = ContextVar("_is_muted", default=False)
 
@@ -142,7 +144,7 @@ def gathered(strict: bool = False) -> Iterator[Notices]:
 
     class Gather(logging.Handler):
         def emit(self, record: logging.LogRecord) -> None:
-            if record.thread != thread:
+            if record.thread != thread or not getattr(record, "is_counted", True):
                 return
             notices.add(record)
             # Others are about this machine, not about the log.

@@ -202,6 +202,29 @@ def classify(cells: NDArray[np.int8], parameters: OccupancyParameters) -> tuple[
     return free, occupied
 
 
+def is_same_to_analysis(
+    before: OccupancySnapshot, now: OccupancySnapshot, parameters: OccupancyParameters
+) -> bool:
+    """Whether two maps have the same free, occupied and unknown cells at the same place: all that counts.
+
+    Maps that hold probabilities change at every scan, mostly without passing a threshold.
+    """
+    if before.geometry != now.geometry:
+        return False
+    changed = before.cells != now.cells
+    kind_before, kind_now = (
+        np.stack([*classify(cells[changed], parameters), cells[changed] == UNKNOWN])
+        for cells in (before.cells, now.cells)
+    )
+    return np.array_equal(kind_before, kind_now)
+
+
+def free_area_m2(snapshot: OccupancySnapshot, parameters: OccupancyParameters) -> float:
+    """Known free area of a map in square metres."""
+    free, _ = classify(snapshot.cells, parameters)
+    return float(free.sum()) * snapshot.geometry.cell_area_m2
+
+
 def known_window(known: BoolArray) -> tuple[slice, slice]:
     """Rows and columns of the smallest part of a mask that holds all of it; the first cell if it is empty."""
     rows, columns = np.flatnonzero(known.any(1)), np.flatnonzero(known.any(0))

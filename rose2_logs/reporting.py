@@ -42,6 +42,11 @@ def print_line(markup: str, to_error: bool = False) -> None:
         _out.print(markup, soft_wrap=True)
 
 
+def print_text(text: str) -> None:
+    """Print a line as it is."""
+    _out.print(escape(text), soft_wrap=True)
+
+
 def print_table(table: Table) -> None:
     """Print a table."""
     _out.print(table)

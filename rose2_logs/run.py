@@ -11,23 +11,24 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-
-import numpy as np
+from typing import Any
 
 from rose2_logs.errors import InvalidMapError
 from rose2_logs.explored import coarser_for_its_size
 from rose2_logs.files import refuse_existing
+from rose2_logs.journal import Found, JournaledWorkers
 from rose2_logs.notices import Notices, gathered, muted, notice
-from rose2_logs.occupancy import UNKNOWN, OccupancySnapshot, classify
-from rose2_logs.parameters import OccupancyParameters, Parameters
-from rose2_logs.pipeline import SnapshotAnalysis, analyse
+from rose2_logs.occupancy import OccupancySnapshot, free_area_m2, is_same_to_analysis
+from rose2_logs.output_folder import OutputFolder
+from rose2_logs.parameters import Parameters
+from rose2_logs.pipeline import analyse
 from rose2_logs.provenance import fingerprint, software_versions
 from rose2_logs.readers import Selection, inspect_log, open_log
 from rose2_logs.readers.discovery import stem_of
 from rose2_logs.readers.log import LogReader
 from rose2_logs.readers.poses import RobotPath
-from rose2_logs.room_evidence import RoomEvidence, room_evidence
-from rose2_logs.sinks.sink import RECORDING_LAYERS, RunInfo, Sink
+from rose2_logs.room_evidence import room_evidence
+from rose2_logs.sinks.sink import RECORDING_LAYERS, CopyingSink, RunInfo, Sink
 from rose2_logs.sinks.summary import RunTotals, write_summary
 from rose2_logs.sinks.tables import Tables
 from rose2_logs.sinks.viewer_layouts import bag_metadata_path, foxglove_path, rviz_path
@@ -41,6 +42,11 @@ logger = logging.getLogger(__name__)
 
 TABLES = ("snapshots", "rooms", "tracks", "events", "doorways")
 SUMMARY = "summary.json"
+NOT_IN_JOURNAL = (
+    *("topic", "selection", "parameters", "workers", "recording", "layers", "annotated_log", "bag"),
+    *("live", "origin", "overwrite", "resume", "journal", "strict"),
+)
+"""Options that the analysis does not depend on, or that a journal names otherwise."""
 
 
 @dataclass(frozen=True)
@@ -70,6 +76,10 @@ class RunOptions:
         Also send the recording to an open Rerun viewer.
     overwrite : bool
         Whether results of an earlier run may be replaced.
+    resume : bool
+        Whether to go on where a run of the same log and parameters was stopped; without one, begin anew.
+    journal : bool
+        Whether to keep what is found on the way beside the folder, so that a run that is stopped can go on.
     origin : str, optional
         What the summary names as the log; by default its path. For a log that was copied to be read.
     strict : bool
@@ -87,6 +97,8 @@ class RunOptions:
     layers: tuple[str, ...] = RECORDING_LAYERS
     live: bool = False
     overwrite: bool = False
+    resume: bool = False
+    journal: bool = True
     origin: str | None = None
     strict: bool = False
 
@@ -108,7 +120,7 @@ class RunResult:
     warnings: Notices = field(default_factory=Notices)
 
 
-SnapshotWorkers = Workers[OccupancySnapshot, tuple[SnapshotAnalysis, RoomEvidence] | InvalidMapError]
+SnapshotWorkers = Workers[OccupancySnapshot, Found]
 OnSnapshot = Callable[[TrackedSnapshot, float], None]
 """Told of each finished snapshot and of the share, in [0, 1], of the log's time that is done."""
 
@@ -146,7 +158,7 @@ def analyse_log(
     path : path
         The log.
     folder : path
-        Where to; it is made.
+        Where to; it is made. All results appear in it at the end, the summary last.
     options : RunOptions
         What to take, do and write.
     on_snapshot : callable, optional
@@ -160,6 +172,8 @@ def analyse_log(
         If there are results already and they may not be replaced, or one cannot be written.
     StrictError
         If something is odd, where that is an error.
+    AlreadyWholeError
+        If a run is to go on that is over.
     """
     with gathered(options.strict) as warnings:
         return _analyse_log(path, folder, options, on_snapshot, warnings)
@@ -169,14 +183,14 @@ def _analyse_log(
     path: Path, folder: Path, options: RunOptions, on_snapshot: OnSnapshot | None, warnings: Notices
 ) -> RunResult:
     start = time.perf_counter()
-    planned = _planned_files(folder, log_stem(path), options)
-    refuse_existing(planned.values(), overwrite=options.overwrite)
-    totals = RunTotals()
+    output = OutputFolder(folder, [file.name for file in _planned_files(folder, path, options).values()])
+    output.refuse_log(path)
+    refuse_existing(output.files, overwrite=options.overwrite or options.resume)
     with (
         open_log(
             path, topic=options.topic, selection=options.selection, limits=options.parameters.reading
         ) as reader,
-        start_workers(options) as workers,
+        start_workers(options) as processes,
     ):
         logger.info(
             "%s: %s, %d messages on %s",
@@ -185,32 +199,53 @@ def _analyse_log(
             len(reader.source.log_times(reader.topic)),
             reader.topic,
         )
-        last = reader.last()
         info = _run_info(path, reader, options)
-        first_ns: int | None = None
-        way = reader.robot_path(last.geometry.frame_id) if "path" in options.shown_layers else None
-        with ExitStack() as stack:
-            tables = Tables(folder)
-            others = _make_sinks(planned, info, options, tables, reader)
-            sinks = [stack.enter_context(sink) for sink in (tables, *others)]
-            for frame in tracked_snapshots(reader, last, workers, options.parameters, totals, way):
-                for sink in sinks:
-                    sink.write(frame)
-                totals.add(frame)
-                logger.info(
-                    "snapshot %d: coverage %.1f %%, %d rooms",
-                    frame.snapshot.index,
-                    100 * frame.coverage,
-                    len(frame.track_ids),
-                )
-                if on_snapshot is not None:
-                    now_ns = frame.snapshot.log_time_ns
-                    first_ns = now_ns if first_ns is None else first_ns
-                    on_snapshot(frame, (now_ns - first_ns) / max(last.log_time_ns - first_ns, 1))
-            if totals.snapshots == 0:
-                raise InvalidMapError(f"{path}: none of its {totals.invalid} maps can be analysed")
-            tables.look_back()
-        messages = dataclasses.asdict(reader.counts)
+        made = output.made(_facts(info, options), overwrite=options.overwrite, resume=options.resume)
+        with made as (work, journal):
+            workers = JournaledWorkers(processes, journal) if options.journal else processes
+            result = _analyse(reader, workers, work, info, options, on_snapshot, warnings, start)
+    return dataclasses.replace(result, folder=folder, files=output.files)
+
+
+def _analyse(
+    reader: LogReader,
+    workers: SnapshotWorkers | JournaledWorkers,
+    folder: Path,
+    info: RunInfo,
+    options: RunOptions,
+    on_snapshot: OnSnapshot | None,
+    warnings: Notices,
+    start: float,
+) -> RunResult:
+    """Write all results of an open log to a folder that is there; the run began at `start`."""
+    path = info.log_path
+    planned = _planned_files(folder, path, options)
+    totals = RunTotals()
+    last = reader.last()
+    first_ns: int | None = None
+    way = reader.robot_path(last.geometry.frame_id) if "path" in options.shown_layers else None
+    with ExitStack() as stack:
+        tables = Tables(folder)
+        others = _make_sinks(planned, info, options, tables, reader)
+        sinks = [stack.enter_context(sink) for sink in (tables, *others)]
+        for frame in tracked_snapshots(reader, last, workers, options.parameters, totals, way):
+            for sink in sinks:
+                sink.write(frame)
+            totals.add(frame)
+            logger.info(
+                "snapshot %d: coverage %.1f %%, %d rooms",
+                frame.snapshot.index,
+                100 * frame.coverage,
+                len(frame.track_ids),
+            )
+            if on_snapshot is not None:
+                now_ns = frame.snapshot.log_time_ns
+                first_ns = now_ns if first_ns is None else first_ns
+                on_snapshot(frame, (now_ns - first_ns) / max(last.log_time_ns - first_ns, 1))
+        if totals.snapshots == 0:
+            raise InvalidMapError(f"{path}: none of its {totals.invalid} maps can be analysed")
+        tables.look_back()
+    messages = dataclasses.asdict(reader.counts)
     if options.origin is not None:
         warnings.rename(str(path), options.origin)
     seconds = time.perf_counter() - start
@@ -225,6 +260,7 @@ def _analyse_log(
         messages=messages,
         files=[file.name for file in files.values()],
         warnings=warnings.as_json(),
+        copied=next((sink.copied for sink in sinks if isinstance(sink, CopyingSink)), None),
         seconds=seconds,
         workers=options.workers,
     )
@@ -247,7 +283,7 @@ def start_workers(options: RunOptions) -> SnapshotWorkers:
 def tracked_snapshots(
     reader: LogReader,
     last: OccupancySnapshot,
-    workers: SnapshotWorkers,
+    workers: SnapshotWorkers | JournaledWorkers,
     parameters: Parameters,
     totals: RunTotals,
     path: RobotPath | None = None,
@@ -295,32 +331,9 @@ def tracked_snapshots(
         yield TrackedSnapshot(snapshot, analysis, coverage, track_ids, events, evidence, change, way)
 
 
-def is_same_to_analysis(
-    before: OccupancySnapshot, now: OccupancySnapshot, parameters: OccupancyParameters
-) -> bool:
-    """Whether two maps have the same free, occupied and unknown cells at the same place: all that counts.
-
-    Maps that hold probabilities change at every scan, mostly without passing a threshold.
-    """
-    if before.geometry != now.geometry:
-        return False
-    changed = before.cells != now.cells
-    kind_before, kind_now = (
-        np.stack([*classify(cells[changed], parameters), cells[changed] == UNKNOWN])
-        for cells in (before.cells, now.cells)
-    )
-    return np.array_equal(kind_before, kind_now)
-
-
-def free_area_m2(snapshot: OccupancySnapshot, parameters: OccupancyParameters) -> float:
-    """Known free area of a map in square metres."""
-    free, _ = classify(snapshot.cells, parameters)
-    return float(free.sum()) * snapshot.geometry.cell_area_m2
-
-
 def _analyse_or_refuse(
     snapshot: OccupancySnapshot, parameters: Parameters, method: str, voronoi: bool
-) -> tuple[SnapshotAnalysis, RoomEvidence] | InvalidMapError:
+) -> Found:
     try:
         analysis = analyse(snapshot, parameters, method, voronoi=voronoi)
         return analysis, room_evidence(snapshot, analysis.rooms, parameters.occupancy)
@@ -342,8 +355,22 @@ def _run_info(path: Path, reader: LogReader, options: RunOptions) -> RunInfo:
     )
 
 
-def _planned_files(folder: Path, stem: str, options: RunOptions) -> dict[str, Path]:
-    files = {}
+def _facts(info: RunInfo, options: RunOptions) -> dict[str, Any]:
+    """Tell what the analysis of the maps depends on; what also stands in the summary, as it stands there."""
+    others = {each.name for each in dataclasses.fields(options)}.difference(NOT_IN_JOURNAL)
+    return {
+        "input": info.provenance,
+        "topic": info.topic,
+        "selection": dataclasses.asdict(options.selection),
+        "parameters": info.parameters.resolved(),
+        "versions": info.versions,
+        "voronoi": "voronoi" in options.shown_layers,
+        **{name: getattr(options, name) for name in sorted(others)},
+    }
+
+
+def _planned_files(folder: Path, log: Path, options: RunOptions) -> dict[str, Path]:
+    files, stem = {}, log_stem(log)
     if options.recording:
         files["recording"] = folder / f"{stem}.rrd"
     if options.annotated_log:

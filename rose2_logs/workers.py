@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import shutil
 import signal
 import sys
+import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
@@ -80,7 +82,10 @@ class Workers(Generic[Item, Result]):
         self._stack.close()
 
     def map(
-        self, items: Iterable[Item], is_same: Callable[[Item, Item], bool] | None = None
+        self,
+        items: Iterable[Item],
+        is_same: Callable[[Item, Item], bool] | None = None,
+        known: Callable[[Item], Result | None] | None = None,
     ) -> Iterator[tuple[Item, Result]]:
         """Yield each item with its result, in the order of the items.
 
@@ -90,6 +95,8 @@ class Workers(Generic[Item, Result]):
             Taken as they are needed, never more than `LOOK_AHEAD_PER_WORKER` for each worker ahead.
         is_same : callable, optional
             Whether an item and the next one have the same result: then the function is not called again.
+        known : callable, optional
+            Gives results that are known already; None where the function is to be called.
 
         Raises
         ------
@@ -97,7 +104,7 @@ class Workers(Generic[Item, Result]):
             If a worker process is killed.
         """
         if self._pool is None:
-            yield from self._map_here(items, is_same)
+            yield from self._map_here(items, is_same, known)
             return
         pending: deque[tuple[Item, _Task]] = deque()
         before: tuple[Item, _Task] | None = None
@@ -105,6 +112,8 @@ class Workers(Generic[Item, Result]):
             for item in items:
                 if before is not None and is_same is not None and is_same(before[0], item):
                     before = (item, before[1])
+                elif known is not None and (result := known(item)) is not None:
+                    before = (item, _Task(result=result))
                 else:
                     parcel = pack(item, self._folders)
                     before = (item, _Task(self._pool.submit(_work, parcel)))
@@ -120,7 +129,10 @@ class Workers(Generic[Item, Result]):
             ) from error
 
     def _map_here(
-        self, items: Iterable[Item], is_same: Callable[[Item, Item], bool] | None
+        self,
+        items: Iterable[Item],
+        is_same: Callable[[Item, Item], bool] | None,
+        known: Callable[[Item], Result | None] | None,
     ) -> Iterator[tuple[Item, Result]]:
         before: tuple[Item, Result] | None = None
         for item in items:
@@ -128,7 +140,10 @@ class Workers(Generic[Item, Result]):
                 before = (item, before[1])
             else:
                 before = None  # so that only one result is held
-                before = (item, _call_on_one_thread(self._function, item))
+                result = None if known is None else known(item)
+                if result is None:
+                    result = _call_on_one_thread(self._function, item)
+                before, result = (item, result), None
             yield before
 
 
@@ -143,9 +158,9 @@ def ordered_map(
 class _Task:
     """A result that comes once and may be asked for several times."""
 
-    def __init__(self, future: Future[Parcel]) -> None:
-        self._future: Future[Parcel] | None = future
-        self._result: Any = None
+    def __init__(self, future: Future[Parcel] | None = None, result: Any = None) -> None:
+        self._future = future
+        self._result = result
 
     def result(self) -> Any:
         if self._future is not None:
@@ -170,6 +185,17 @@ def _begin(function: Callable[[Any], Any], folders: tuple[str, ...]) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     keep_freed_memory()
     _function, _folders = function, folders
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    """End when the process that this one works for is killed; remove what waits in shared memory."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        for folder in _folders:
+            shutil.rmtree(folder, ignore_errors=True)
+        os._exit(1)
 
 
 def keep_freed_memory() -> None:

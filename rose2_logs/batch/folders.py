@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import logging
 import shutil
 import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from rose2_logs import files
 from rose2_logs.batch.task import RUNNING
-from rose2_logs.errors import OutputError
-
-logger = logging.getLogger(__name__)
+from rose2_logs.files import writing
 
 LOGS_FOLDER = "logs"
 WORK_FOLDER = ".batch"
@@ -45,22 +43,10 @@ def put_in_place(results: Path, out: Path, name: str) -> None:
 @contextmanager
 def locked(out: Path) -> Iterator[None]:
     """Keep other batches out of the folder; the lock of one that was killed does not hold."""
-    from filelock import FileLock, Timeout
-
-    lock = FileLock(out / WORK_FOLDER / LOCK)
-    try:
+    with writing(out):
         (out / WORK_FOLDER).mkdir(parents=True, exist_ok=True)
-        lock.acquire(timeout=0)
-    except Timeout as error:
-        raise OutputError(f"{out}: another batch is writing to this folder") from error
-    except NotImplementedError:
-        logger.warning("%s: its file system has no locks; let no other batch write to it meanwhile", out)
-    except OSError as error:
-        raise OutputError(f"{out}: cannot be written: {error}") from error
-    try:
+    with files.locked(out / WORK_FOLDER / LOCK, f"{out}: another batch is writing to this folder"):
         yield
-    finally:
-        lock.release()
 
 
 @contextmanager

@@ -239,6 +239,7 @@ def _analyse_local(task: LogTask, path: Path, signature: Signature, report: Repo
             method=asked.method,
             recording=asked.recording,
             annotated_log=asked.annotated_log,
+            journal=False,  # a log that was stopped is begun anew, in another folder
             origin=task.log.address,
         )
         reported = 0.0

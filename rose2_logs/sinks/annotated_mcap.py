@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
-from typing import IO, Self
+from typing import IO, Any, Self
 
 from mcap.exceptions import McapError
 
@@ -21,6 +21,7 @@ from rose2_logs.readers.mcap_index import DAMAGE
 from rose2_logs.readers.source import MessageSource
 from rose2_logs.sinks.extent import Extent
 from rose2_logs.sinks.mcap_bag_metadata import write_bag_metadata
+from rose2_logs.sinks.mcap_check import Tallies, checked_copy
 from rose2_logs.sinks.mcap_input import (
     LATCHED_QOS,
     CopiedChannel,
@@ -69,11 +70,18 @@ class AnnotatedMcap:
     is_bag : bool
         Whether to describe the file in a ``metadata.yaml``, so that its folder is a bag of ROS 2.
 
+    In the end the file is read back, and what it holds is held against what was read and added.
+
+    Attributes
+    ----------
+    copied : dict
+        For each channel the number and the hash of its messages in the input and in the output, once whole.
+
     Raises
     ------
     OutputError
-        If the file cannot be written, or the input holds ``/rose2/`` topics already, or messages that no bag
-        of ROS 2 can hold.
+        If the file cannot be written or is not what was to be written, or the input holds ``/rose2/`` topics
+        already, or messages that no bag of ROS 2 can hold.
     LogError
         If the input cannot be copied.
     """
@@ -89,6 +97,7 @@ class AnnotatedMcap:
         self._extent = Extent()
         self._frame_id = ""
         self._file: IO[bytes] | None = None
+        self.copied: dict[str, Any] = {}
 
     def __enter__(self) -> Self:
         self._opened_source: MessageSource | None = None
@@ -112,7 +121,8 @@ class AnnotatedMcap:
         self._writer = McapWriter(file, log.profile, library)
         self._channels: dict[int, int] = {}
         self._schemas: dict[int | tuple[str, str, bytes], int] = {}
-        self._items = log.messages()
+        self._input, self._own = Tallies(), Tallies()
+        self._items = self._input.watched(log.messages())
         self._waiting: CopiedMessage | CopiedChunk | None = None
         # The messages of a chunk that was taken apart; they come before all else.
         self._opened: deque[CopiedMessage] = deque()
@@ -183,6 +193,7 @@ class AnnotatedMcap:
                 self._writer.finish()
                 if self._file is not None:
                     self._file.close()
+                self.copied = self._checked()
                 self._part.replace(self._path)
                 self._describe()
         finally:
@@ -195,6 +206,11 @@ class AnnotatedMcap:
         write_layouts(self._path, scene)
         if self._is_bag:
             write_bag_metadata(self._path, bag_metadata_path(self._path))
+
+    def _checked(self) -> dict[str, Any]:
+        # Channels that hold no message went over too.
+        read = {number: self._input[key] for key, number in self._channels.items()}
+        return checked_copy(self._part, str(self._path), read, self._own, self._input.closed_chunks)
 
     def _copy_until(self, time_ns: int | None) -> None:
         """Copy what was logged up to a time; a chunk that goes on after it is taken apart."""
@@ -229,6 +245,7 @@ class AnnotatedMcap:
             begin = chunk.index.chunk_start_offset
             text = f"{self._info.log_path}: the chunk at byte {begin} is damaged ({error}); it is not copied"
             notice(logger, "not_copied", text, file=self._info.log_path)
+            self._input.leave_out(chunk)
             return
         for message in messages:
             self._add_message(message)
@@ -277,6 +294,7 @@ class AnnotatedMcap:
         return self._writer.register_channel(topic, "cdr", schema, {"offered_qos_profiles": self._qos})
 
     def _add(self, channel: int, time_ns: int, data: bytearray) -> None:
+        self._own[channel].add(time_ns, time_ns, self._sequence, data)
         self._writer.add_message(channel, time_ns, data, time_ns, self._sequence)
 
     def _abandon(self) -> None:

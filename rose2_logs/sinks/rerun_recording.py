@@ -18,6 +18,7 @@ from rose2_logs.sinks.extent import Extent
 from rose2_logs.sinks.palette import track_colour
 from rose2_logs.sinks.rerun_blueprint import COVERAGE_UNIT, make_blueprint
 from rose2_logs.sinks.rerun_columns import Entry, Scalar
+from rose2_logs.sinks.rerun_faults import abandon, require_space
 from rose2_logs.sinks.rerun_layers import CHUNK_BYTES, Layers
 from rose2_logs.sinks.rerun_lives import FINAL_IOU, FINAL_SHARE, Lives
 from rose2_logs.sinks.rerun_summary import summary_text
@@ -84,6 +85,7 @@ class RerunRecording:
         self._wanted = layers
         self._tables = tables
         self._viewer_answers = live
+        self._is_lost = False
         self._shown: set[int] = set()
         self._known: set[int] = set()
         self._extent = Extent()
@@ -151,8 +153,9 @@ class RerunRecording:
                 )
                 if self._frames:
                     self._send_blueprint()
-            self._flush()
-            self._recording.disconnect()
+                self._flush()
+            if not self._is_lost:
+                self._recording.disconnect()
             if kind is None and self._path is not None and self._part is not None:
                 with writing(self._path):
                     self._part.replace(self._path)
@@ -168,10 +171,14 @@ class RerunRecording:
         """Write what was logged; a viewer that was closed along the way is not waited for again."""
         if self._live and not self._viewer_answers:
             return
+        if self._part is not None and self._path is not None:
+            require_space(self._part, self._path)
         try:
             self._recording.flush(timeout_sec=FLUSH_TIMEOUT_S)
         except RuntimeError as error:
             if not self._live:
+                self._is_lost = True
+                abandon(self._recording)
                 raise OutputError(f"{self._path}: cannot be written: {error}") from error
             self._viewer_answers = False
             logger.warning("the Rerun viewer does not answer any more; the run goes on without it")

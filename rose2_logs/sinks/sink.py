@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Protocol, Self
+from typing import Any, Protocol, Self, runtime_checkable
 
 from rose2_logs.parameters import Parameters
 from rose2_logs.tracking.frames import TrackedSnapshot
@@ -71,3 +71,16 @@ class Sink(Protocol):
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None: ...
+
+
+@runtime_checkable
+class CopyingSink(Protocol):
+    """A sink that copies the log too.
+
+    Attributes
+    ----------
+    copied : dict
+        What went in and what came out, for the summary, once the output is whole; JSON values.
+    """
+
+    copied: dict[str, Any]

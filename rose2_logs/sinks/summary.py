@@ -117,6 +117,7 @@ def write_summary(
     messages: dict[str, int],
     files: list[str],
     warnings: dict[str, Any],
+    copied: dict[str, Any] | None,
     seconds: float,
     workers: int,
 ) -> None:
@@ -138,6 +139,8 @@ def write_summary(
         Names of the other results, beside this one.
     warnings : dict
         What was odd about the log: how often, by kind, and the first ones.
+    copied : dict, optional
+        Number and hash of the messages of each channel in the log and in the annotated one.
     seconds : float
         Wall-clock time of the run. Times stand under ``seconds``; the rest is the same each time.
     workers : int
@@ -172,6 +175,7 @@ def write_summary(
         },
         "layout": _layout(totals, lives, hindsight),
         "files": files,
+        **({} if copied is None else {"annotated_log": copied}),
         "seconds": {
             "run": seconds,
             "workers": workers,

@@ -74,6 +74,11 @@ def peak_memory(function: Callable[[], object]) -> int | None:
     return _status_bytes("self", "VmHWM") - before
 
 
+def memory_now() -> int:
+    """Bytes of memory that this process holds."""
+    return _status_bytes("self", "VmRSS")
+
+
 def peak_allocated(function: Callable[[], object]) -> int:
     """Bytes that Python and numpy hold at the peak of a call, its result included."""
     tracemalloc.start()

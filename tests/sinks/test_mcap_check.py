@@ -1,0 +1,143 @@
+"""The annotated MCAP held against its input: what is lost, changed or too much is found."""
+
+from __future__ import annotations
+
+import io
+import json
+from pathlib import Path
+
+import pytest
+from mcap.reader import make_reader
+from mcap.writer import CompressionType, IndexType, Writer
+from saved_maps import save_run
+
+from rose2_logs.errors import OutputError
+from rose2_logs.run import RunOptions, analyse_log
+from rose2_logs.sinks import annotated_mcap
+from rose2_logs.sinks.mcap_check import Tallies, Tally, checked_copy
+
+OFFICE = Path(__file__).parents[2] / "sample_logs" / "office.mcap"
+TOPICS = ("/a", "/b", "/silent")
+MESSAGES = [(k % 2, 10 * k, bytes([k]) * (k * 37)) for k in range(20)]
+
+
+def mcap(messages=MESSAGES, compression=CompressionType.ZSTD, **options) -> bytes:
+    """A file of messages (number of the topic, time, data)."""
+    stream = io.BytesIO()
+    writer = Writer(stream, chunk_size=2000, compression=compression, **options)
+    writer.start("x", "y")
+    schema = writer.register_schema("n", "jsonschema", b"{}")
+    ids = [writer.register_channel(topic, "json", schema) for topic in TOPICS]
+    for topic, time, data in messages:
+        writer.add_message(ids[topic], time, data, time + 1, time)
+    writer.finish()
+    return stream.getvalue()
+
+
+def tallies(data: bytes) -> Tallies:
+    found = Tallies()
+    found.take_file(io.BytesIO(data))
+    return found
+
+
+def plain(found: dict[int, Tally]) -> dict[int, dict]:
+    return {channel: tally.as_json() for channel, tally in found.items()}
+
+
+def test_the_same_messages_give_the_same_tallies_however_they_are_stored():
+    """In any order, compressed or not, in chunks or not."""
+    expected = tallies(mcap())
+    assert {channel: tally.messages for channel, tally in expected.items()} == {1: 10, 2: 10}
+    for data in (
+        mcap(MESSAGES[::-1]),
+        mcap(compression=CompressionType.LZ4),
+        mcap(compression=CompressionType.NONE),
+        mcap(use_chunking=False),
+        mcap(index_types=IndexType.NONE),
+    ):
+        assert plain(tallies(data)) == plain(expected)
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        MESSAGES[:-1],
+        [*MESSAGES, MESSAGES[3]],
+        [*MESSAGES[:5], (1, 50, b"other"), *MESSAGES[6:]],
+        [*MESSAGES[:5], (1, 51, MESSAGES[5][2]), *MESSAGES[6:]],
+        [(1 - topic, time, data) for topic, time, data in MESSAGES],
+    ],
+    ids=["lost", "twice", "other data", "other time", "other channel"],
+)
+def test_another_file_is_refused(tmp_path: Path, changed):
+    path = tmp_path / "copy.mcap"
+    path.write_bytes(mcap(changed))
+    with pytest.raises(OutputError, match=r"run\.mcap: /[ab] has \d+ messages .* after writing"):
+        checked_copy(path, "run.mcap", tallies(mcap()), {}, 0)
+
+
+def test_what_is_equal_is_told_by_channel(tmp_path: Path):
+    """Also of a channel without a message, and of channels that were added."""
+    path = tmp_path / "copy.mcap"
+    path.write_bytes(mcap())
+    told = checked_copy(path, "run.mcap", {1: tallies(mcap())[1], 3: Tally()}, {2: tallies(mcap())[2]}, 0)
+    by_topic = {each["topic"]: each for each in told["channels"]}
+    assert by_topic["/a"]["input"] == by_topic["/a"]["output"] == plain(tallies(mcap()))[1]
+    assert by_topic["/b"]["added"]["messages"] == 10
+    assert by_topic["/silent"]["output"]["messages"] == 0
+
+
+@pytest.mark.parametrize("cut", [9, 300, -200, -30, -1])
+def test_a_file_that_is_cut_off_is_refused(tmp_path: Path, cut: int):
+    path = tmp_path / "copy.mcap"
+    path.write_bytes(mcap()[:cut])
+    with pytest.raises(OutputError, match="not as it was written"):
+        checked_copy(path, "run.mcap", tallies(mcap()), {}, 0)
+
+
+def test_a_chunk_that_is_damaged_is_not_looked_into():
+    """None of its messages counts, those of the others do."""
+    data = bytearray(mcap(compression=CompressionType.NONE))
+    place = data.index(bytes([15]) * 37)
+    data[place] ^= 1
+    found = tallies(bytes(data))
+    assert found.closed_chunks == 1
+    assert 0 < sum(tally.messages for tally in found.values()) < 20
+
+
+def test_the_summary_tells_what_was_copied(tmp_path: Path):
+    """Numbers as another reader counts them in the log; the added ones are one a map."""
+    from rose2_logs.readers import Selection
+
+    options = RunOptions(recording=False, selection=Selection(max_snapshots=2))
+    analyse_log(OFFICE, tmp_path / "out", options)
+    told = json.loads((tmp_path / "out" / "summary.json").read_text())["annotated_log"]
+    with OFFICE.open("rb") as file:
+        summary = make_reader(file).get_summary()
+    counts = {c.topic: summary.statistics.channel_message_counts[n] for n, c in summary.channels.items()}
+    assert {
+        each["topic"]: each["output"]["messages"] for each in told["channels"] if "output" in each
+    } == counts
+    assert all(each["input"] == each["output"] for each in told["channels"] if "output" in each)
+    added = {each["topic"]: each["added"]["messages"] for each in told["channels"] if "added" in each}
+    assert added == dict.fromkeys(annotated_mcap.ADDED, 2)
+    assert told["chunks_not_looked_into"] == {"input": 0, "output": 0}
+
+
+def test_a_message_that_is_lost_on_the_way_is_an_error_and_no_file_appears(tmp_path: Path, monkeypatch):
+    """A writer that drops one message."""
+    dropped = []
+    real = annotated_mcap.McapWriter.add_message
+
+    def add_message(self, *message):
+        if not dropped:
+            dropped.append(message)
+            return
+        real(self, *message)
+
+    monkeypatch.setattr(annotated_mcap.McapWriter, "add_message", add_message)
+    maps = save_run(tmp_path / "maps")
+    with pytest.raises(OutputError, match=r"maps\.rose2\.mcap: /map has 2 messages .*3 .*went in"):
+        analyse_log(maps, tmp_path / "out", RunOptions(recording=False))
+    assert len(dropped) == 1
+    assert not (tmp_path / "out").exists()

@@ -1,0 +1,335 @@
+"""Runs that are killed, interrupted or cannot write: nothing or all appears; --resume ends in the same."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from saved_maps import save_map, save_run, two_rooms
+
+from rose2_logs.cli import main
+from rose2_logs.errors import AlreadyWholeError, InvalidMapError, OutputError
+from rose2_logs.files import locked
+from rose2_logs.output_folder import OutputFolder, difference
+from rose2_logs.parameters import Parameters
+from rose2_logs.run import TABLES, RunOptions, analyse_log
+
+SEEN = (110, 130, 150, 170, 190, 210, 240)
+OPTIONS = {"recording": False, "annotated_log": True}
+JOURNAL, PART, LOCK = ".out.journal", ".out.part", ".out.lock"
+
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+from rose2_logs.run import RunOptions, analyse_log
+
+log, folder, moment, overwrite = sys.argv[1:]
+kill = lambda: os.kill(os.getpid(), signal.SIGKILL)
+frames, moves = 0, 0
+
+def count_frames(frame, share):
+    global frames
+    frames += 1
+    if moment == f"map {frames}":
+        kill()
+
+def count_moves(real):
+    def move(self, target):
+        global moves
+        place = Path(folder).parent if moment == "renaming" else Path(folder)
+        if Path(target).parent.samefile(place):
+            moves += 1
+            if moment in ("renaming", f"file {moves}"):
+                kill()
+        return real(self, target)
+    return move
+
+if moment == "renaming":
+    Path.rename = count_moves(Path.rename)
+if moment.startswith("file"):
+    Path.replace = count_moves(Path.replace)
+unlink = Path.unlink
+def remove(self, missing_ok=False):
+    if moment == "journal" and self.name.endswith(".journal"):
+        kill()
+    unlink(self, missing_ok)
+Path.unlink = remove
+options = RunOptions(recording=False, annotated_log=True, overwrite=overwrite == "True")
+analyse_log(Path(log), Path(folder), options, count_frames)
+"""
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory) -> Path:
+    return save_run(tmp_path_factory.mktemp("log") / "maps", SEEN)
+
+
+@pytest.fixture(scope="module")
+def fresh(log: Path, tmp_path_factory) -> dict[str, bytes]:
+    """What a run gives that nobody stops."""
+    folder = tmp_path_factory.mktemp("fresh") / "out"
+    analyse_log(log, folder, RunOptions(**OPTIONS))
+    return contents(folder)
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    """Every file; of the summary all but the times."""
+    found = {file.name: file.read_bytes() for file in folder.iterdir()}
+    summary = json.loads(found["summary.json"])
+    assert set(found) == {"summary.json", *summary["files"]}
+    del summary["seconds"]
+    return found | {"summary.json": json.dumps(summary).encode()}
+
+
+def kill_at(moment: str, log: Path, folder: Path, overwrite: bool = False) -> None:
+    command = [sys.executable, "-c", KILLED, *map(str, (log, folder, moment, overwrite))]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == -signal.SIGKILL, done.stderr
+
+
+def names(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.iterdir())
+
+
+@pytest.mark.parametrize(("moment", "kept"), [("map 1", 1), ("map 5", 5), ("renaming", 7)])
+def test_a_killed_run_leaves_no_results_and_goes_on_to_the_same(
+    log: Path, fresh, tmp_path: Path, caplog, monkeypatch, moment: str, kept: int
+):
+    """In the first map, in the middle, with all written but nothing in place. Known maps are not analysed."""
+    kill_at(moment, log, tmp_path / "out")
+    assert names(tmp_path) == [JOURNAL, LOCK, PART]
+    analysed = []
+    count_calls(monkeypatch, analysed)
+    analyse_log(log, tmp_path / "out", RunOptions(**OPTIONS, resume=True))
+    assert f"goes on after the {kept} maps" in caplog.text
+    assert analysed == list(range(kept, len(SEEN)))
+    assert contents(tmp_path / "out") == fresh
+    assert names(tmp_path) == ["out"]
+
+
+def count_calls(monkeypatch, analysed: list[int]) -> None:
+    from rose2_logs import run
+
+    real = run.analyse
+
+    def analyse(snapshot, *arguments, **options):
+        analysed.append(snapshot.index)
+        return real(snapshot, *arguments, **options)
+
+    monkeypatch.setattr(run, "analyse", analyse)
+
+
+def test_a_run_killed_after_all_is_in_place_is_whole(log: Path, fresh, tmp_path: Path):
+    """What is left to do is to remove the journal."""
+    kill_at("journal", log, tmp_path / "out")
+    assert contents(tmp_path / "out") == fresh
+    with pytest.raises(AlreadyWholeError, match="whole already"):
+        analyse_log(log, tmp_path / "out", RunOptions(**OPTIONS, resume=True))
+    assert names(tmp_path) == ["out"]
+    assert contents(tmp_path / "out") == fresh
+
+
+def test_results_that_are_being_replaced_have_no_summary_until_they_are_whole(
+    log: Path, fresh, tmp_path: Path
+):
+    """Killed between two files: told apart from whole results, and completed."""
+    out = tmp_path / "out"
+    analyse_log(log, out, RunOptions(**OPTIONS, parameters=Parameters().replaced(SMALL_ROOMS)))
+    kill_at("file 3", log, out, overwrite=True)
+    assert not (out / "summary.json").exists()
+    with pytest.raises(OutputError, match="exists already"):
+        analyse_log(log, out, RunOptions(**OPTIONS))
+    analyse_log(log, out, RunOptions(**OPTIONS, resume=True))
+    assert contents(out) == fresh
+    assert names(tmp_path) == ["out"]
+
+
+SMALL_ROOMS = {"floor_plan": {"room_min_area_m2": 0.5}}
+
+
+def stop(number: int, kind: type[BaseException]) -> Callable[[object, float], None]:
+    """Raise at a snapshot."""
+
+    def on_snapshot(frame: object, share: float) -> None:
+        nonlocal number
+        number -= 1
+        if number == 0:
+            raise kind("stopped")
+
+    return on_snapshot
+
+
+def test_a_run_that_was_interrupted_keeps_its_maps_and_says_so(log: Path, fresh, tmp_path: Path, caplog):
+    """Nothing else of it stays; stopped again, it goes on from the later map."""
+    out = tmp_path / "out"
+    for resume, number in ((False, 2), (True, 4)):
+        with pytest.raises(KeyboardInterrupt):
+            analyse_log(log, out, RunOptions(**OPTIONS, resume=resume), stop(number, KeyboardInterrupt))
+        assert f"{number} maps are done; --resume goes on after them" in caplog.text
+        assert names(tmp_path) == [JOURNAL]
+    analyse_log(log, out, RunOptions(**OPTIONS, resume=True, workers=2))
+    assert contents(out) == fresh
+
+
+@pytest.mark.parametrize("kind", [InvalidMapError, ZeroDivisionError])
+def test_what_would_come_again_leaves_nothing(log: Path, tmp_path: Path, kind: type[Exception]):
+    with pytest.raises(kind):
+        analyse_log(log, tmp_path / "out", RunOptions(**OPTIONS), stop(2, kind))
+    assert names(tmp_path) == []
+
+
+def test_a_fresh_start_says_that_the_stopped_run_could_have_gone_on(log: Path, fresh, tmp_path: Path, caplog):
+    with pytest.raises(KeyboardInterrupt):
+        analyse_log(log, tmp_path / "out", RunOptions(**OPTIONS), stop(2, KeyboardInterrupt))
+    analyse_log(log, tmp_path / "out", RunOptions(**OPTIONS))
+    assert "stopped here after 2 maps; --resume would have gone on" in caplog.text
+    assert contents(tmp_path / "out") == fresh
+
+
+def test_another_run_is_not_gone_on_with(log: Path, tmp_path: Path):
+    """The first difference is named; without --resume the run begins anew."""
+    with pytest.raises(KeyboardInterrupt):
+        analyse_log(log, tmp_path / "out", RunOptions(**OPTIONS), stop(2, KeyboardInterrupt))
+    other = Parameters().replaced(SMALL_ROOMS)
+    options = {**OPTIONS, "parameters": other}
+    with pytest.raises(
+        OutputError, match=r"another one \(parameters\.floor_plan\.room_min_area_m2 was .*0\.5"
+    ):
+        analyse_log(log, tmp_path / "out", RunOptions(**options, resume=True))
+    assert JOURNAL in names(tmp_path)
+    with pytest.raises(OutputError, match="method was rose2, is voronoi"):
+        analyse_log(log, tmp_path / "out", RunOptions(**OPTIONS, method="voronoi", resume=True))
+    analyse_log(log, tmp_path / "out", RunOptions(**options))
+    assert names(tmp_path) == ["out"]
+
+
+def test_two_runs_do_not_write_to_one_folder(log: Path, tmp_path: Path):
+    with (
+        locked(tmp_path / LOCK, "first"),
+        pytest.raises(OutputError, match="another run is writing"),
+    ):
+        analyse_log(log, tmp_path / "out", RunOptions(**OPTIONS))
+    assert names(tmp_path) == []
+
+
+def test_a_log_is_never_written_over(log: Path, tmp_path: Path):
+    """Neither its files, by links either, nor among its files; --overwrite does not help."""
+    maps = save_run(tmp_path / "maps", (200, 240))
+    before = hash_of(maps)
+    replace_all = RunOptions(**OPTIONS, overwrite=True)
+    for folder in (maps, maps / "inside", tmp_path / "other" / ".." / "maps"):
+        (tmp_path / "other").mkdir(exist_ok=True)
+        with pytest.raises(OutputError, match="lies in the log"):
+            analyse_log(maps, folder, replace_all)
+    single = save_map(tmp_path / "single", "flat", two_rooms())
+    for make in (Path.symlink_to, Path.hardlink_to):
+        out = tmp_path / make.__name__
+        out.mkdir()
+        make(out / "summary.json", single)
+        with pytest.raises(OutputError, match="is a file of the log itself"):
+            analyse_log(single, out, replace_all)
+        assert single.read_text().startswith("image:")
+    assert hash_of(maps) == before
+
+
+def hash_of(folder: Path) -> str:
+    digest = hashlib.sha256()
+    for file in sorted(folder.rglob("*")):
+        digest.update(file.name.encode() + (file.read_bytes() if file.is_file() else b""))
+    return digest.hexdigest()
+
+
+def test_differences_are_told_by_name():
+    assert difference({"a": {"b": 1}, "c": 2}, {"a": {"b": 1}, "c": 2}) == ""
+    assert difference({"a": {"b": 1}}, {"a": {"b": 2}}) == "a.b was 1, is 2"
+    assert difference({}, {"a": 1}) == "a was None, is 1"
+
+
+def test_a_folder_that_is_a_file_is_told(log: Path, tmp_path: Path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(OutputError, match="file"):
+        analyse_log(log, tmp_path / "file" / "out", RunOptions(**OPTIONS))
+    assert OutputFolder(tmp_path / "x", ["a"]).files == (tmp_path / "x" / "a",)
+
+
+COMMAND = [sys.executable, "-m", "rose2_logs", "analyze"]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs limits of POSIX")
+def test_a_full_disk_is_one_line(log: Path, tmp_path: Path):
+    """Files that cannot grow, as on a full disk: exit code 2, no rests untold, the log as it was."""
+    before = hash_of(log)
+    limited = 'ulimit -f 20; exec "$@"'  # in blocks of 1024 bytes
+    command = [*COMMAND, str(log), "-o", str(tmp_path), "--no-rrd"]
+    done = subprocess.run(["bash", "-c", limited, "-", *command], capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    errors = [line for line in done.stderr.splitlines() if line.startswith("error: ")]
+    assert len(errors) == 1
+    assert "cannot be written" in errors[0]
+    assert ".part" not in errors[0]
+    assert not any(name.endswith((".part", ".lock")) for name in names(tmp_path))
+    assert ("--resume" in done.stderr) == (names(tmp_path) != [])
+    assert hash_of(log) == before
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs signals of POSIX")
+def test_killed_and_interrupted_commands_end_with_their_workers(tmp_path: Path, monkeypatch, capsys):
+    """kill -9 leaves no process behind; Ctrl-C is one line and exit code 130; --resume ends it."""
+    many = save_run(tmp_path / "maps", tuple(range(120, 240, 3)))
+    command = [*COMMAND, str(many), "-o", str(tmp_path / "o"), "--no-rrd"]
+    journal = tmp_path / "o" / ".maps.journal"
+    for number, extra in ((signal.SIGKILL, ["--workers", "2"]), (signal.SIGINT, ["--resume"])):
+        running = subprocess.Popen([*command, *extra], stderr=subprocess.PIPE, text=True)
+        size = journal.stat().st_size if journal.exists() else 10_000
+        wait_for(lambda size=size: journal.exists() and journal.stat().st_size > size)
+        children = children_of(running.pid)
+        running.send_signal(number)
+        _, err = running.communicate(timeout=60)
+        assert not (tmp_path / "o" / "maps").exists()
+        wait_for(lambda children=children: not any(map(is_alive, children)))
+    assert running.returncode == 130
+    assert [line for line in err.splitlines() if line.startswith("error: ")] == [
+        "error: interrupted; unfinished results were removed"
+    ]
+    assert "--resume goes on after them" in err
+    assert names(tmp_path / "o") == [".maps.journal"]
+    monkeypatch.setattr(sys, "argv", ["rose2-logs", *command[3:], "--resume"])
+    for said in ("results in", "is whole already"):
+        with pytest.raises(SystemExit) as ended:
+            main()
+        assert not ended.value.code
+        assert said in capsys.readouterr().out
+    analyse_log(many, tmp_path / "fresh", RunOptions(**OPTIONS))
+    assert contents(tmp_path / "o" / "maps") == contents(tmp_path / "fresh")
+
+
+def wait_for(done: Callable[[], bool]) -> None:
+    end = time.monotonic() + 60
+    while not done():
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+def children_of(pid: int) -> list[int]:
+    path = Path(f"/proc/{pid}/task/{pid}/children")
+    return [int(child) for child in path.read_text().split()] if path.exists() else []
+
+
+def is_alive(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+        return "State:\tZ" not in Path(f"/proc/{pid}/status").read_text()
+    except OSError:
+        return False
+
+
+def test_tables_are_all_there(fresh):
+    assert {f"{name}.parquet" for name in TABLES} < set(fresh)
