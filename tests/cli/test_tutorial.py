@@ -30,7 +30,8 @@ def printed(tmp_path: Path, monkeypatch) -> str:
     (tmp_path / "sample_logs").symlink_to(PROJECT / "sample_logs")
     monkeypatch.chdir(tmp_path)
     out = io.StringIO()
-    monkeypatch.setattr("rose2_logs.reporting._out.file", out)
+    # Not `file`, whose value is where standard output goes at that time: it would be kept after the test.
+    monkeypatch.setattr("rose2_logs.reporting._out._file", out)
     names: dict[str, object] = {"print": lambda frame: out.write(f"{frame.to_string(index=False)}\n")}
     for language, block in re.findall(r"```(sh|python)\n(.*?)```", TUTORIAL, re.DOTALL):
         if language == "python":
