@@ -14,27 +14,12 @@ from PIL import Image
 from saved_maps import RESOLUTION_M, save_map, save_run, two_rooms
 
 from rose2_logs import __version__
-from rose2_logs.cli import main
 from rose2_logs.sinks.label_image import write_label_image
 
 VERBS = (
     "info", "analyze", "batch", "view", "serve",
     "report", "figure", "export", "compare", "segment", "evaluate",
 )  # fmt: skip
-
-
-@pytest.fixture
-def cli(monkeypatch, capfd):
-    """Run the command line; returns exit code, stdout and stderr."""
-
-    def run(*arguments: object) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["rose2-logs", *map(str, arguments)])
-        with pytest.raises(SystemExit) as ended:
-            main()
-        out, err = capfd.readouterr()
-        return int(ended.value.code or 0), out, err
-
-    return run
 
 
 @pytest.fixture

@@ -15,25 +15,7 @@ from numpy.typing import NDArray
 from PIL import Image
 from saved_maps import FREE, UNKNOWN, WALL, save_map
 
-from rose2_logs.cli import main
-from rose2_logs.cli_options import state
-
 BIN = Path(sys.executable).parent
-
-
-@pytest.fixture
-def cli(monkeypatch, capfd):
-    """Run the command line; returns exit code, stdout and stderr."""
-
-    def run(*arguments: object) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["rose2-logs", *map(str, arguments)])
-        monkeypatch.setitem(state, "debug", False)
-        with pytest.raises(SystemExit) as ended:
-            main()
-        out, err = capfd.readouterr()
-        return int(ended.value.code or 0), out, err
-
-    return run
 
 
 def three_rooms() -> NDArray[np.uint8]:

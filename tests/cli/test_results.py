@@ -2,31 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import pytest
 from PIL import Image
 from saved_maps import save_map, two_rooms
-
-from rose2_logs.cli import main
-from rose2_logs.cli_options import state
-
-
-@pytest.fixture
-def cli(monkeypatch, capfd):
-    """Run the command line; returns exit code, stdout and stderr."""
-
-    def run(*arguments: object) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["rose2-logs", *map(str, arguments)])
-        monkeypatch.setitem(state, "debug", False)
-        with pytest.raises(SystemExit) as ended:
-            main()
-        out, err = capfd.readouterr()
-        return int(ended.value.code or 0), out, err
-
-    return run
 
 
 def test_report_writes_a_page(cli, office_results: Path, tmp_path: Path):

@@ -13,24 +13,9 @@ import pytest
 from mcap.writer import Writer
 from saved_maps import save_run
 
-from rose2_logs.cli import main
 from rose2_logs.notices import PACKAGE, gathered, muted, notice
 
 MAPS = 12
-
-
-@pytest.fixture
-def cli(monkeypatch, capfd):
-    """Run the command line; returns exit code, stdout and stderr."""
-
-    def run(*arguments: object) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["rose2-logs", *map(str, arguments)])
-        with pytest.raises(SystemExit) as ended:
-            main()
-        out, err = capfd.readouterr()
-        return int(ended.value.code or 0), out, err
-
-    return run
 
 
 @pytest.fixture
