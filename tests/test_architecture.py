@@ -13,6 +13,7 @@ ORDER = (
     "__init__",
     "errors",
     "notices",
+    "circular_peaks",
     "files",
     "parcels",
     "workers",

@@ -11,9 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft, ndimage, signal
+from scipy import fft, ndimage
 from scipy.spatial import cKDTree
 
+from rose2_logs.circular_peaks import circular_peaks
 from rose2_logs.explored import ExploredPart
 from rose2_logs.occupancy import UNKNOWN, BoolArray, FloatArray, OccupancySnapshot, classify
 from rose2_logs.parameters import OccupancyParameters, SpectrumParameters
@@ -221,13 +222,11 @@ def _turns(moving: PlacedMap, fixed: PlacedMap) -> list[float]:
         profiles.append((energy - energy.mean()) / max(float(energy.std()), 1e-12))
     bins = len(profiles[0])
     match = fft.irfft(fft.rfft(profiles[0]) * np.conj(fft.rfft(profiles[1])), n=bins)
-    tiled = np.tile(match, 3)
-    peaks, _ = signal.find_peaks(tiled, distance=max(1, round(TURN_MIN_GAP_RAD / np.pi * bins)))
-    peaks = peaks[(peaks >= bins) & (peaks < 2 * bins)]
-    peaks = peaks[np.argsort(-tiled[peaks], kind="stable")][:TURNS_MOST]
+    peaks = circular_peaks(match, round(TURN_MIN_GAP_RAD / np.pi * bins))
+    peaks = peaks[np.argsort(-match[peaks], kind="stable")][:TURNS_MOST]
     if len(peaks) == 0:
-        peaks = np.array([bins])
-    turns = (peaks - bins) * np.pi / bins
+        peaks = np.array([0])
+    turns = peaks * np.pi / bins
     return [turn + half for turn in turns.tolist() for half in (0.0, np.pi)]
 
 

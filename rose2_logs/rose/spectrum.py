@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft, ndimage, signal
+from scipy import fft, ndimage
 
+from rose2_logs.circular_peaks import circular_peaks
 from rose2_logs.occupancy import BoolArray, FloatArray
 from rose2_logs.parameters import SpectrumParameters
 
@@ -142,17 +143,12 @@ def dominant_directions(energy: FloatArray, parameters: SpectrumParameters) -> t
     if span <= 0:
         return np.zeros(0), np.zeros(0)
     bins = len(energy)
-    # Three turns of the circle, of which the middle one is read, so that no peak is cut.
-    tiled = np.tile((energy - energy.min()) / span, 3)
-    peaks, _ = signal.find_peaks(
-        tiled,
-        prominence=parameters.peak_min_prominence,
-        distance=max(1, round(parameters.direction_min_gap_rad / np.pi * bins)),
-    )
-    peaks = peaks[(peaks >= bins) & (peaks < 2 * bins)]
-    left, centre, right = tiled[peaks - 1], tiled[peaks], tiled[peaks + 1]
+    heights = (energy - energy.min()) / span
+    gap = round(parameters.direction_min_gap_rad / np.pi * bins)
+    peaks = circular_peaks(heights, gap, parameters.peak_min_prominence)
+    left, centre, right = heights[peaks - 1], heights[peaks], heights[(peaks + 1) % bins]
     curvature = left - 2 * centre + right
     shift = np.divide(left - right, 2 * curvature, out=np.zeros(len(peaks)), where=curvature < 0)
-    directions = np.mod((peaks - bins + shift) * np.pi / bins, np.pi)
+    directions = np.mod((peaks + shift) * np.pi / bins, np.pi)
     order = np.lexsort((directions, -centre))
     return directions[order], centre[order]
