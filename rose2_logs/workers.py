@@ -14,6 +14,7 @@ from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack, contextmanager, suppress
 from functools import lru_cache
+from multiprocessing.context import BaseContext
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Generic, Self, TypeVar
 
@@ -65,8 +66,7 @@ class Workers(Generic[Item, Result]):
     def __enter__(self) -> Self:
         if self._count > 1:
             self._folders = self._stack.enter_context(parcel_folders())
-            # Forking a process that runs threads already (Rerun, Arrow) may lock up; a fresh one cannot.
-            context = multiprocessing.get_context("spawn")
+            context = _context(self._function)
             self._pool = ProcessPoolExecutor(
                 self._count, context, initializer=_begin, initargs=(self._function, self._folders)
             )
@@ -153,6 +153,19 @@ def ordered_map(
     """Yield each item with its result, in the order of the items: `Workers` for a single stream."""
     with Workers(function, workers) as processes:
         yield from processes.map(items)
+
+
+def _context(function: Callable[..., Any]) -> BaseContext:
+    """Choose how processes start: never by a copy of this one, whose threads (Rerun, Arrow) might lock up.
+
+    On Linux they are copies of a fresh process that has imported what the function needs, once for all. On
+    other systems libraries do not bear to be copied after their import, so that each process imports anew.
+    """
+    if sys.platform != "linux":
+        return multiprocessing.get_context("spawn")
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload([getattr(function, "func", function).__module__])
+    return context
 
 
 class _Task:

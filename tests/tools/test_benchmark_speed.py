@@ -147,16 +147,22 @@ def test_bytes_read_are_those_of_the_call(tmp_path: Path):
 
 
 @needs_proc
-def test_memory_of_a_process_counts_that_of_its_children(tmp_path: Path):
-    """A process that starts another one which holds 100 MB for a while."""
-    from benchmarking.gauges import TreeMemory
+def test_memory_and_time_of_a_process_count_those_below_it():
+    """A process that starts another, which starts one that holds 100 MB and works for a second."""
+    from benchmarking.gauges import ProcessTree
 
-    child = "import time; held = bytearray(100_000_000); time.sleep(0.5)"
-    parent = f"import subprocess, sys; subprocess.run([sys.executable, '-c', {child!r}])"
-    with subprocess.Popen([sys.executable, "-c", parent]) as process:
-        memory = TreeMemory(process.pid)
+    command = (
+        "import time; held = bytearray(100_000_000)\nwhile time.process_time() < 1: pass\ntime.sleep(0.5)"
+    )
+    for _ in range(2):
+        command = f"import subprocess, sys; subprocess.run([sys.executable, '-c', {command!r}])"
+    with subprocess.Popen([sys.executable, "-c", command]) as process:
+        tree = ProcessTree(process.pid)
         process.wait()
-    assert 100e6 < memory.stop() < 200e6
+    use = tree.stop()
+    assert use.peak_bytes is not None
+    assert 100e6 < use.peak_bytes < 200e6
+    assert 0.9 < use.cpu_s < 2
 
 
 def test_maps_of_a_group_are_spread_evenly():

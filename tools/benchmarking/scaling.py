@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import resource
 import subprocess
 import sys
 import time
@@ -15,7 +14,7 @@ import numpy as np
 from log_writing import robot_log
 from numpy.typing import NDArray
 
-from benchmarking.gauges import TreeMemory, peak_memory
+from benchmarking.gauges import ProcessTree, peak_memory
 from benchmarking.map_times import time_analysis
 from rose2_logs.errors import Rose2LogsError
 from rose2_logs.occupancy import GridGeometry, OccupancySnapshot, known_window
@@ -128,17 +127,17 @@ def time_log(log: Path, snapshots: int, workers: int, folder: Path) -> LogTimes:
     Rose2LogsError
         If the command fails.
     """
-    before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
+    start = time.perf_counter()
     with _analyze(log, workers, folder) as process:
-        memory = TreeMemory(process.pid)
+        tree = ProcessTree(process.pid)
         _wait(process, log)
-    wall_s, after = time.perf_counter() - start, resource.getrusage(resource.RUSAGE_CHILDREN)
+    wall_s, use = time.perf_counter() - start, tree.stop()
     return LogTimes(
         snapshots,
         workers,
         wall_s,
-        after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime,
-        memory.stop(),
+        use.cpu_s,
+        use.peak_bytes,
         log.stat().st_size,
         (folder / log.stem / f"{log.stem}.rrd").stat().st_size,
     )
