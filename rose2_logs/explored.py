@@ -11,7 +11,7 @@ from shapely.geometry.base import BaseGeometry
 
 from rose2_logs.occupancy import (
     BoolArray,
-    CanvasPart,
+    CellValues,
     FloatArray,
     GridGeometry,
     Scalar,
@@ -91,12 +91,17 @@ class ExploredPart:
         """Shapely geometry in the world."""
         return shapely.transform(geometry, self.points)
 
-    def occupied_cells(self, values: NDArray[Scalar]) -> CanvasPart[Scalar]:
-        """Values of blocks as values of the canvas's occupied cells, zero elsewhere."""
-        cells = self._unblocked(values)
-        if self.factor > 1:
-            cells[~self.known_occupied] = 0
-        return CanvasPart(self.geometry.shape, self.window, cells)
+    def occupied_cells(self) -> NDArray[np.int32]:
+        """Row and column (N, 2) on the canvas of its occupied cells."""
+        row, column = np.nonzero(self.known_occupied)
+        cells = np.empty((len(row), 2), np.int32)
+        cells[:, 0], cells[:, 1] = row + self.window[0].start, column + self.window[1].start
+        return cells
+
+    def values_at(self, cells: NDArray[np.int32], values: NDArray[Scalar]) -> CellValues[Scalar]:
+        """Values of blocks (H, W) as values of cells (N, 2) of the canvas."""
+        row, column = (cells - (self.window[0].start, self.window[1].start)).T // self.factor
+        return CellValues(self.geometry.shape, cells, values[row, column])
 
     def labels(self, labels: NDArray[np.int32]) -> NDArray[np.int32]:
         """Labels of blocks as labels of the canvas's free cells.

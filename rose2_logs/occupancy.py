@@ -157,27 +157,27 @@ class OccupancySnapshot:
 
 
 @dataclass(frozen=True, eq=False)
-class CanvasPart(Generic[Scalar]):
-    """Values of the cells of a window of a canvas; those outside are zero and not kept.
+class CellValues(Generic[Scalar]):
+    """Values of some cells of a canvas; those of the others are zero and not kept.
 
     Attributes
     ----------
     shape : (int, int)
         Of the canvas (H, W).
-    window : (slice, slice)
-        Rows and columns of the canvas.
-    values : (h, w)
-        Values of the window's cells.
+    cells : (N, 2) int32
+        Row and column of each cell that has a value.
+    values : (N,)
+        Its value.
     """
 
     shape: tuple[int, int]
-    window: tuple[slice, slice]
+    cells: NDArray[np.int32]
     values: NDArray[Scalar]
 
     def whole(self) -> NDArray[Scalar]:
         """Values (H, W) of the whole canvas."""
         canvas = np.zeros(self.shape, self.values.dtype)
-        canvas[self.window] = self.values
+        canvas[self.cells[:, 0], self.cells[:, 1]] = self.values
         return canvas
 
 

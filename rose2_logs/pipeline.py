@@ -146,39 +146,29 @@ def analyse(
         rooms = _room_map(labels, room_outlines(labels, resolution), explored, parameters)
         watch.lap("rooms")
         return analysis(rooms=rooms, structure=None, walls=None, floor_plan=None)
-    structure = find_structure(
+    found = find_structure(
         occupied,
         free_m2,
         resolution,
         lambda clean, directions: count_walls(clean, directions, resolution, parameters.walls),
         parameters.spectrum,
     )
+    directions, structure = found.directions_rad, _structure(found, explored)
     watch.lap("structure")
-    walls = find_walls(
-        structure.supported,
-        structure.clean,
-        structure.attached,
-        structure.directions_rad,
-        resolution,
-        parameters.walls,
-    )
+    walls = find_walls(found.supported, found.clean, found.attached, directions, resolution, parameters.walls)
+    del found  # what the stages to come need the memory of
     watch.lap("walls")
     plan = make_floor_plan(
         walls.lines.ends_m,
         walls.walls,
         free,
-        float(structure.directions_rad[0]) if len(structure.directions_rad) else 0.0,
+        float(directions[0]) if len(directions) else 0.0,
         resolution,
         parameters.floor_plan,
     )
     watch.lap("floor_plan")
     labels = split_rooms(
-        plan.labels,
-        walls.walls,
-        walls.lines.ends_m,
-        structure.directions_rad,
-        resolution,
-        parameters.topology,
+        plan.labels, walls.walls, walls.lines.ends_m, directions, resolution, parameters.topology
     )
     watch.lap("topology")
     labels, shapes, room_of_face = _finished_rooms(labels, plan, free, resolution, parameters)
@@ -194,7 +184,7 @@ def analyse(
     return analysis(
         rooms=rooms,
         voronoi_m=graph,
-        structure=_structure(structure, explored),
+        structure=structure,
         walls=_walls(walls, explored),
         floor_plan=_floor_plan(plan, room_of_face, explored, parameters),
     )
@@ -282,12 +272,13 @@ def _room_map(
 
 
 def _structure(found: RoseResult, explored: ExploredPart) -> Structure:
+    cells = explored.occupied_cells()
     return Structure(
         directions_rad=np.mod(found.directions_rad + explored.geometry.yaw_rad, np.pi),
         strengths=found.strengths,
-        scores=explored.occupied_cells(found.score),
+        scores=explored.values_at(cells, found.score),
         threshold=found.threshold,
-        clean_cells=explored.occupied_cells(found.clean),
+        clean_cells=explored.values_at(cells, found.clean),
         spectrum=found.spectrum,
     )
 

@@ -13,7 +13,7 @@ from hypothesis.extra import numpy as arrays
 from shapely.geometry import MultiPolygon, Polygon, box
 
 from rose2_logs.codec import Codec, dataclasses_within
-from rose2_logs.occupancy import CanvasPart, GridGeometry
+from rose2_logs.occupancy import CellValues, GridGeometry
 from rose2_logs.parameters import Parameters
 from rose2_logs.pipeline import SnapshotAnalysis, analyse
 from rose2_logs.room_evidence import RoomEvidence, room_evidence
@@ -71,7 +71,7 @@ def test_any_array_comes_back(array: np.ndarray):
         {"a": [1, (2, [3])], "b": {}},
         (Polygon(), box(0, 0, 1, 1), MultiPolygon([box(0, 0, 1, 1), box(2, 2, 3, 3)])),
         GridGeometry(0.05, (1.0, 2.0), 0.5, "map", (3, 4)),
-        CanvasPart((9, 9), (slice(1, 3), slice(2, 4)), np.ones((2, 2), np.float32)),
+        CellValues((9, 9), np.array([[1, 2], [3, 4]], np.int32), np.ones(2, np.float32)),
         np.float32(0.1),
         np.int64(7),
     ],
@@ -83,7 +83,7 @@ def test_what_an_analysis_is_made_of_comes_back(value: object):
 
 def test_the_known_types_are_those_of_the_annotations():
     names = set(dataclasses_within([SnapshotAnalysis, RoomEvidence]))
-    assert {"SnapshotAnalysis", "RoomMap", "Doorway", "Structure", "CanvasPart", "Walls", "FloorPlan"} < names
+    assert {"SnapshotAnalysis", "RoomMap", "Doorway", "Structure", "CellValues", "Walls", "FloorPlan"} < names
 
 
 @pytest.mark.parametrize("value", [object(), Parameters(), {1, 2}, np.array([object()]), np.array(["a"])])

@@ -69,7 +69,7 @@ def test_labels_come_back_on_free_cells_only_and_beside_thin_walls():
 
 def test_values_lie_where_their_block_does():
     part = explored_part(["????", "?..#", "?..#"], 0.025)
-    full = part.occupied_cells(np.array([[7, 9]])).whole()
+    full = part.values_at(part.occupied_cells(), np.array([[7, 9]])).whole()
     assert full.tolist() == [[0, 0, 0, 0], [0, 0, 0, 9], [0, 0, 0, 9]]
 
 

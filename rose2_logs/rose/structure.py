@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rose2_logs.occupancy import BoolArray, CanvasPart, FloatArray
+from rose2_logs.occupancy import BoolArray, CellValues, FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,8 +22,8 @@ class Structure:
         Share of the spectrum's energy that each direction holds.
     threshold : float
         Cells with at least this score make the clean map.
-    scores, clean_cells : CanvasPart
-        What `score` and `clean` hold, of the explored part alone.
+    scores, clean_cells : CellValues
+        What `score` and `clean` hold, of the occupied cells alone.
     spectrum : (S, S) uint8
         Picture of the spectrum in the grid's frame, see `rose.spectrum.spectrum_picture`.
     """
@@ -31,8 +31,8 @@ class Structure:
     directions_rad: FloatArray
     strengths: FloatArray
     threshold: float
-    scores: CanvasPart[np.float32]
-    clean_cells: CanvasPart[np.bool_]
+    scores: CellValues[np.float32]
+    clean_cells: CellValues[np.bool_]
     spectrum: NDArray[np.uint8]
 
     @property
