@@ -94,8 +94,10 @@ def edge_evidence(
     share = np.zeros(len(edges_m))
     first = offset[owner] + np.floor(start / step_m[owner] + 0.5).astype(np.int64)
     last = offset[owner] + np.floor(end / step_m[owner] + 0.5).astype(np.int64)
-    some = on_line & (last > first)
-    if some.any():
+    some = np.flatnonzero(on_line & (last > first))
+    # In the order of the samples, since what lies between two edges is gone through as well.
+    some = some[np.argsort(first[some], kind="stable")]
+    if len(some):
         bounds = np.minimum(np.column_stack([first[some], last[some]]).ravel(), len(run_share) - 1)
         share[some] = np.maximum.reduceat(run_share, bounds)[::2]
     return EdgeEvidence(lengths[0], lengths[1], length, share)

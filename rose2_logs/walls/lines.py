@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect
 from dataclasses import dataclass
 
 import numpy as np
@@ -94,13 +95,14 @@ def _shared_offsets(clusters: WallClusters, lateral_m: float) -> FloatArray:
     for index in np.unique(clusters.direction):
         members = np.flatnonzero(clusters.direction == index)
         members = members[np.lexsort((clusters.offset[members], -clusters.covered[members]))]
-        taken: list[float] = []
-        for member in members:
-            value = clusters.offset[member]
-            near = [offset for offset in taken if abs(offset - value) <= lateral_m]
-            if near:
-                shared[member] = min(near, key=lambda offset: abs(offset - value))
+        taken: list[float] = []  # ascending: the nearest is one of two neighbours
+        for member, value in zip(members.tolist(), clusters.offset[members].tolist(), strict=True):
+            at = bisect(taken, value)
+            nearest = min(
+                taken[max(at - 1, 0) : at + 1], key=lambda offset: abs(offset - value), default=np.inf
+            )
+            if abs(nearest - value) <= lateral_m:
+                shared[member] = nearest
             else:
-                taken.append(float(value))
-                shared[member] = value
+                taken.insert(at, value)
     return shared
