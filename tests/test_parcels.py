@@ -33,7 +33,8 @@ def test_an_analysis_comes_out_as_it_went_in(tmp_path: Path):
     ):
         assert one.dtype == other.dtype
         np.testing.assert_array_equal(one, other)
-        assert other.ctypes.data % ALIGNMENT_BYTES == 0
+        if one.nbytes >= LARGE_BYTES:
+            assert other.ctypes.data % ALIGNMENT_BYTES == 0
     assert [shape.wkb for shape in made.rooms.polygons] == [shape.wkb for shape in found.rooms.polygons]
     assert not found.rooms.labels.flags.writeable
 
