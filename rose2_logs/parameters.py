@@ -233,6 +233,9 @@ class TrackingParameters:
     shift_min_share: float = number(
         0.5, "share", "A motion of the map is believed when it brings most of its walls together.", 0, 1
     )
+    smoothed_min_area_m2: float = number(
+        1.5, "m2", "A lesser glimpse of a room of the last map is no room yet: half the least room.", 0.0
+    )
 
 
 @dataclass(frozen=True)

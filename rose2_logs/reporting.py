@@ -249,12 +249,18 @@ def print_tracks(runs: Mapping[str, RunTrackScores]) -> None:
         table.add_column(heading, justify="right")
     for group, run in runs.items():
         table.add_row(f"[bold]{escape(group)}")
-        for name, scores in (("rooms found", run.found), ("true rooms", run.true_rooms)):
+        rows = {"rooms found": run.found, "smoothed": run.smoothed, "true rooms": run.true_rooms}
+        for name, scores in rows.items():
             shares = (scores.idf1, scores.idf1_bound, scores.idp, scores.idr)
             counts = (str(scores.id_switches), str(scores.fragmentations))
             number = f"{scores.tracks}/{scores.true_tracks}"
             table.add_row(f"  {name}", *(f"{share:.2f}" for share in shares), *counts, number)
     _out.print(table)
+    for group, run in runs.items():
+        _out.print(
+            f"smoothed: the rooms of the last map carried over to those before, {escape(group)}: "
+            f"mean iou_sym {run.smoothed_iou_sym:.2f}"
+        )
 
 
 def _megabytes(size_bytes: int) -> str:

@@ -12,13 +12,16 @@ from numpy.typing import NDArray
 
 from rose2_logs.evaluation.benchmark import CaseResult
 from rose2_logs.evaluation.canvas import placed
+from rose2_logs.evaluation.cases import Case
+from rose2_logs.evaluation.scores import score
 from rose2_logs.evaluation.tracks import TrackComparison, TrackScores
 from rose2_logs.evaluation.truth_tracks import TruthLinker
-from rose2_logs.occupancy import OccupancySnapshot
+from rose2_logs.occupancy import GridGeometry, OccupancySnapshot
 from rose2_logs.parameters import Parameters
 from rose2_logs.rooms import RoomMap
-from rose2_logs.tracking.alignment import MapAligner
+from rose2_logs.tracking.alignment import MapAligner, RigidMotion
 from rose2_logs.tracking.overlap import overlap_of
+from rose2_logs.tracking.smoothing import Smoother, motions_to_last
 from rose2_logs.tracking.tracker import RoomTracker
 
 
@@ -30,12 +33,18 @@ class RunTrackScores:
     ----------
     found : TrackScores
         Of the rooms that the method found.
+    smoothed : TrackScores
+        Of the rooms of the run's last map, carried over to the maps before it.
+    smoothed_iou_sym : float
+        Mean overlap, in percent, of these rooms with the true ones, see `Scores`.
     true_rooms : TrackScores
         Of the true rooms, given to the tracker without their numbers: what it reaches where the segmentation
         is right.
     """
 
     found: TrackScores
+    smoothed: TrackScores
+    smoothed_iou_sym: float
     true_rooms: TrackScores
 
 
@@ -64,13 +73,26 @@ class RunTracks:
             If an image of the case cannot be read any more.
         """
         run = self._runs.setdefault(result.case.group, _Run(self._parameters))
-        truth = np.ascontiguousarray(np.flipud(result.case.truth())).astype(np.int32)
+        truth = _true_labels(result.case)
         found = np.ascontiguousarray(np.flipud(result.labels))
-        run.add(result.case.snapshot(), truth, found, origin_known=result.case.origin_xy_m is not None)
+        run.add(result.case, truth, found)
 
     def scores(self) -> dict[str, RunTrackScores]:
         """Figures of each group, in the order in which the groups came."""
         return {group: run.scores() for group, run in self._runs.items()}
+
+
+@dataclass(frozen=True)
+class _Past:
+    """What has to be known of a map until the run is over; the map itself is read again then."""
+
+    case: Case
+    geometry: GridGeometry
+    motion: RigidMotion | None
+    true_track: NDArray[np.int32]
+
+    def snapshot(self) -> OccupancySnapshot:
+        return dataclasses.replace(self.case.snapshot(), geometry=self.geometry)
 
 
 class _Run:
@@ -82,30 +104,54 @@ class _Run:
         self._sides = tuple(
             (RoomTracker(parameters.tracking, parameters.occupancy), TrackComparison()) for _ in range(2)
         )
+        self._past: list[_Past] = []
+        self._last_labels: NDArray[np.int32]
 
-    def add(
-        self,
-        snapshot: OccupancySnapshot,
-        truth: NDArray[np.int32],
-        found: NDArray[np.int32],
-        *,
-        origin_known: bool,
-    ) -> None:
-        if self._before is not None and not origin_known:
+    def add(self, case: Case, truth: NDArray[np.int32], found: NDArray[np.int32]) -> None:
+        snapshot = case.snapshot()
+        if self._before is not None and case.origin_xy_m is None:
             snapshot = placed(snapshot, self._before, self._parameters.occupancy)
         self._before = snapshot
-        geometry = snapshot.geometry
-        true_track = self._linker.update(truth, geometry, self._aligner.update(snapshot))
+        geometry, motion = snapshot.geometry, self._aligner.update(snapshot)
+        true_track = self._linker.update(truth, geometry, motion)
         for labels, (tracker, comparison) in zip((found, truth), self._sides, strict=True):
             tracks, _ = tracker.update(snapshot, RoomMap.from_labels(labels, geometry))
-            overlap = overlap_of(truth, labels)
-            comparison.add(
-                true_track[overlap.first_ids], np.array(tracks, np.int64)[overlap.second_ids - 1], overlap.iou
-            )
+            _compare(comparison, truth, true_track, labels, np.array(tracks, np.int64))
+        self._past.append(_Past(case, geometry, motion, true_track))
+        self._last_labels = found
 
     def scores(self) -> RunTrackScores:
         found, true_rooms = (comparison.scores() for _, comparison in self._sides)
-        return RunTrackScores(found, true_rooms)
+        return RunTrackScores(found, *self._smoothed(), true_rooms)
+
+    def _smoothed(self) -> tuple[TrackScores, float]:
+        parameters, last = self._parameters, self._past[-1]
+        rooms = RoomMap.from_labels(self._last_labels, last.geometry)
+        smoother = Smoother(last.snapshot(), rooms, parameters.tracking, parameters.occupancy)
+        comparison, overlaps = TrackComparison(), []
+        motions = motions_to_last([past.motion for past in self._past])
+        for past, motion in zip(self._past, motions, strict=True):
+            truth = _true_labels(past.case)
+            labels = smoother.rooms(past.snapshot(), motion).labels
+            _compare(comparison, truth, past.true_track, labels, np.arange(1, len(rooms) + 1))
+            overlaps.append(score(truth, labels).iou_sym)
+        return comparison.scores(), float(np.mean(overlaps))
+
+
+def _true_labels(case: Case) -> NDArray[np.int32]:
+    """True rooms with row 0 at the bottom, as a map has it."""
+    return np.ascontiguousarray(np.flipud(case.truth())).astype(np.int32)
+
+
+def _compare(
+    comparison: TrackComparison,
+    truth: NDArray[np.int32],
+    true_track: NDArray[np.int32],
+    labels: NDArray[np.int32],
+    tracks: NDArray[np.int64],
+) -> None:
+    overlap = overlap_of(truth, labels)
+    comparison.add(true_track[overlap.first_ids], tracks[overlap.second_ids - 1], overlap.iou)
 
 
 def run_tracks_as_json(runs: Mapping[str, RunTrackScores]) -> dict[str, dict[str, Any]]:

@@ -100,6 +100,8 @@ def test_a_run_is_scored_over_growing_canvases_without_origins(tmp_path: Path):
     assert scores.found.idf1 == scores.found.idf1_bound == pytest.approx(100 * 2 * 8 / (9 + 8))
     assert (scores.found.id_switches, scores.found.fragmentations) == (0, 1)
     assert (scores.found.tracks, scores.found.true_tracks) == (3, 3)
+    assert scores.smoothed.idf1 == 100  # the last map has the missed room
+    assert scores.smoothed_iou_sym == pytest.approx(100)
     assert run_tracks_as_json({"run": scores})["run"]["found"]["idf1"] == scores.found.idf1
 
 

@@ -1,0 +1,146 @@
+"""The rooms of every map of a run by the layout of its last one: smoothing, where tracking filters.
+
+What a map alone shows of a half seen building is often wrong. Once the run is over, its last map tells
+which rooms there are; an earlier map shows how much of each was seen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from skimage.measure import label as connected
+
+from rose2_logs.occupancy import FloatArray, OccupancySnapshot, classify, known_window, label_sizes
+from rose2_logs.parameters import OccupancyParameters, TrackingParameters
+from rose2_logs.rooms import RoomMap
+from rose2_logs.tracking.alignment import POINTS_MIN, RigidMotion, WallFit, wall_points
+
+
+@dataclass(frozen=True, eq=False)
+class SmoothedRooms:
+    """How much of the rooms of the run's last map another map shows.
+
+    Attributes
+    ----------
+    labels : (H, W) int32
+        On the map's canvas: 0 = no room, 1..R = the rooms of the last map.
+    areas_m2 : (R,) float
+        Area of each.
+    """
+
+    labels: NDArray[np.int32]
+    areas_m2: FloatArray
+
+
+class Smoother:
+    """Carries the rooms of a run's last map over to the maps before it.
+
+    A map is laid over the last one: first as it moved from map to map, then by its walls. Each of its free
+    cells takes the room that lies there in the end, or the nearest. Pieces of a room smaller than
+    `smoothed_min_area_m2` take the room beside them.
+
+    Parameters
+    ----------
+    last : OccupancySnapshot
+        The last map.
+    rooms : RoomMap
+        Its rooms.
+    tracking : TrackingParameters
+        The least piece of a room.
+    occupancy : OccupancyParameters, optional
+        Which cells are free, which are walls.
+    """
+
+    def __init__(
+        self,
+        last: OccupancySnapshot,
+        rooms: RoomMap,
+        tracking: TrackingParameters,
+        occupancy: OccupancyParameters | None = None,
+    ) -> None:
+        self._min_area_m2 = tracking.smoothed_min_area_m2
+        self._occupancy = occupancy or OccupancyParameters()
+        self._window = known_window(rooms.labels > 0)
+        self._geometry, self._count = rooms.geometry, len(rooms)
+        self._nearest = _filled(rooms.labels[self._window])
+        points = wall_points(last, self._occupancy)
+        self._fit = WallFit(points, last.geometry.resolution_m) if len(points) >= POINTS_MIN else None
+
+    def rooms(self, snapshot: OccupancySnapshot, motion: RigidMotion) -> SmoothedRooms:
+        """Find the rooms of the last map on another one.
+
+        Parameters
+        ----------
+        snapshot : OccupancySnapshot
+            The map.
+        motion : RigidMotion
+            How the whole map moved from then to the end, see `motions_to_last`.
+        """
+        labels = np.zeros(snapshot.geometry.shape, np.int32)
+        window = known_window(snapshot.cells >= 0)
+        free, _ = classify(snapshot.cells[window], self._occupancy)
+        row, column = np.nonzero(free)
+        if self._count == 0 or len(row) == 0:
+            return SmoothedRooms(labels, np.zeros(self._count))
+        corner = np.array([window[0].start, window[1].start])
+        centres = snapshot.geometry.cell_centres(row + corner[0], column + corner[1])
+        cells = self._geometry.world_to_cell(self._laid_over(snapshot, motion).points(centres))
+        cells -= (self._window[0].start, self._window[1].start)
+        np.clip(cells, 0, np.array(self._nearest.shape) - 1, out=cells)
+        part = labels[window]
+        part[row, column] = self._nearest[cells[:, 0], cells[:, 1]]
+        cell_m2 = snapshot.geometry.cell_area_m2
+        _join_small_pieces(part, free, self._min_area_m2 / cell_m2)
+        return SmoothedRooms(labels, label_sizes(part, self._count)[1:].astype(float) * cell_m2)
+
+    def _laid_over(self, snapshot: OccupancySnapshot, motion: RigidMotion) -> RigidMotion:
+        """Fit a map's walls to those of the last one, where that brings more of them together."""
+        points = wall_points(snapshot, self._occupancy)
+        fit = self._fit
+        if fit is None or len(points) < POINTS_MIN:
+            return motion
+        walls = WallFit(points, snapshot.geometry.resolution_m).sample()
+        centre = walls.points.mean(axis=0)
+        start = RigidMotion.moving(centre, motion.points(centre), motion.turn_rad)
+        fitted = fit.settled(walls, start)
+        return max(start, fitted, key=lambda each: fit.share(walls.points, each))
+
+
+def motions_to_last(motions: Sequence[RigidMotion | None]) -> list[RigidMotion]:
+    """How the whole map moved from each map of a run to the last.
+
+    Parameters
+    ----------
+    motions : sequence
+        How it moved to each from the one before; None where it stayed.
+    """
+    found = [RigidMotion.none()]
+    for motion in reversed(motions[1:]):
+        found.append(found[-1] if motion is None else motion.then(found[-1]))
+    return found[: len(motions)][::-1]
+
+
+def _join_small_pieces(labels: NDArray[np.int32], free: NDArray[np.bool_], min_cells: float) -> None:
+    """Give the cells (H, W) of pieces smaller than so many to the nearest larger piece, if there is one."""
+    piece: NDArray[np.int64] = connected(labels, background=0, connectivity=1)  # type: ignore[no-untyped-call]
+    small = np.bincount(piece.ravel()) < min_cells
+    small[0] = False
+    kept = np.where(small[piece], 0, labels)
+    if small.any() and kept.any():
+        np.copyto(labels, _filled(kept), where=small[piece] & free)
+
+
+def _filled(labels: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Give each cell (H, W) without a room that of the nearest cell that has one."""
+    if not labels.any():
+        return labels
+    _, nearest = cv2.distanceTransformWithLabels(
+        (labels == 0).view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
+    )
+    room_of = np.zeros(int(nearest.max()) + 1, np.int32)
+    room_of[nearest[labels > 0]] = labels[labels > 0]
+    return room_of[nearest]
