@@ -103,7 +103,9 @@ def test_a_map_that_did_not_change_is_not_analysed_again(tmp_path: Path, monkeyp
     assert (result.totals.snapshots, result.totals.unchanged) == (5, 2)
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert summary["results"]["unchanged_maps"] == 2
-    monkeypatch.setattr("rose2_logs.run.is_same_to_analysis", lambda before, now, parameters: False)
+    monkeypatch.setattr(
+        "rose2_logs.tracked_stream.is_same_to_analysis", lambda before, now, parameters: False
+    )
     each = analyse_log(folder, tmp_path / "each", options)
     assert (each.totals.snapshots, each.totals.unchanged) == (5, 0)
     assert table_bytes(tmp_path / "out") == table_bytes(tmp_path / "each")

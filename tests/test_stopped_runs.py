@@ -116,15 +116,15 @@ def test_a_killed_run_leaves_no_results_and_goes_on_to_the_same(
 
 
 def count_calls(monkeypatch, analysed: list[int]) -> None:
-    from rose2_logs import run
+    from rose2_logs import tracked_stream
 
-    real = run.analyse
+    real = tracked_stream.analyse
 
     def analyse(snapshot, *arguments, **options):
         analysed.append(snapshot.index)
         return real(snapshot, *arguments, **options)
 
-    monkeypatch.setattr(run, "analyse", analyse)
+    monkeypatch.setattr(tracked_stream, "analyse", analyse)
 
 
 def test_a_run_killed_after_all_is_in_place_is_whole(log: Path, fresh, tmp_path: Path):
