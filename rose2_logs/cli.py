@@ -169,7 +169,7 @@ def analyze(
     failed = False
     for log, name in zip(logs, names, strict=True):
         try:
-            start_ns, end_ns = seconds_into_log(log, start, end)
+            start_ns, end_ns = seconds_into_log(log, start, end, parameters.reading)
             options = RunOptions(
                 topic=topic,
                 selection=Selection(start_ns, end_ns, every, min_change, max_snapshots),

@@ -10,17 +10,18 @@ from typing import Any
 import numpy as np
 import shapely
 
-from rose2_logs.errors import LogError, OutputError, ParameterError
+from rose2_logs.errors import LogError, ParameterError
+from rose2_logs.files import refuse_existing, writing
 from rose2_logs.layouts.comparison import LayoutComparison, compare_layouts
 from rose2_logs.layouts.layout import FinalLayout
 from rose2_logs.layouts.placing import PlacedMap
 from rose2_logs.occupancy import OccupancySnapshot
-from rose2_logs.parameters import Parameters
+from rose2_logs.parameters import Parameters, ReadingParameters
 from rose2_logs.pipeline import analyse
 from rose2_logs.readers import Selection, open_log
+from rose2_logs.readers.discovery import ANNOTATED_ENDING
 from rose2_logs.run import SUMMARY
 
-ANNOTATED_ENDING = ".rose2.mcap"
 FILES = (
     "room_changes.parquet",
     "wall_changes.parquet",
@@ -67,10 +68,8 @@ def compare_runs(
     from rose2_logs.sinks.layout_picture import draw_layout_comparison
     from rose2_logs.sinks.layout_tables import write_comparison_summary, write_comparison_tables
 
-    names = FILES if recording else FILES[:-1]
-    files = tuple(folder / name for name in names)
-    if not overwrite and (existing := [file for file in files if file.exists()]):
-        raise OutputError(f"{existing[0]}: exists already; choose another folder or pass --overwrite")
+    files = tuple(folder / name for name in FILES)
+    refuse_existing(files, overwrite=overwrite)
     name_a, name_b = _names(folder_a, folder_b)
     a, b = read_final_layout(folder_a, name_a), read_final_layout(folder_b, name_b)
     comparison = compare_layouts(a, b)
@@ -84,7 +83,10 @@ def compare_runs(
         from rose2_logs.sinks.rerun_comparison import write_comparison_recording
 
         write_comparison_recording(files[4], comparison)
-    return ComparisonResult(comparison, folder, files)
+        return ComparisonResult(comparison, folder, files)
+    with writing(files[4]):
+        files[4].unlink(missing_ok=True)  # of the comparison that this one replaces
+    return ComparisonResult(comparison, folder, files[:-1])
 
 
 def _names(folder_a: Path, folder_b: Path) -> tuple[str, str]:
@@ -121,7 +123,12 @@ def read_final_layout(folder: Path, name: str | None = None) -> FinalLayout:
     last, rooms = _last_rows(folder)
     annotated = [folder / name for name in names if name.endswith(ANNOTATED_ENDING)]
     snapshot = _last_map(
-        folder, next((path for path in annotated if path.is_file()), None), log, topic, last_ns
+        folder,
+        next((path for path in annotated if path.is_file()), None),
+        log,
+        topic,
+        last_ns,
+        parameters.reading,
     )
     analysis = analyse(snapshot, parameters, method)
     if not np.isclose(analysis.free_area_m2, last["free_area_m2"]):
@@ -167,9 +174,12 @@ def _last_rows(folder: Path) -> tuple[dict[str, Any], list[dict[str, Any]]]:
     return last, rooms
 
 
-def _last_map(folder: Path, annotated: Path | None, log: str, topic: str, last_ns: int) -> OccupancySnapshot:
+def _last_map(
+    folder: Path, annotated: Path | None, log: str, topic: str, last_ns: int, limits: ReadingParameters
+) -> OccupancySnapshot:
+    selection = Selection(last_ns, last_ns)
     try:
-        with open_log(annotated or log, topic=topic, selection=Selection(last_ns, last_ns)) as reader:
+        with open_log(annotated or log, topic=topic, selection=selection, limits=limits) as reader:
             return reader.last()
     except LogError as error:
         if annotated is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import glob
 import logging
 import time
 from collections.abc import Callable
@@ -11,15 +12,17 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from rose2_logs.errors import InvalidMapError
+from rose2_logs.errors import InvalidMapError, ParameterError
 from rose2_logs.files import refuse_existing
 from rose2_logs.journal import JournaledWorkers
 from rose2_logs.notices import Notices, gathered, muted
 from rose2_logs.output_folder import OutputFolder
+from rose2_logs.parameters import ReadingParameters
 from rose2_logs.provenance import fingerprint, software_versions
 from rose2_logs.readers import inspect_log, open_log
 from rose2_logs.readers.discovery import stem_of
 from rose2_logs.readers.log import LogReader
+from rose2_logs.readers.log_file import LATEST_NS
 from rose2_logs.run_options import NOT_IN_JOURNAL, RunOptions
 from rose2_logs.sinks.sink import CopyingSink, RunInfo, Sink
 from rose2_logs.sinks.summary import RunTotals, write_summary
@@ -65,22 +68,29 @@ OnSnapshot = Callable[[TrackedSnapshot, float], None]
 def log_stem(path: Path) -> str:
     """Name for the results of a log: its name without its format's ending; of a pattern, its folder's."""
     path = path.resolve()
-    is_pattern = any(sign in path.name for sign in "*?[")
+    is_pattern = glob.has_magic(path.name) and not path.exists()
     return stem_of(path.parent.name if is_pattern else path.name)
 
 
-def seconds_into_log(path: Path, start_s: float | None, end_s: float | None) -> tuple[int | None, int | None]:
+def seconds_into_log(
+    path: Path, start_s: float | None, end_s: float | None, limits: ReadingParameters
+) -> tuple[int | None, int | None]:
     """Convert seconds since a log's first message to log times in nanoseconds; None stays None.
 
     Raises
     ------
     LogError
         If the log cannot be opened.
+    ParameterError
+        If a time is no number that a log can hold.
     """
+    for seconds in (start_s, end_s):
+        if seconds is not None and not abs(seconds) <= LATEST_NS / 1e9:
+            raise ParameterError(f"{seconds:g} is no number of seconds into a log")
     if start_s is None and end_s is None:
         return None, None
     with muted():  # what is odd is told when the log is analysed
-        first_ns = inspect_log(path).start_ns or 0
+        first_ns = inspect_log(path, limits).start_ns or 0
     start_ns = None if start_s is None else first_ns + round(start_s * 1e9)
     return start_ns, None if end_s is None else first_ns + round(end_s * 1e9)
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import io
 import logging
 import struct
-from collections import Counter
+from collections import Counter, OrderedDict
 from collections.abc import Collection, Iterator
 from contextlib import suppress
 from io import BytesIO
@@ -51,6 +51,9 @@ logger = logging.getLogger(__name__)
 _DAMAGE = (ValueError, KeyError, EOFError, struct.error)
 # Messages of a scanned chunk that are put into an array at once: as tuples they take ten times the memory.
 _ENTRIES_AT_ONCE = 65_536
+# Chunks that are kept, as far as they are no larger together: those of a bag that was written topic by topic
+# are read in turns, and each would be decompressed for every message. A recorder's have 0.8 MB.
+_CHUNKS_KEPT_BYTES = 64 << 20
 
 
 class BagFile(LogFile):
@@ -71,7 +74,8 @@ class BagFile(LogFile):
     def __init__(self, path: Path, limits: ReadingParameters) -> None:
         self.path = path
         self.limits = limits
-        self._chunk: tuple[int, bytes] = (-1, b"")
+        self._chunks: OrderedDict[int, bytes] = OrderedDict()
+        self._kept_bytes = 0
         try:
             self._stream = io.BufferedReader(CheckedFile(path))
             self._size = path.stat().st_size
@@ -112,7 +116,8 @@ class BagFile(LogFile):
     def close(self) -> None:
         """Close the file."""
         self._stream.close()
-        self._chunk = (-1, b"")
+        self._chunks.clear()
+        self._kept_bytes = 0
 
     def places(self, channel_ids: Collection[int]) -> list[Place]:
         """Where the messages of some channels lie, in the order of log time."""
@@ -134,11 +139,7 @@ class BagFile(LogFile):
             raise DamagedMessageError(f"damaged ({error})") from error
 
     def _payload(self, place: Place) -> memoryview:
-        if self._chunk[0] != place.record:
-            head = read_head(self._stream, place.record)
-            records = chunk_data(self._stream, head, self.limits.chunk_max_bytes)
-            self._chunk = (place.record, bytes(records))
-        records = self._chunk[1]
+        records = self._records(place.record)
         stream = BytesIO(records)
         head = read_head(stream, place.offset)
         while head.op == CONNECTION:  # may stand before its first message
@@ -153,6 +154,19 @@ class BagFile(LogFile):
         if len(data) != head.data_length:
             raise EOFError("it ends within the message")
         return data
+
+    def _records(self, begin: int) -> bytes:
+        """Uncompressed records of the chunk at a file offset."""
+        if begin in self._chunks:
+            self._chunks.move_to_end(begin)
+            return self._chunks[begin]
+        head = read_head(self._stream, begin)
+        records = bytes(chunk_data(self._stream, head, self.limits.chunk_max_bytes))
+        self._kept_bytes += len(records)
+        while self._chunks and self._kept_bytes > _CHUNKS_KEPT_BYTES:
+            self._kept_bytes -= len(self._chunks.popitem(last=False)[1])
+        self._chunks[begin] = records
+        return records
 
     def messages(self, channel_ids: Collection[int] | None = None) -> Iterator[StoredMessage]:
         """Yield every message that is whole, of some channels or of all, by log time."""

@@ -176,7 +176,10 @@ def _open_storage(
     scratch = tempfile.TemporaryDirectory(prefix="rose2_logs_") if any(map(_is_packed, files)) else None
     try:
         if scratch is not None:
-            files = [_decompressed(file, Path(scratch.name)) if _is_packed(file) else file for file in files]
+            files = [
+                _decompressed(file, Path(scratch.name, str(number))) if _is_packed(file) else file
+                for number, file in enumerate(files)
+            ]
         return FileLog(
             log,
             files,
@@ -331,6 +334,8 @@ def _decompressed(file: Path, directory: Path) -> Path:
 
     from rose2_logs.readers.decompression import TooLargeError, decompress_file
 
+    # A folder of its own: files of one name may come from several places.
+    directory.mkdir()
     target = directory / file.stem
     try:
         decompress_file(file, target, max(shutil.disk_usage(directory).free - DISK_LEFT_BYTES, 0))

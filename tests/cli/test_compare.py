@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 from PIL import Image
 from saved_maps import FREE, UNKNOWN, WALL, save_map
 
+from rose2_logs.comparing import FILES
+
 BIN = Path(sys.executable).parent
 
 
@@ -105,3 +107,13 @@ def test_what_cannot_be_compared_is_told_in_a_line(cli, results, tmp_path: Path)
     code, _, err = cli("compare", *results, "-o", tmp_path / "out", "--no-rrd")
     assert (code, "--overwrite" in err) == (2, True)
     assert cli("compare", *results, "-o", tmp_path / "out", "--no-rrd", "--overwrite")[0] == 0
+
+
+def test_a_comparison_that_replaces_one_leaves_nothing_of_it(cli, results, tmp_path: Path):
+    """Its recording would be taken for that of the new one."""
+    out = tmp_path / "out"
+    assert cli("compare", *results, "-o", out)[0] == 0
+    assert (out / "comparison.rrd").exists()
+    code, said, _ = cli("compare", *results[::-1], "-o", out, "--no-rrd", "--overwrite")
+    assert (code, "comparison.rrd" in said) == (0, False)
+    assert sorted(file.name for file in out.iterdir()) == sorted(FILES[:-1])

@@ -33,6 +33,7 @@ from test_messages import SCHEMA, foxglove_message
 
 from rose2_logs.errors import InvalidMapError, LogError, NoMapTopicError
 from rose2_logs.notices import StrictError, gathered
+from rose2_logs.parameters import ReadingParameters
 from rose2_logs.readers import Selection, inspect_log, open_log
 
 needs_shared = pytest.mark.skipif(
@@ -316,6 +317,58 @@ def test_several_files_are_read_as_one_log(tmp_path):
     assert_are(read(files), growing_maps())
     with pytest.raises(LogError, match="different kinds"):
         open_log([tmp_path / "part0.mcap", tmp_path / "part1.bag"])
+
+
+def test_compressed_files_of_one_name_from_several_folders_are_several_files(tmp_path):
+    log = run_of_maps()
+    files = []
+    for k, half in enumerate((log[:6], log[6:])):
+        bag = write_rosbag2(tmp_path / str(k) / "run", half, compression="FILE")
+        files.append(bag / "run.db3.zstd")
+    assert_are(read(files), growing_maps())
+
+
+def test_each_chunk_of_a_bag_written_topic_by_topic_is_decompressed_once(tmp_path, monkeypatch):
+    """Its chunks overlap in time throughout; as many decompressions as messages take hours for a long bag."""
+    from rose2_logs.readers import bag_index
+
+    bag = write_bag(tmp_path / "run.bag", written_topic_by_topic(), compression="LZ4", chunk_bytes=2**14)
+    begins = []
+    chunk_data = bag_index.chunk_data
+
+    def counted(stream, head, most_bytes):
+        begins.append(head.begin)
+        return chunk_data(stream, head, most_bytes)
+
+    monkeypatch.setattr(bag_index, "chunk_data", counted)
+    file = bag_index.BagFile(bag, ReadingParameters())
+    with contextlib.closing(file):
+        times = [message.log_time_ns for message in file.messages()]
+    assert times == sorted(times)
+    assert len(times) == 80
+    assert 4 <= len(begins) == len(set(begins)) < 20
+
+
+def test_no_more_chunks_of_a_bag_are_kept_than_their_size_allows(tmp_path, monkeypatch):
+    from rose2_logs.readers import bag_index
+
+    monkeypatch.setattr(bag_index, "_CHUNKS_KEPT_BYTES", 2**15)
+    bag = write_bag(tmp_path / "run.bag", written_topic_by_topic(), chunk_bytes=2**14)
+    file = bag_index.BagFile(bag, ReadingParameters())
+    with contextlib.closing(file):
+        for _ in file.messages():
+            kept = [len(records) for records in file._chunks.values()]
+            assert file._kept_bytes == sum(kept)
+            assert len(kept) == 1 or sum(kept) <= 2**15
+
+
+def written_topic_by_topic():
+    """Two topics of texts of a kilobyte whose times interlace, one topic after the other."""
+    return [
+        (topic, START_NS + k * 10**9 + late, Text(f"{topic}{k}" * 200))
+        for topic, late in (("/one", 0), ("/two", 10**8))
+        for k in range(40)
+    ]
 
 
 @pytest.mark.parametrize("storage", ["SQLITE3", "MCAP"])
