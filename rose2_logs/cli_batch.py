@@ -42,7 +42,7 @@ def batch(
     logs: Annotated[
         list[str],
         typer.Argument(
-            metavar="LOG...",
+            metavar="LOG",
             help="Logs, folders at any depth, quoted patterns, URLs (s3://, https:// ..) of these.",
         ),
     ],

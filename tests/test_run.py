@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from finished_runs import SAMPLE_LOGS
 from saved_maps import FREE, WALL, save_map, save_run, two_rooms
 
 from rose2_logs.errors import LogError, OutputError, ParameterError
@@ -18,7 +19,6 @@ from rose2_logs.provenance import fingerprint, log_files
 from rose2_logs.readers import Selection
 from rose2_logs.run import TABLES, RunOptions, analyse_log, log_stem, seconds_into_log
 
-SAMPLE_LOGS = Path(__file__).parents[1] / "sample_logs"
 SHARED_BAGS = Path(__file__).parents[2] / "shared" / "bags"
 TABLES_ONLY = RunOptions(recording=False, annotated_log=False)
 

@@ -72,7 +72,9 @@ class RunResults:
         path = folder / SUMMARY
         if not path.is_file():
             several = folder.is_dir() and any(folder.rglob(SUMMARY))
-            hint = "give the folder of one log below it" if several else "give one that analyze has written"
+            hint = (
+                "give the folder of one log below it" if several else "give a folder that analyze has written"
+            )
             raise LogError(f"{folder}: holds no {SUMMARY}; {hint}")
         try:
             summary = json.loads(path.read_text(encoding="utf-8"))

@@ -349,17 +349,25 @@ def test_each_chunk_of_a_bag_written_topic_by_topic_is_decompressed_once(tmp_pat
     assert 4 <= len(begins) == len(set(begins)) < 20
 
 
-def test_no_more_chunks_of_a_bag_are_kept_than_their_size_allows(tmp_path, monkeypatch):
-    from rose2_logs.readers import bag_index
+def test_no_more_chunks_of_a_bag_are_kept_than_their_size_allows():
+    """The latest always is; the one that was not asked for the longest goes first."""
+    from rose2_logs.readers.bag_index import _Chunks
 
-    monkeypatch.setattr(bag_index, "_CHUNKS_KEPT_BYTES", 2**15)
-    bag = write_bag(tmp_path / "run.bag", written_topic_by_topic(), chunk_bytes=2**14)
-    file = bag_index.BagFile(bag, ReadingParameters())
-    with contextlib.closing(file):
-        for _ in file.messages():
-            kept = [len(records) for records in file._chunks.values()]
-            assert file._kept_bytes == sum(kept)
-            assert len(kept) == 1 or sum(kept) <= 2**15
+    read = []
+
+    def chunk(begin):
+        read.append(begin)
+        return bytes(begin)
+
+    chunks = _Chunks(chunk, 10)
+    for begin in (4, 5, 4, 6, 4, 5, 20, 20, 4):
+        assert len(chunks.records(begin)) == begin
+    assert read == [4, 5, 6, 5, 20, 4]
+    one = _Chunks(chunk, 0)
+    read.clear()
+    for begin in (4, 4, 5, 4):
+        one.records(begin)
+    assert read == [4, 5, 4]
 
 
 def written_topic_by_topic():
@@ -399,6 +407,41 @@ def test_a_ros2_bag_whose_recorder_died_before_writing_metadata_is_read_all_the_
     bag = write_rosbag2(tmp_path / "run", run_of_maps(), storage)
     (bag / "metadata.yaml").unlink()
     assert_are(read(bag), growing_maps())
+
+
+def test_a_folder_of_several_logs_is_not_taken_for_one_without_a_word(tmp_path):
+    """As a bag without its description they may be one; unlike one, they are likely several."""
+    log = run_of_maps()
+    (tmp_path / "run").mkdir()
+    one = write_mcap(tmp_path / "run" / "run_0.mcap", log[:6])
+    two = write_mcap(tmp_path / "run" / "run_1.mcap", log[6:])
+    with gathered() as notices:
+        assert_are(read(one.parent), growing_maps())
+    assert not notices.kinds
+    two.rename(two.with_name("another.mcap"))
+    with gathered() as notices:
+        assert_are(read(one.parent), growing_maps())
+    assert "2 files from another.mcap on" in notices.kinds["files_as_one"].first[0]["message"]
+    write_bag(one.with_name("third.bag"), log)
+    (one.parent / "another.mcap").unlink()
+    with gathered() as notices:
+        assert_are(read(one.parent), growing_maps()[:3])
+    assert (
+        "its run_0.mcap is read as one log, third.bag left out"
+        in (notices.kinds["files_as_one"].first[0]["message"])
+    )
+
+
+def test_an_annotated_copy_beside_a_log_is_no_part_of_it(tmp_path):
+    log = run_of_maps()
+    (tmp_path / "run").mkdir()
+    write_mcap(tmp_path / "run" / "run_0.mcap", log[:6])
+    write_mcap(tmp_path / "run" / "run_0.rose2.mcap", log)
+    with gathered() as notices:
+        assert_are(read(tmp_path / "run"), growing_maps()[:3])
+    assert not notices.kinds
+    (tmp_path / "run" / "run_0.mcap").unlink()
+    assert_are(read(tmp_path / "run"), growing_maps())
 
 
 def test_the_topic_is_the_one_asked_for_else_map_else_the_only_one(tmp_path):
