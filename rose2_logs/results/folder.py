@@ -71,10 +71,8 @@ class RunResults:
         self.folder = folder
         path = folder / SUMMARY
         if not path.is_file():
-            several = folder.is_dir() and any(folder.rglob(SUMMARY))
-            hint = (
-                "give the folder of one log below it" if several else "give a folder that analyze has written"
-            )
+            below = min((found.parent for found in folder.rglob(SUMMARY)), default=None)
+            hint = f"did you mean {below}?" if below else "analyze writes such a folder for each log"
             raise LogError(f"{folder}: holds no {SUMMARY}; {hint}")
         try:
             summary = json.loads(path.read_text(encoding="utf-8"))

@@ -100,7 +100,7 @@ def test_without_the_annotated_log_the_map_comes_from_the_log(cli, results, tmp_
 def test_what_cannot_be_compared_is_told_in_a_line(cli, results, tmp_path: Path):
     """No results, the folder above them, an earlier comparison."""
     code, _, err = cli("compare", tmp_path / "nowhere", results[1], "-o", tmp_path / "out")
-    assert (code, "holds no results of analyze" in err) == (2, True)
+    assert (code, "holds no summary.json; analyze writes" in err) == (2, True)
     code, _, err = cli("compare", results[0].parent, results[1], "-o", tmp_path / "out")
     assert (code, f"did you mean {results[1]}" in err) == (2, True)
     assert cli("compare", *results, "-o", tmp_path / "out", "--no-rrd")[0] == 0
