@@ -106,7 +106,9 @@ def _everything(
 
 @app.command(epilog="Example: [bold]rose2-logs info run.mcap[/bold]")
 def info(
-    log: Annotated[str, typer.Argument(help="MCAP, ROS 1 bag, ROS 2 bag or map_server map.")],
+    log: Annotated[
+        str, typer.Argument(metavar="LOG", help="MCAP, ROS 1 bag, ROS 2 bag, saved map or folder of such.")
+    ],
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON for scripts.")] = False,
     debug: Debug = False,
 ) -> None:
@@ -123,7 +125,7 @@ def info(
 
 @app.command(epilog="Example: [bold]rose2-logs analyze run.mcap -o results --workers 4[/bold]")
 def analyze(
-    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="One or several logs.")],
+    logs: Annotated[list[Path], typer.Argument(metavar="LOG", help="One or several logs.")],
     out: Annotated[Path, typer.Option("--out", "-o", help="Results go to OUT/<name of the log>/.")],
     topic: Topic = None,
     start: Start = None,
@@ -135,7 +137,9 @@ def analyze(
     method: Method = "rose2",
     config: Config = None,
     settings: Settings = None,
-    live: Annotated[bool, typer.Option("--live", help="Also send to an open Rerun viewer.")] = False,
+    live: Annotated[
+        bool, typer.Option("--live", help="Also show it in a Rerun viewer; one is started if none is open.")
+    ] = False,
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace results of an earlier run.")
     ] = False,
@@ -169,7 +173,7 @@ def analyze(
     failed = False
     for log, name in zip(logs, names, strict=True):
         try:
-            start_ns, end_ns = seconds_into_log(log, start, end)
+            start_ns, end_ns = seconds_into_log(log, start, end, parameters.reading)
             options = RunOptions(
                 topic=topic,
                 selection=Selection(start_ns, end_ns, every, min_change, max_snapshots),
@@ -284,7 +288,15 @@ def segment(
     epilog="Example: [bold]rose2-logs evaluate cases.json --pictures pictures --json figures.json[/bold]"
 )
 def evaluate(
-    cases: Annotated[Path, typer.Argument(metavar="CASES.json", help="Maps with true rooms.")],
+    cases: Annotated[
+        Path,
+        typer.Argument(
+            metavar="CASES.json",
+            help="Maps with true rooms: "
+            '{"cases": \\[{"group", "name", "map", "rooms", "resolution_m"}, ..]}, '
+            "where map and rooms name images of one size.",
+        ),
+    ],
     predictions: Annotated[
         Path | None,
         typer.Option(metavar="DIR", help="Write DIR/<group>/<name>.png label images.", show_default=False),

@@ -32,9 +32,11 @@ BATCH_EXAMPLE = (
     "[bold]rose2-logs batch /data/robots -o /data/results --scheduler tcp://HOST:8786[/bold]\n\n"
     "The same command again goes on where it was stopped, and takes up logs that are new."
 )
+CATALOG_PORT = 51234
+"""Where Rerun's catalog servers listen unless told otherwise."""
 SERVE_EXAMPLE = (
     "Example: [bold]rose2-logs serve results[/bold], then [bold]rose2-logs view "
-    "rerun+http://127.0.0.1:51234[/bold]"
+    f"rerun+http://127.0.0.1:{CATALOG_PORT}[/bold]"
 )
 
 
@@ -42,7 +44,7 @@ def batch(
     logs: Annotated[
         list[str],
         typer.Argument(
-            metavar="LOG...",
+            metavar="LOG",
             help="Logs, folders at any depth, quoted patterns, URLs (s3://, https:// ..) of these.",
         ),
     ],
@@ -127,7 +129,7 @@ def serve(
         str,
         typer.Option(help="Address to listen on; 0.0.0.0 lets other machines in, without a password."),
     ] = "127.0.0.1",
-    port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen on; 0 for any.")] = 51234,
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen on; 0 for any.")] = CATALOG_PORT,
     debug: Debug = False,
 ) -> None:
     """Serve the recordings of all logs as one Rerun catalog, until Ctrl-C."""

@@ -80,11 +80,20 @@ Strict = Annotated[
 ]
 Config = Annotated[
     Path | None,
-    typer.Option(metavar="FILE.toml", help="Parameters, one table per stage.", show_default=False),
+    typer.Option(
+        metavar="FILE.toml",
+        help="Parameters, one table per stage: as in the summary.json of a run.",
+        show_default=False,
+    ),
 ]
 Settings = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="STAGE.NAME=VALUE", help="Change one parameter.", show_default=False),
+    typer.Option(
+        "--set",
+        metavar="STAGE.NAME=VALUE",
+        help="Change one parameter, as in floor_plan.room_min_area_m2=2; may be repeated.",
+        show_default=False,
+    ),
 ]
 
 

@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import shapely
 
-from rose2_logs.errors import LogError, OutputError, ParameterError
+from rose2_logs.errors import LogError, ParameterError
+from rose2_logs.files import refuse_existing, writing
 from rose2_logs.layouts.comparison import LayoutComparison, compare_layouts
 from rose2_logs.layouts.layout import FinalLayout
 from rose2_logs.layouts.placing import PlacedMap
 from rose2_logs.occupancy import OccupancySnapshot
-from rose2_logs.parameters import Parameters
+from rose2_logs.parameters import Parameters, ReadingParameters
 from rose2_logs.pipeline import analyse
 from rose2_logs.readers import Selection, open_log
+from rose2_logs.results.folder import RunResults
 from rose2_logs.run import SUMMARY
 
-ANNOTATED_ENDING = ".rose2.mcap"
 FILES = (
     "room_changes.parquet",
     "wall_changes.parquet",
@@ -67,10 +66,8 @@ def compare_runs(
     from rose2_logs.sinks.layout_picture import draw_layout_comparison
     from rose2_logs.sinks.layout_tables import write_comparison_summary, write_comparison_tables
 
-    names = FILES if recording else FILES[:-1]
-    files = tuple(folder / name for name in names)
-    if not overwrite and (existing := [file for file in files if file.exists()]):
-        raise OutputError(f"{existing[0]}: exists already; choose another folder or pass --overwrite")
+    files = tuple(folder / name for name in FILES)
+    refuse_existing(files, overwrite=overwrite)
     name_a, name_b = _names(folder_a, folder_b)
     a, b = read_final_layout(folder_a, name_a), read_final_layout(folder_b, name_b)
     comparison = compare_layouts(a, b)
@@ -84,7 +81,10 @@ def compare_runs(
         from rose2_logs.sinks.rerun_comparison import write_comparison_recording
 
         write_comparison_recording(files[4], comparison)
-    return ComparisonResult(comparison, folder, files)
+        return ComparisonResult(comparison, folder, files)
+    with writing(files[4]):
+        files[4].unlink(missing_ok=True)  # of the comparison that this one replaces
+    return ComparisonResult(comparison, folder, files[:-1])
 
 
 def _names(folder_a: Path, folder_b: Path) -> tuple[str, str]:
@@ -108,26 +108,24 @@ def read_final_layout(folder: Path, name: str | None = None) -> FinalLayout:
     LogError
         If there are no results, or the map is not to be found or is another one.
     """
-    summary = _summary(folder)
+    results = RunResults(folder)
+    summary = results.summary
     try:
         parameters = Parameters().replaced(summary["parameters"])
         last_ns, method = int(summary["results"]["last_log_time_ns"]), str(summary["method"])
-        topic, log = str(summary["topic"]), str(summary["log"])
-        names = [str(name) for name in summary["files"]]
     except (KeyError, TypeError, ValueError, ParameterError) as error:
         raise LogError(
             f"{folder / SUMMARY}: is of another version ({error}); analyze the log again"
         ) from error
-    last, rooms = _last_rows(folder)
-    annotated = [folder / name for name in names if name.endswith(ANNOTATED_ENDING)]
-    snapshot = _last_map(
-        folder, next((path for path in annotated if path.is_file()), None), log, topic, last_ns
-    )
+    last = results.choose()
+    rooms = results.table("rooms", ["track", "area_m2", "polygon_wkb"], last).to_pylist()
+    snapshot = _last_map(results, last_ns, parameters.reading)
     analysis = analyse(snapshot, parameters, method)
-    if not np.isclose(analysis.free_area_m2, last["free_area_m2"]):
+    if not np.isclose(analysis.free_area_m2, results.row(last)["free_area_m2"]):
+        log = summary["log"]
         raise LogError(f"{folder}: {log} does not hold the map that the results are of; analyze it again")
     return FinalLayout(
-        name=name or folder.resolve().name,
+        name=name or results.name,
         map=PlacedMap(snapshot, parameters.occupancy),
         tracks=tuple(row["track"] for row in rooms),
         shapes=tuple(shapely.from_wkb([row["polygon_wkb"] for row in rooms])),
@@ -136,45 +134,16 @@ def read_final_layout(folder: Path, name: str | None = None) -> FinalLayout:
     )
 
 
-def _summary(folder: Path) -> dict[str, Any]:
-    path = folder / SUMMARY
-    if not path.is_file():
-        inside = sorted(found.parent for found in folder.glob(f"*/{SUMMARY}")) if folder.is_dir() else []
-        hint = f"; did you mean {inside[0]}?" if inside else "; analyze writes such a folder for each log"
-        raise LogError(f"{folder}: holds no results of analyze{hint}")
+def _last_map(results: RunResults, last_ns: int, limits: ReadingParameters) -> OccupancySnapshot:
+    topic, log, annotated = str(results.summary["topic"]), str(results.summary["log"]), results.annotated_log
+    selection = Selection(last_ns, last_ns)
     try:
-        summary = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise LogError(f"{path}: cannot be read: {error}") from error
-    if not isinstance(summary, dict):
-        raise LogError(f"{path}: is no summary of analyze")
-    return summary
-
-
-def _last_rows(folder: Path) -> tuple[dict[str, Any], list[dict[str, Any]]]:
-    """Rows of the last snapshot and of its rooms."""
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    try:
-        snapshots = pq.read_table(folder / "snapshots.parquet", columns=["snapshot", "free_area_m2"])
-        last = snapshots.slice(snapshots.num_rows - 1).to_pylist()[0]
-        columns = ["track", "area_m2", "polygon_wkb"]
-        chosen = [("snapshot", "=", last["snapshot"])]
-        rooms = pq.read_table(folder / "rooms.parquet", columns=columns, filters=chosen).to_pylist()
-    except (OSError, pa.ArrowException, IndexError) as error:
-        raise LogError(f"{folder}: its tables cannot be read: {error}") from error
-    return last, rooms
-
-
-def _last_map(folder: Path, annotated: Path | None, log: str, topic: str, last_ns: int) -> OccupancySnapshot:
-    try:
-        with open_log(annotated or log, topic=topic, selection=Selection(last_ns, last_ns)) as reader:
+        with open_log(annotated or log, topic=topic, selection=selection, limits=limits) as reader:
             return reader.last()
     except LogError as error:
         if annotated is not None:
             raise
         raise LogError(
-            f"{folder}: holds no annotated MCAP, and the last map cannot be read from the log ({error}); "
-            "analyze it again without --no-mcap"
+            f"{results.folder}: holds no annotated MCAP, and the last map cannot be read from the log "
+            f"({error}); analyze it again without --no-mcap"
         ) from error

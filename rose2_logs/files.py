@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from rose2_logs.errors import OutputError
@@ -95,5 +95,7 @@ def locked(path: Path, refusal: str) -> Iterator[None]:
     try:
         yield
     finally:
-        path.unlink(missing_ok=True)
+        # Windows lets nothing remove a file that is open: there the lock itself does, once it is released.
+        with suppress(OSError):
+            path.unlink()
         lock.release()

@@ -31,7 +31,8 @@ class OutputFolder:
     """Where the results of a run are made and where they come to stand.
 
     A folder that is not there appears with all results in it, by one renaming. Into one that is there the
-    files are moved one after the other, the summary last: as long as it is missing they are not whole.
+    files are moved one after the other, the summary last: as long as it is missing they are not whole. What
+    an earlier run has written there besides, as its recording where this one makes none, goes.
 
     Parameters
     ----------
@@ -51,6 +52,7 @@ class OutputFolder:
         self.files = tuple(folder / name for name in names)
         self._folder = folder
         self._place = folder.resolve()
+        self._sources: tuple[Path, ...] = ()
         # Files can be renamed within a file system only.
         base = self._place if self._place.is_mount() else self._place.parent
         self._work, self._journal, self._lock = (
@@ -65,8 +67,9 @@ class OutputFolder:
         OutputError
             If a result is one of the log's files, also by another name, or would stand among them.
         """
+        self._sources = log_files(log)
         for file in self.files:
-            for source in log_files(log):
+            for source in self._sources:
                 if file.exists() and source.exists() and file.samefile(source):
                     raise OutputError(f"{file}: is a file of the log itself; choose another folder")
         if log.is_dir() and self._place.is_relative_to(log.resolve()):
@@ -164,11 +167,27 @@ class OutputFolder:
             if not self._place.exists():
                 self._work.rename(self._place)
             else:
+                for file in self._left_over():
+                    file.unlink(missing_ok=True)
                 (self._place / self._names[-1]).unlink(missing_ok=True)
                 for name in self._names:
                     (self._work / name).replace(self._place / name)
         _sync(self._place)
         _sync(self._place.parent)
+
+    def _left_over(self) -> list[Path]:
+        """Results that only the earlier run has made, by its summary: they would pass for this one's."""
+        try:
+            earlier = json.loads((self._place / self._names[-1]).read_text(encoding="utf-8"))["files"]
+            names = {str(name) for name in earlier}.difference(self._names)
+        except (OSError, ValueError, KeyError, TypeError):
+            return []
+        files = [self._place / name for name in sorted(names) if Path(name).name == name]
+        return [
+            file
+            for file in files
+            if file.is_file() and not any(file.samefile(each) for each in self._sources if each.exists())
+        ]
 
     def _clean_up(self, kept_maps: int = 0) -> None:
         shutil.rmtree(self._work, ignore_errors=True)

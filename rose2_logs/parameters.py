@@ -313,7 +313,8 @@ def load_parameters(config: Path | None = None, settings: Iterable[str] = ()) ->
     config : path, optional
         TOML file with one table per block.
     settings : iterable of str
-        ``block.name=value`` with the value written as in TOML; they win over the file.
+        ``block.name=value`` with the value written as in TOML, a name also without quotes, which shells take
+        away; they win over the file.
 
     Raises
     ------
@@ -328,13 +329,23 @@ def load_parameters(config: Path | None = None, settings: Iterable[str] = ()) ->
             raise ParameterError(f"{config}: cannot be read as TOML: {error}") from error
     for setting in settings:
         try:
-            parsed = tomllib.loads(setting)
+            parsed = _parsed_setting(setting)
         except tomllib.TOMLDecodeError as error:
             raise ParameterError(f"--set {setting!r}: write it as block.name=value") from error
         if not all(isinstance(values, Mapping) for values in parsed.values()):
             raise ParameterError(f"--set {setting!r}: write it as block.name=value")
         parameters = parameters.replaced(parsed)
     return parameters
+
+
+def _parsed_setting(setting: str) -> dict[str, Any]:
+    try:
+        return tomllib.loads(setting)
+    except tomllib.TOMLDecodeError:
+        name, sign, value = setting.partition("=")
+        if not sign or not value.strip().isidentifier():
+            raise
+        return tomllib.loads(f'{name}="{value.strip()}"')
 
 
 def describe_parameters() -> list[dict[str, Any]]:

@@ -1,111 +1,52 @@
-"""One run: reader -> workers -> tracker -> sinks, as one stream."""
+"""One run: a log to a folder of results, what is found in its maps going to all sinks as it comes."""
 
 from __future__ import annotations
 
 import dataclasses
+import glob
 import logging
 import time
-import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 from typing import Any
 
-from rose2_logs.errors import InvalidMapError
-from rose2_logs.explored import coarser_for_its_size
+from rose2_logs.errors import InvalidMapError, ParameterError
 from rose2_logs.files import refuse_existing
-from rose2_logs.journal import Found, JournaledWorkers
-from rose2_logs.notices import Notices, gathered, muted, notice
-from rose2_logs.occupancy import OccupancySnapshot, free_area_m2, is_same_to_analysis
+from rose2_logs.journal import JournaledWorkers
+from rose2_logs.notices import Notices, gathered, muted
 from rose2_logs.output_folder import OutputFolder
-from rose2_logs.parameters import Parameters
-from rose2_logs.pipeline import analyse
+from rose2_logs.parameters import ReadingParameters
 from rose2_logs.provenance import fingerprint, software_versions
-from rose2_logs.readers import Selection, inspect_log, open_log
+from rose2_logs.readers import inspect_log, open_log
 from rose2_logs.readers.discovery import stem_of
 from rose2_logs.readers.log import LogReader
-from rose2_logs.readers.poses import RobotPath
-from rose2_logs.room_evidence import room_evidence
-from rose2_logs.sinks.sink import RECORDING_LAYERS, CopyingSink, RunInfo, Sink
+from rose2_logs.readers.log_file import LATEST_NS
+from rose2_logs.run_options import NOT_IN_JOURNAL, RunOptions
+from rose2_logs.sinks.sink import CopyingSink, RunInfo, Sink
 from rose2_logs.sinks.summary import RunTotals, write_summary
 from rose2_logs.sinks.tables import Tables
 from rose2_logs.sinks.viewer_layouts import bag_metadata_path, foxglove_path, rviz_path
-from rose2_logs.tracking.frames import TrackedSnapshot, map_motion
-from rose2_logs.tracking.layout_change import LayoutFollower
+from rose2_logs.tracked_stream import SnapshotWorkers, start_workers, tracked_snapshots
+from rose2_logs.tracking.frames import TrackedSnapshot
 from rose2_logs.tracking.lives import Moment
-from rose2_logs.tracking.tracker import RoomTracker
-from rose2_logs.workers import Workers
+
+__all__ = [
+    "SUMMARY",
+    "TABLES",
+    "OnSnapshot",
+    "RunOptions",
+    "RunResult",
+    "analyse_log",
+    "log_stem",
+    "seconds_into_log",
+]
 
 logger = logging.getLogger(__name__)
 
 TABLES = ("snapshots", "rooms", "tracks", "events", "doorways")
 SUMMARY = "summary.json"
-NOT_IN_JOURNAL = (
-    *("topic", "selection", "parameters", "workers", "recording", "layers", "annotated_log", "bag"),
-    *("live", "origin", "overwrite", "resume", "journal", "strict"),
-)
-"""Options that the analysis does not depend on, or that a journal names otherwise."""
-
-
-@dataclass(frozen=True)
-class RunOptions:
-    """What to take from a log, what to do with it, what to write.
-
-    Attributes
-    ----------
-    topic : str, optional
-        The map topic; by default ``/map``, else the only one.
-    selection : Selection
-        Which maps.
-    parameters : Parameters
-        Of all stages.
-    method : str
-        The segmentation method.
-    workers : int
-        Processes; results do not depend on it. A script that asks for several does so under
-        ``if __name__ == "__main__"``, as each of them imports it.
-    recording, annotated_log : bool
-        Whether to write the Rerun recording and the annotated MCAP. The tables are always written.
-    bag : bool
-        Whether the folder becomes a bag of ROS 2 that holds the annotated MCAP.
-    layers : tuple of str
-        Those of `RECORDING_LAYERS` that the recording gets.
-    live : bool
-        Also send the recording to an open Rerun viewer.
-    overwrite : bool
-        Whether results of an earlier run may be replaced.
-    resume : bool
-        Whether to go on where a run of the same log and parameters was stopped; without one, begin anew.
-    journal : bool
-        Whether to keep what is found on the way beside the folder, so that a run that is stopped can go on.
-    origin : str, optional
-        What the summary names as the log; by default its path. For a log that was copied to be read.
-    strict : bool
-        Whether the first warning about the log is an error.
-    """
-
-    topic: str | None = None
-    selection: Selection = field(default_factory=Selection)
-    parameters: Parameters = field(default_factory=Parameters)
-    method: str = "rose2"
-    workers: int = 1
-    recording: bool = True
-    annotated_log: bool = True
-    bag: bool = False
-    layers: tuple[str, ...] = RECORDING_LAYERS
-    live: bool = False
-    overwrite: bool = False
-    resume: bool = False
-    journal: bool = True
-    origin: str | None = None
-    strict: bool = False
-
-    @property
-    def shown_layers(self) -> tuple[str, ...]:
-        """The layers that a recording, stored or live, is going to show."""
-        return self.layers if self.recording or self.live else ()
 
 
 @dataclass(frozen=True)
@@ -120,7 +61,6 @@ class RunResult:
     warnings: Notices = field(default_factory=Notices)
 
 
-SnapshotWorkers = Workers[OccupancySnapshot, Found]
 OnSnapshot = Callable[[TrackedSnapshot, float], None]
 """Told of each finished snapshot and of the share, in [0, 1], of the log's time that is done."""
 
@@ -128,22 +68,29 @@ OnSnapshot = Callable[[TrackedSnapshot, float], None]
 def log_stem(path: Path) -> str:
     """Name for the results of a log: its name without its format's ending; of a pattern, its folder's."""
     path = path.resolve()
-    is_pattern = any(sign in path.name for sign in "*?[")
+    is_pattern = glob.has_magic(path.name) and not path.exists()
     return stem_of(path.parent.name if is_pattern else path.name)
 
 
-def seconds_into_log(path: Path, start_s: float | None, end_s: float | None) -> tuple[int | None, int | None]:
+def seconds_into_log(
+    path: Path, start_s: float | None, end_s: float | None, limits: ReadingParameters
+) -> tuple[int | None, int | None]:
     """Convert seconds since a log's first message to log times in nanoseconds; None stays None.
 
     Raises
     ------
     LogError
         If the log cannot be opened.
+    ParameterError
+        If a time is no number that a log can hold.
     """
+    for seconds in (start_s, end_s):
+        if seconds is not None and not abs(seconds) <= LATEST_NS / 1e9:
+            raise ParameterError(f"{seconds:g} is no number of seconds into a log")
     if start_s is None and end_s is None:
         return None, None
     with muted():  # what is odd is told when the log is analysed
-        first_ns = inspect_log(path).start_ns or 0
+        first_ns = inspect_log(path, limits).start_ns or 0
     start_ns = None if start_s is None else first_ns + round(start_s * 1e9)
     return start_ns, None if end_s is None else first_ns + round(end_s * 1e9)
 
@@ -267,84 +214,6 @@ def _analyse(
     layout_final = None if tables.hindsight is None else tables.hindsight.layout_final
     written = (*files.values(), planned["summary"])
     return RunResult(folder, written, totals, seconds, layout_final, warnings)
-
-
-def start_workers(options: RunOptions) -> SnapshotWorkers:
-    """Return what analyses snapshots: a context manager, to be entered as early as possible."""
-    work = partial(
-        _analyse_or_refuse,
-        parameters=options.parameters,
-        method=options.method,
-        voronoi="voronoi" in options.shown_layers,
-    )
-    return Workers(work, options.workers)
-
-
-def tracked_snapshots(
-    reader: LogReader,
-    last: OccupancySnapshot,
-    workers: SnapshotWorkers | JournaledWorkers,
-    parameters: Parameters,
-    totals: RunTotals,
-    path: RobotPath | None = None,
-) -> Iterator[TrackedSnapshot]:
-    """Yield every map of a log with its rooms and their identity.
-
-    Parameters
-    ----------
-    reader : LogReader
-        The log.
-    last : OccupancySnapshot
-        The last map of the run, which coverage refers to.
-    workers : Workers
-        What analyses the maps, started.
-    parameters : Parameters
-        Those that it was started with.
-    totals : RunTotals
-        Maps that cannot be analysed are left out and counted as invalid here.
-    path : RobotPath, optional
-        Where the robot was, to be told with the maps.
-    """
-    final_free_m2 = free_area_m2(last, parameters.occupancy)
-    tracker = RoomTracker(parameters.tracking, parameters.occupancy)
-    layout = LayoutFollower()
-    said = False
-    is_same = partial(is_same_to_analysis, parameters=parameters.occupancy)
-    for snapshot, found in workers.map(reader.snapshots(), is_same):
-        if isinstance(found, InvalidMapError):
-            totals.invalid += 1
-            text = f"{reader.info.path}: snapshot {snapshot.index} is left out: {found}"
-            notice(logger, "snapshot_left_out", text, file=reader.info.path, topic=reader.topic)
-            continue
-        analysis, evidence = found
-        note = coarser_for_its_size(snapshot.geometry, analysis.resolution_m, parameters.occupancy)
-        if note is not None and not said:
-            logger.warning("snapshot %d and those of its size: %s", snapshot.index, note)
-            said = True
-        if analysis.index != snapshot.index:
-            analysis = analysis.again_for(snapshot)
-            totals.unchanged += 1
-        track_ids, events = tracker.update(snapshot, analysis)
-        change = layout.update(analysis.rooms, track_ids, map_motion(events))
-        coverage = min(analysis.free_area_m2 / final_free_m2, 1.0) if final_free_m2 > 0 else 0.0
-        way = None if path is None else path.until(snapshot.log_time_ns)
-        yield TrackedSnapshot(snapshot, analysis, coverage, track_ids, events, evidence, change, way)
-
-
-def _analyse_or_refuse(
-    snapshot: OccupancySnapshot, parameters: Parameters, method: str, voronoi: bool
-) -> Found:
-    try:
-        analysis = analyse(snapshot, parameters, method, voronoi=voronoi)
-        return analysis, room_evidence(snapshot, analysis.rooms, parameters.occupancy)
-    except InvalidMapError as error:
-        return error
-    except MemoryError:
-        raise
-    except Exception as error:  # a map that the method stumbles over does not cost the others of the run
-        at = traceback.extract_tb(error.__traceback__)[-1]
-        where = f"{Path(at.filename).name}:{at.lineno}"
-        return InvalidMapError(f"{type(error).__name__}: {error} ({where}, a fault of rose2-logs)")
 
 
 def _run_info(path: Path, reader: LogReader, options: RunOptions) -> RunInfo:

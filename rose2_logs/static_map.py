@@ -21,6 +21,7 @@ from rose2_logs.parameters import Parameters, ReadingParameters
 from rose2_logs.pipeline import analyse
 from rose2_logs.readers import open_log
 from rose2_logs.readers.discovery import IMAGE_ENDINGS
+from rose2_logs.readers.map_files import MapFilesSource
 from rose2_logs.readers.opening import DEFAULT_LIMITS
 from rose2_logs.room_evidence import room_evidence
 from rose2_logs.room_plan import plan_of_analysis
@@ -99,7 +100,13 @@ def segment_map(
 def read_static_map(
     map_file: Path, resolution_m: float | None = None, limits: ReadingParameters = DEFAULT_LIMITS
 ) -> OccupancySnapshot:
-    """Read a saved map; an image without a ``.yaml`` needs its resolution."""
+    """Read a saved map; an image without a ``.yaml`` needs its resolution.
+
+    Raises
+    ------
+    LogError, InvalidMapError, ParameterError
+        If it cannot be read, is a log, or its resolution is neither given nor written beside it.
+    """
     if not map_file.is_file():
         raise LogError(f"{map_file}: there is no such file")
     is_bare = map_file.suffix.lower() in IMAGE_ENDINGS and not map_file.with_suffix(".yaml").exists()
@@ -108,6 +115,10 @@ def read_static_map(
     if not is_bare and resolution_m is not None:
         raise ParameterError(f"{map_file}: its .yaml says the resolution; leave --resolution out")
     with _described(map_file, resolution_m) as log, open_log(log, limits=limits) as reader:
+        if not isinstance(reader.source, MapFilesSource):
+            raise LogError(
+                f"{map_file}: is a log, no saved map: rose2-logs analyze finds the rooms of its maps"
+            )
         return reader.first()
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import shapely
 from numpy.typing import NDArray
@@ -55,6 +53,3 @@ def _box(mask: NDArray[np.bool_], geometry: GridGeometry) -> shapely.Polygon:
 def rows(*text: str) -> NDArray[np.int32]:
     """Labels from lines of digits, the first line being row 0; ``.`` is no room."""
     return np.array([[0 if digit == "." else int(digit) for digit in line] for line in text], np.int32)
-
-
-QUARTER_TURN_RAD = math.pi / 2

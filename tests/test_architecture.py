@@ -44,6 +44,8 @@ ORDER = (
     "static_map",
     "provenance",
     "output_folder",
+    "run_options",
+    "tracked_stream",
     "run",
     "results",
     "report",

@@ -10,13 +10,14 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from finished_runs import SAMPLE_LOGS
 from saved_maps import FREE, WALL, save_map, save_run, two_rooms
 
-from rose2_logs.errors import OutputError
+from rose2_logs.errors import LogError, OutputError, ParameterError
 from rose2_logs.parameters import Parameters
 from rose2_logs.provenance import fingerprint, log_files
 from rose2_logs.readers import Selection
-from rose2_logs.run import TABLES, RunOptions, analyse_log, log_stem
+from rose2_logs.run import TABLES, RunOptions, analyse_log, log_stem, seconds_into_log
 
 SHARED_BAGS = Path(__file__).parents[2] / "shared" / "bags"
 TABLES_ONLY = RunOptions(recording=False, annotated_log=False)
@@ -103,7 +104,9 @@ def test_a_map_that_did_not_change_is_not_analysed_again(tmp_path: Path, monkeyp
     assert (result.totals.snapshots, result.totals.unchanged) == (5, 2)
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert summary["results"]["unchanged_maps"] == 2
-    monkeypatch.setattr("rose2_logs.run.is_same_to_analysis", lambda before, now, parameters: False)
+    monkeypatch.setattr(
+        "rose2_logs.tracked_stream.is_same_to_analysis", lambda before, now, parameters: False
+    )
     each = analyse_log(folder, tmp_path / "each", options)
     assert (each.totals.snapshots, each.totals.unchanged) == (5, 0)
     assert table_bytes(tmp_path / "out") == table_bytes(tmp_path / "each")
@@ -152,6 +155,39 @@ def test_names_of_results_come_from_the_log(tmp_path: Path):
     assert log_stem(tmp_path / "run.1.mcap") == "run.1"
     assert log_stem(tmp_path / "fr79.ros2_mcap") == "fr79.ros2_mcap"
     assert log_stem(tmp_path / "maps" / "*.yaml") == "maps"
+
+
+def test_a_log_whose_name_looks_like_a_pattern_gives_its_results_its_own_name(tmp_path: Path):
+    """Two of one folder would otherwise have one name."""
+    for name in ("run[1]", "run[2]"):
+        (tmp_path / f"{name}.mcap").touch()
+        assert log_stem(tmp_path / f"{name}.mcap") == name
+
+
+def test_seconds_into_a_log_are_counted_within_the_limits_of_the_run(tmp_path: Path):
+    """A log without an index is counted when it is opened, also to look when it began."""
+    log = save_run(tmp_path / "maps")
+    few, many = Parameters().reading, dataclasses.replace(Parameters().reading, map_max_messages=2)
+    assert seconds_into_log(log, 1.0, None, few) == (10**9, None)
+    office = cut_off(SAMPLE_LOGS / "office.mcap", tmp_path)
+    with pytest.raises(LogError, match="more than 2 map messages"):
+        seconds_into_log(office, 1.0, None, many)
+    assert seconds_into_log(office, 1.0, None, few)[0] > 0
+
+
+@pytest.mark.parametrize("seconds", [float("nan"), float("inf"), -float("inf"), 1e300])
+def test_seconds_that_are_no_time_are_refused(tmp_path: Path, seconds: float):
+    log = save_run(tmp_path / "maps")
+    for start_s, end_s in ((seconds, None), (None, seconds)):
+        with pytest.raises(ParameterError, match="no number of seconds"):
+            seconds_into_log(log, start_s, end_s, Parameters().reading)
+
+
+def cut_off(log: Path, folder: Path) -> Path:
+    """Copy a log without its end, where its index is."""
+    short = folder / log.name
+    short.write_bytes(log.read_bytes()[:-200])
+    return short
 
 
 def test_the_fingerprint_of_one_file_is_its_sha256(tmp_path: Path):

@@ -115,16 +115,31 @@ def test_a_killed_run_leaves_no_results_and_goes_on_to_the_same(
     assert names(tmp_path) == ["out"]
 
 
-def count_calls(monkeypatch, analysed: list[int]) -> None:
-    from rose2_logs import run
+@pytest.mark.parametrize("is_log", [False, True])
+def test_results_that_only_the_earlier_run_has_made_go_with_it(log: Path, tmp_path: Path, is_log: bool):
+    """A table beside a recording of other parameters would be taken for its own; but no log is removed."""
+    out = tmp_path / "out"
+    analyse_log(log, out, RunOptions(**OPTIONS))
+    before = set(names(out))
+    (out / "notes.txt").write_text("mine")
+    annotated = out / "maps.rose2.mcap"
+    tables = RunOptions(recording=False, annotated_log=False, overwrite=True, topic="/map")
+    analyse_log(annotated if is_log else log, out, tables)
+    kept = {"summary.json", "notes.txt", *(f"{table}.parquet" for table in TABLES)}
+    assert set(names(out)) == kept | ({annotated.name} if is_log else set())
+    assert annotated.name in before - kept
 
-    real = run.analyse
+
+def count_calls(monkeypatch, analysed: list[int]) -> None:
+    from rose2_logs import tracked_stream
+
+    real = tracked_stream.analyse
 
     def analyse(snapshot, *arguments, **options):
         analysed.append(snapshot.index)
         return real(snapshot, *arguments, **options)
 
-    monkeypatch.setattr(run, "analyse", analyse)
+    monkeypatch.setattr(tracked_stream, "analyse", analyse)
 
 
 def test_a_run_killed_after_all_is_in_place_is_whole(log: Path, fresh, tmp_path: Path):

@@ -25,7 +25,7 @@ from rose2_logs.comparing import compare_runs
 from rose2_logs.explored import ExploredPart
 from rose2_logs.floor_plan.stage import make_floor_plan
 from rose2_logs.occupancy import UNKNOWN, BoolArray, FloatArray, OccupancySnapshot, known_window
-from rose2_logs.parameters import Parameters
+from rose2_logs.parameters import Parameters, ReadingParameters
 from rose2_logs.pipeline import SnapshotAnalysis, analyse
 from rose2_logs.readers import Selection, open_log
 from rose2_logs.rose.spectrum import Spectrum, compute_spectrum
@@ -259,7 +259,7 @@ def comparison_picture(log: Path) -> tuple[str, Image]:
     """Compare a run with the same run that ended half way, as `compare` draws it."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        _, end_ns = seconds_into_log(log, None, HALF_WAY_S)
+        _, end_ns = seconds_into_log(log, None, HALF_WAY_S, ReadingParameters())
         for run, selection in (("half", Selection(end_ns=end_ns)), ("whole", Selection())):
             options = RunOptions(selection=selection, recording=False)
             analyse_log(log, folder / run, options)

@@ -231,7 +231,7 @@ def _analyse_local(task: LogTask, path: Path, signature: Signature, report: Repo
             raise OutputError(f"{task.log.address}: has changed since its results; --overwrite replaces them")
     asked = task.settings
     with _attempt_folder(task) as folder:
-        start_ns, end_ns = seconds_into_log(path, asked.start_s, asked.end_s)
+        start_ns, end_ns = seconds_into_log(path, asked.start_s, asked.end_s, asked.parameters.reading)
         options = RunOptions(
             topic=asked.topic,
             selection=Selection(start_ns, end_ns, asked.every_s, asked.min_change_m2, asked.max_snapshots),

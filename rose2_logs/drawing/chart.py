@@ -15,7 +15,6 @@ from rose2_logs.sinks.axes import Axis, axis_of
 WIDTH, HEIGHT = 420.0, 210.0
 LEFT, RIGHT, TOP, BOTTOM = 44.0, 12.0, 10.0, 36.0
 """Space around the axes."""
-FONT = 11.0
 TICK_GAP_MIN = 34.0
 """Marks of the horizontal axis that would stand closer are thinned."""
 POINTS_MAX = 800

@@ -82,9 +82,9 @@ def _area(image: Image.Image, area: Area, scale: float) -> None:
     mask = Image.new("L", (math.ceil(x1) - left + 1, math.ceil(y1) - top + 1))
     draw = ImageDraw.Draw(mask)
     level = round(255 * area.opacity)
-    for part in shapely.get_parts(area.shape):
-        if shapely.get_dimensions(part) != 2:
-            continue
+    parts = [part for part in shapely.get_parts(area.shape) if shapely.get_dimensions(part) == 2]
+    # The largest first: a part may lie in a hole of another, which would be cut out of it.
+    for part in sorted(parts, key=lambda part: -part.envelope.area):
         for number, ring in enumerate(shapely.get_rings(part)):
             points = shapely.get_coordinates(ring) * scale - (left, top)
             draw.polygon([(x, y) for x, y in points.tolist()], level if number == 0 else 0)

@@ -139,5 +139,5 @@ def _read_image(path: Path) -> NDArray[Any]:
     try:
         with Image.open(path) as image:
             return np.asarray(image)
-    except (OSError, UnidentifiedImageError) as error:
+    except (OSError, UnidentifiedImageError, Image.DecompressionBombError) as error:
         raise CasesError(f"{path}: cannot be read as an image: {error}") from error

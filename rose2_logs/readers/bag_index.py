@@ -9,8 +9,8 @@ from __future__ import annotations
 import io
 import logging
 import struct
-from collections import Counter
-from collections.abc import Collection, Iterator
+from collections import Counter, OrderedDict
+from collections.abc import Callable, Collection, Iterator
 from contextlib import suppress
 from io import BytesIO
 from pathlib import Path
@@ -51,6 +51,10 @@ logger = logging.getLogger(__name__)
 _DAMAGE = (ValueError, KeyError, EOFError, struct.error)
 # Messages of a scanned chunk that are put into an array at once: as tuples they take ten times the memory.
 _ENTRIES_AT_ONCE = 65_536
+# Chunks that are kept while messages are read by time, as far as they are no larger together: those of a bag
+# that was written topic by topic come in turns, and each would be decompressed for every message. Those of a
+# recorder have 0.8 MB.
+_CHUNKS_KEPT_BYTES = 16 << 20
 
 
 class BagFile(LogFile):
@@ -71,7 +75,8 @@ class BagFile(LogFile):
     def __init__(self, path: Path, limits: ReadingParameters) -> None:
         self.path = path
         self.limits = limits
-        self._chunk: tuple[int, bytes] = (-1, b"")
+        # Maps are read once each, and one behind the other.
+        self._latest = _Chunks(self._read_chunk, 0)
         try:
             self._stream = io.BufferedReader(CheckedFile(path))
             self._size = path.stat().st_size
@@ -112,7 +117,7 @@ class BagFile(LogFile):
     def close(self) -> None:
         """Close the file."""
         self._stream.close()
-        self._chunk = (-1, b"")
+        self._latest = _Chunks(self._read_chunk, 0)
 
     def places(self, channel_ids: Collection[int]) -> list[Place]:
         """Where the messages of some channels lie, in the order of log time."""
@@ -129,16 +134,16 @@ class BagFile(LogFile):
             If it is not where the index says, or its chunk is damaged.
         """
         try:
-            return self._payload(place)
+            return self._payload(place, self._latest)
         except _DAMAGE as error:
             raise DamagedMessageError(f"damaged ({error})") from error
 
-    def _payload(self, place: Place) -> memoryview:
-        if self._chunk[0] != place.record:
-            head = read_head(self._stream, place.record)
-            records = chunk_data(self._stream, head, self.limits.chunk_max_bytes)
-            self._chunk = (place.record, bytes(records))
-        records = self._chunk[1]
+    def _read_chunk(self, begin: int) -> bytes:
+        head = read_head(self._stream, begin)
+        return bytes(chunk_data(self._stream, head, self.limits.chunk_max_bytes))
+
+    def _payload(self, place: Place, chunks: _Chunks) -> memoryview:
+        records = chunks.records(place.record)
         stream = BytesIO(records)
         head = read_head(stream, place.offset)
         while head.op == CONNECTION:  # may stand before its first message
@@ -157,13 +162,14 @@ class BagFile(LogFile):
     def messages(self, channel_ids: Collection[int] | None = None) -> Iterator[StoredMessage]:
         """Yield every message that is whole, of some channels or of all, by log time."""
         sequence: Counter[int] = Counter()
+        chunks = _Chunks(self._read_chunk, _CHUNKS_KEPT_BYTES)
         index = self._index
         if channel_ids is not None:
             index = index[np.isin(index["connection"], list(channel_ids))]
         for entry in index[np.argsort(index["time"], kind="stable")]:
             place = Place(*entry.item())
             with suppress(*_DAMAGE):
-                data = self._payload(place)
+                data = self._payload(place, chunks)
                 channel, time = self.channels[place.channel_id], place.log_time_ns
                 yield StoredMessage(channel, time, time, sequence[place.channel_id], data)
                 sequence[place.channel_id] += 1
@@ -284,3 +290,29 @@ class BagFile(LogFile):
             raise EOFError("it ends within a record")
         self._stream.seek(head.data_begin)
         return self._stream.read(head.data_length)
+
+
+class _Chunks:
+    """Uncompressed records of chunks by file offset: the latest, and of others as many as may be kept."""
+
+    def __init__(self, read: Callable[[int], bytes], kept_bytes: int) -> None:
+        self._read = read
+        self._most_bytes = kept_bytes
+        self._kept: OrderedDict[int, bytes] = OrderedDict()
+        self._bytes = 0
+
+    def records(self, begin: int) -> bytes:
+        if begin in self._kept:
+            self._kept.move_to_end(begin)
+            return self._kept[begin]
+        if self._bytes > self._most_bytes:
+            self._drop()
+        records = self._read(begin)
+        self._kept[begin] = records
+        self._bytes += len(records)
+        while self._bytes > self._most_bytes and len(self._kept) > 1:
+            self._drop()
+        return records
+
+    def _drop(self) -> None:
+        self._bytes -= len(self._kept.popitem(last=False)[1])

@@ -76,7 +76,7 @@ def is_bag(names: Sequence[str], folder_name: str) -> bool:
     if not stored or BAG_DESCRIPTION in names:
         return bool(stored)
     parts = {f"{folder_name}_{number}" for number in range(len(stored))}
-    return {PurePosixPath(name).stem for name in stored} == parts
+    return {PurePosixPath(name.removesuffix(COMPRESSED_ENDING)).stem for name in stored} == parts
 
 
 def is_storage(name: str) -> bool:

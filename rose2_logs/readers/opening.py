@@ -15,12 +15,15 @@ from rose2_logs.notices import notice
 from rose2_logs.parameters import ReadingParameters
 from rose2_logs.readers.descriptions import load_yaml
 from rose2_logs.readers.discovery import (
+    ANNOTATED_ENDING,
     BAG_DESCRIPTION,
     COMPRESSED_ENDING,
     IMAGE_ENDINGS,
     MAP_ENDINGS,
     STORAGE_ENDINGS,
     ZSTD_MAGIC,
+    is_bag,
+    is_storage,
 )
 from rose2_logs.readers.log import LogReader
 from rose2_logs.readers.selection import Selection
@@ -37,6 +40,8 @@ EVERYTHING = Selection()
 DEFAULT_LIMITS = ReadingParameters()
 DISK_LEFT_BYTES = 1 << 30
 """Of the disk with the temporary folder, left free when a bag is decompressed there."""
+_MOST_NAMED = 3
+"""Files that a warning names."""
 _FORMATS = (
     "an .mcap file, a ROS 1 .bag, a ROS 2 bag directory or .db3, a map_server .yaml or a folder of those"
 )
@@ -176,7 +181,10 @@ def _open_storage(
     scratch = tempfile.TemporaryDirectory(prefix="rose2_logs_") if any(map(_is_packed, files)) else None
     try:
         if scratch is not None:
-            files = [_decompressed(file, Path(scratch.name)) if _is_packed(file) else file for file in files]
+            files = [
+                _decompressed(file, Path(scratch.name, str(number))) if _is_packed(file) else file
+                for number, file in enumerate(files)
+            ]
         return FileLog(
             log,
             files,
@@ -273,6 +281,7 @@ def _open_directory(log: Path, limits: ReadingParameters) -> MessageSource:
     if (log / BAG_DESCRIPTION).exists():
         return _open_files(log, _files_of_bag(log), limits, is_bag=True)
     if files := _stored_in(log):
+        _tell_what_is_one_log(log, files)
         return _open_files(log, files, limits)
     inside = sorted(each for each in log.iterdir() if each.is_file())
     # One with an image of its name is a map even if it cannot be read, which is told then.
@@ -286,13 +295,30 @@ def _open_directory(log: Path, limits: ReadingParameters) -> MessageSource:
 
 
 def _stored_in(log: Path) -> list[Path]:
-    """Files of the first kind of storage that a folder holds."""
+    """Files of the first kind of storage that a folder holds; annotated logs only if there are no others."""
     inside = [each for each in log.iterdir() if each.is_file()]
+    inside = [each for each in inside if not each.name.endswith(ANNOTATED_ENDING)] or inside
     for suffix in STORAGE_ENDINGS:
         endings = (suffix, suffix + COMPRESSED_ENDING)
         if files := [each for each in inside if each.name.lower().endswith(endings)]:
             return _in_natural_order(files)
     return []
+
+
+def _tell_what_is_one_log(log: Path, files: list[Path]) -> None:
+    """Say what is taken for one run where no description says so: it may be several, or not all of it."""
+    names = [file.name for file in files]
+    inside = [each.name for each in log.iterdir() if each.is_file()]
+    stored = {name for name in inside if is_storage(name.removesuffix(COMPRESSED_ENDING))}
+    others = sorted(stored.difference(names))
+    if not others and (len(names) == 1 or is_bag(names, log.resolve().name)):
+        return
+    told = f"{names[0]} is" if len(names) == 1 else f"{len(names)} files from {names[0]} on are"
+    left_out = f", {', '.join(others[:_MOST_NAMED])} left out" if others else ""
+    text = (
+        f"{log}: has no {BAG_DESCRIPTION}; its {told} read as one log{left_out}: name the file that is meant"
+    )
+    notice(logger, "files_as_one", text, file=log)
 
 
 def _files_of_bag(log: Path) -> list[Path]:
@@ -331,6 +357,8 @@ def _decompressed(file: Path, directory: Path) -> Path:
 
     from rose2_logs.readers.decompression import TooLargeError, decompress_file
 
+    # A folder of its own: files of one name may come from several places.
+    directory.mkdir()
     target = directory / file.stem
     try:
         decompress_file(file, target, max(shutil.disk_usage(directory).free - DISK_LEFT_BYTES, 0))

@@ -62,13 +62,19 @@ class Selection:
     def thin(self, times: Times) -> Times:
         """Keep those of the sorted, distinct `times` that `every_s` and `max_snapshots` choose."""
         if self.every_s and len(times):
-            step = max(round(self.every_s * 1e9), 1)
-            chosen = [0]
-            while (later := int(np.searchsorted(times, int(times[chosen[-1]]) + step))) < len(times):
-                chosen.append(later)
-            times = times[chosen]
+            times = times[self._every(times, self.every_s * 1e9)]
         if self.max_snapshots == 1:
             return times[-1:]
         if self.max_snapshots is not None and len(times) > self.max_snapshots:
             times = times[np.linspace(0, len(times) - 1, self.max_snapshots).round().astype(np.intp)]
         return times
+
+    @staticmethod
+    def _every(times: Times, least_ns: float) -> list[int]:
+        """Places of the first time, and of each that follows the one before by at least so much."""
+        chosen = [0]
+        if least_ns <= int(times[-1]) - int(times[0]):  # beyond, it may be more than a log time can be
+            step = max(round(least_ns), 1)
+            while (later := int(np.searchsorted(times, int(times[chosen[-1]]) + step))) < len(times):
+                chosen.append(later)
+        return chosen

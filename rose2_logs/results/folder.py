@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from contextlib import nullcontext
 from functools import cached_property
@@ -12,6 +13,7 @@ import numpy as np
 import shapely
 
 from rose2_logs.errors import LogError, ParameterError
+from rose2_logs.parameters import Parameters, ReadingParameters
 from rose2_logs.readers.discovery import ANNOTATED_ENDING
 from rose2_logs.results.maps import RunMaps
 from rose2_logs.room_plan import PlanRoom, RoomPlan
@@ -69,8 +71,8 @@ class RunResults:
         self.folder = folder
         path = folder / SUMMARY
         if not path.is_file():
-            several = folder.is_dir() and any(folder.rglob(SUMMARY))
-            hint = "give the folder of one log below it" if several else "give one that analyze has written"
+            below = min((found.parent for found in folder.rglob(SUMMARY)), default=None)
+            hint = f"did you mean {below}?" if below else "analyze writes such a folder for each log"
             raise LogError(f"{folder}: holds no {SUMMARY}; {hint}")
         try:
             summary = json.loads(path.read_text(encoding="utf-8"))
@@ -148,7 +150,17 @@ class RunResults:
     def open_maps(self) -> RunMaps | nullcontext[None]:
         """Open the maps of the run, as far as the annotated MCAP is there; a context manager."""
         path = self.annotated_log
-        return nullcontext() if path is None else RunMaps(path, str(self.summary["topic"]))
+        return nullcontext() if path is None else RunMaps(path, str(self.summary["topic"]), self._limits)
+
+    @property
+    def _limits(self) -> ReadingParameters:
+        """Those that the log was read with; of results of another version as far as they are known."""
+        known = {each.name for each in dataclasses.fields(ReadingParameters)}
+        used = self.summary.get("parameters", {}).get("reading", {})
+        try:
+            return Parameters().replaced({"reading": {k: v for k, v in used.items() if k in known}}).reading
+        except (ParameterError, AttributeError):
+            return ReadingParameters()
 
     def plan(self, snapshot: int, maps: RunMaps | None, *, with_walls: bool = False) -> RoomPlan:
         """Return the floor plan of a snapshot, whose rooms go by their tracks.

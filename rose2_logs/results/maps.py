@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 
 from rose2_logs.errors import LogError
 from rose2_logs.occupancy import GridGeometry, OccupancySnapshot
+from rose2_logs.parameters import ReadingParameters
 from rose2_logs.readers import LogReader, Selection, open_source
 from rose2_logs.readers.marker_lines import read_marker_lines
+from rose2_logs.readers.opening import DEFAULT_LIMITS
 from rose2_logs.readers.source import MessageSource
 from rose2_logs.room_plan import PlanMap, PlanRoom
 from rose2_logs.sinks.ros_messages import HIGHEST_VALUE
@@ -31,6 +33,8 @@ class RunMaps:
         The file.
     topic : str
         The map topic.
+    limits : ReadingParameters
+        How much it may claim: those that its log was read with.
 
     Raises
     ------
@@ -38,9 +42,9 @@ class RunMaps:
         If it cannot be opened.
     """
 
-    def __init__(self, path: Path, topic: str) -> None:
+    def __init__(self, path: Path, topic: str, limits: ReadingParameters = DEFAULT_LIMITS) -> None:
         self._path, self._topic = path, topic
-        self._source: MessageSource = open_source(path)
+        self._source: MessageSource = open_source(path, limits)
 
     def __enter__(self) -> RunMaps:
         return self

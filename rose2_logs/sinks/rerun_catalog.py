@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger(__name__)
 
-DEFAULT_PORT = 51234
-"""Where Rerun's catalog servers listen unless told otherwise."""
 MARGIN_M = 5.0
 """Around the points where rooms are deepest: half a large room."""
 NO_TABLES_M = 20.0

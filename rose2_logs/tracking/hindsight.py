@@ -145,8 +145,11 @@ def _placed(
 ) -> NDArray[np.object_]:
     """Shapes where a map of another drift has them; those of equal drift stay as they are."""
     moved = polygons.copy()
-    for pair in dict.fromkeys(pair for pair in drifts if pair[0] != pair[1]):
-        chosen = np.array([drift == pair for drift in drifts])
+    places: dict[tuple[RigidMotion, RigidMotion], list[int]] = {}
+    for place, pair in enumerate(drifts):
+        if pair[0] != pair[1]:
+            places.setdefault(pair, []).append(place)
+    for pair, chosen in places.items():
         moved[chosen] = shapely.transform(moved[chosen], pair[0].inverse().then(pair[1]).points)
     return _valid(moved)
 

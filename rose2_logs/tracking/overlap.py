@@ -38,11 +38,6 @@ class Overlap:
         """Intersection over union (A, B) of each pair; 0 where both are empty."""
         return _share(self.common, self.first_size[:, None] + self.second_size[None] - self.common)
 
-    @property
-    def share_of_smaller(self) -> FloatArray:
-        """Intersection (A, B) over the size of the smaller of the two; 0 where it is empty."""
-        return _share(self.common, np.minimum(self.first_size[:, None], self.second_size[None]))
-
 
 def _share(part: FloatArray, whole: FloatArray) -> FloatArray:
     return np.divide(part, whole, out=np.zeros_like(part), where=whole > 0)

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from finished_runs import SAMPLE_LOGS
 from PIL import Image
 from saved_maps import RESOLUTION_M, save_map, save_run, two_rooms
 
@@ -104,6 +105,12 @@ def test_time_options_are_seconds_into_the_log(cli, maps: Path, tmp_path: Path):
         (["info", "nowhere.mcap"], "nowhere.mcap"),
         (["analyze", "nowhere.mcap", "-o", "out"], "nowhere.mcap"),
         (["analyze", "x.bag", "-o", "out", "--set", "walls.nothing=1"], "walls.nothing"),
+        (["analyze", "x.bag", "-o", "out", "--set", "walls.cluster_gap_m=wide"], "of type float, not 'wide'"),
+        (["analyze", "x.bag", "-o", "out", "--set", "walls.cluster_gap_m"], "write it as block.name=value"),
+        (["analyze", "x.bag", "-o", "out", "--set", "floor_plan.grouping=x"], "it must be one of"),
+        (["analyze", "x.bag", "-o", "out", "--set", "floor_plan.grouping=dbscan"], "x.bag"),
+        (["analyze", SAMPLE_LOGS / "office.mcap", "-o", "out", "--start", "nan"], "no number of seconds"),
+        (["segment", SAMPLE_LOGS / "office.mcap", "-o", "out"], "is a log, no saved map"),
         (["analyze", "x.bag", "-o", "out", "--method", "magic"], "no method 'magic'"),
         (["analyze", "a/x.bag", "b/x.mcap", "-o", "out"], "several logs are named x"),
         (["batch", "nowhere*.mcap", "-o", "out"], "nowhere*.mcap: no log there"),

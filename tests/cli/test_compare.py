@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 from PIL import Image
 from saved_maps import FREE, UNKNOWN, WALL, save_map
 
+from rose2_logs.comparing import FILES
+
 BIN = Path(sys.executable).parent
 
 
@@ -98,10 +100,20 @@ def test_without_the_annotated_log_the_map_comes_from_the_log(cli, results, tmp_
 def test_what_cannot_be_compared_is_told_in_a_line(cli, results, tmp_path: Path):
     """No results, the folder above them, an earlier comparison."""
     code, _, err = cli("compare", tmp_path / "nowhere", results[1], "-o", tmp_path / "out")
-    assert (code, "holds no results of analyze" in err) == (2, True)
+    assert (code, "holds no summary.json; analyze writes" in err) == (2, True)
     code, _, err = cli("compare", results[0].parent, results[1], "-o", tmp_path / "out")
     assert (code, f"did you mean {results[1]}" in err) == (2, True)
     assert cli("compare", *results, "-o", tmp_path / "out", "--no-rrd")[0] == 0
     code, _, err = cli("compare", *results, "-o", tmp_path / "out", "--no-rrd")
     assert (code, "--overwrite" in err) == (2, True)
     assert cli("compare", *results, "-o", tmp_path / "out", "--no-rrd", "--overwrite")[0] == 0
+
+
+def test_a_comparison_that_replaces_one_leaves_nothing_of_it(cli, results, tmp_path: Path):
+    """Its recording would be taken for that of the new one."""
+    out = tmp_path / "out"
+    assert cli("compare", *results, "-o", out)[0] == 0
+    assert (out / "comparison.rrd").exists()
+    code, said, _ = cli("compare", *results[::-1], "-o", out, "--no-rrd", "--overwrite")
+    assert (code, "comparison.rrd" in said) == (0, False)
+    assert sorted(file.name for file in out.iterdir()) == sorted(FILES[:-1])

@@ -143,17 +143,17 @@ def test_a_folder_that_cannot_be_written_to_is_one_line(tmp_path):
 
 
 def test_a_map_that_the_method_stumbles_over_is_left_out(monkeypatch, tmp_path):
-    from rose2_logs import run
+    from rose2_logs import run, tracked_stream
 
     maps = save_run(tmp_path / "maps")
-    analyse = run.analyse
+    analyse = tracked_stream.analyse
 
     def stumbling(snapshot, *others, **more):
         if snapshot.index == 1:
             raise IndexError("out of bounds")
         return analyse(snapshot, *others, **more)
 
-    monkeypatch.setattr(run, "analyse", stumbling)
+    monkeypatch.setattr(tracked_stream, "analyse", stumbling)
     options = run.RunOptions(recording=False, annotated_log=False)
     result = run.analyse_log(maps, tmp_path / "out", options)
     assert (result.totals.snapshots, result.totals.invalid) == (2, 1)

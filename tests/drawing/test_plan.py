@@ -15,7 +15,7 @@ from PIL import Image
 
 from rose2_logs.drawing.pixels import as_pixels
 from rose2_logs.drawing.plan import FREE_GREY, MARGIN_M, PANEL, SEEN_OPACITY, UNKNOWN_GREY, draw_plan
-from rose2_logs.drawing.shapes import Drawing, Lines, Text, hatching
+from rose2_logs.drawing.shapes import Area, Drawing, Lines, Text, hatching
 from rose2_logs.drawing.svg import as_svg
 from rose2_logs.sinks.palette import track_colour
 
@@ -100,6 +100,18 @@ def test_hatching_fills_a_shape_evenly(gap: float):
     ends = shapely.get_coordinates(shapely.get_parts(lines)).reshape(-1, 2, 2)
     across = np.diff(ends, axis=1)[:, 0]
     assert across[:, 0] == pytest.approx(-across[:, 1])
+
+
+@pytest.mark.parametrize("turn", [1, -1])
+def test_what_lies_in_a_hole_is_drawn(turn: int):
+    """Whichever part of a room comes first; and in the hole around it there is nothing."""
+    ring = shapely.box(0, 0, 90, 90).difference(shapely.box(20, 20, 70, 70))
+    room = shapely.MultiPolygon([ring, shapely.box(40, 40, 50, 50)][::turn])
+    drawing = Drawing(90.0, 90.0)
+    drawing.add(Area(room, (200, 0, 0)))
+    image = as_pixels(drawing, 90)
+    assert image[10, 10].tolist() == image[45, 45].tolist() == [200, 0, 0]
+    assert image[30, 30].tolist() == [255, 255, 255]
 
 
 def test_a_raised_two_is_drawn():

@@ -209,19 +209,7 @@ def write_bag(
     if compression != "NONE":
         writer.set_compression(rosbag1.Writer.CompressionFormat[compression])
     writer.chunk_threshold = 1
-    with writer:
-        connections: dict[tuple[str, str], Any] = {}
-        for topic, time, message in logged:
-            kind = _type_of(message)
-            if (topic, kind) not in connections:
-                text = (schemas or {}).get(kind)
-                connections[topic, kind] = writer.add_connection(
-                    topic,
-                    kind,
-                    typestore=typestore(1),
-                    **({} if text is None else {"msgdef": text.decode("latin-1"), "md5sum": "0" * 32}),
-                )
-            writer.write(connections[topic, kind], time, packed(message, "ros1"))
+    _write_all(writer, logged, 1, "ros1", schemas, {"md5sum": "0" * 32})
     return path
 
 
@@ -236,20 +224,28 @@ def write_rosbag2(
     """Write a ROS 2 bag directory."""
     writer = rosbag2.Writer(path, version=9, storage_plugin=rosbag2.StoragePlugin[storage])
     writer.set_compression(rosbag2.CompressionMode[compression], rosbag2.CompressionFormat.ZSTD)
+    _write_all(writer, logged, 2, "cdr", schemas, {"rihs01": "RIHS01_0"})
+    return path
+
+
+def _write_all(
+    writer: Any,
+    logged: Sequence[Logged],
+    ros: int,
+    encoding: str,
+    schemas: dict[str, bytes] | None,
+    checksum: dict[str, str],
+) -> None:
+    """Write messages to a bag of a version of ROS; a type of another definition gets that checksum."""
     with writer:
         connections: dict[tuple[str, str], Any] = {}
         for topic, time, message in logged:
             kind = _type_of(message)
             if (topic, kind) not in connections:
                 text = (schemas or {}).get(kind)
-                connections[topic, kind] = writer.add_connection(
-                    topic,
-                    kind,
-                    typestore=typestore(2),
-                    **({} if text is None else {"msgdef": text.decode("latin-1"), "rihs01": "RIHS01_0"}),
-                )
-            writer.write(connections[topic, kind], time, packed(message, "cdr"))
-    return path
+                own = {} if text is None else {"msgdef": text.decode("latin-1"), **checksum}
+                connections[topic, kind] = writer.add_connection(topic, kind, typestore=typestore(ros), **own)
+            writer.write(connections[topic, kind], time, packed(message, encoding))
 
 
 @dataclass(frozen=True)

@@ -141,12 +141,14 @@ def serialized_costmap(costs: np.ndarray, *, ros: int = 2) -> bytes:
     return bytes(typestore(ros).serialize_cdr(made, "nav2_msgs/msg/Costmap"))
 
 
-def write_bag(path: Path, messages: Sequence[Logged], compression: str = "NONE") -> Path:
-    """Write a ROS 1 bag; compression NONE, BZ2 or LZ4."""
+def write_bag(
+    path: Path, messages: Sequence[Logged], compression: str = "NONE", chunk_bytes: int = 1
+) -> Path:
+    """Write a ROS 1 bag; compression NONE, BZ2 or LZ4. By default a chunk for each message, as maps have."""
     writer = rosbag1.Writer(path)
     if compression != "NONE":
         writer.set_compression(rosbag1.Writer.CompressionFormat[compression])
-    writer.chunk_threshold = 1  # a chunk for each message, as large maps have
+    writer.chunk_threshold = chunk_bytes
     with writer:
         connections: dict[str, Any] = {}
         for topic, time, message in messages:

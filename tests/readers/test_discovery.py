@@ -16,6 +16,7 @@ from rose2_logs.readers.discovery import logs_among
         (["bag/metadata.yaml", "bag/sub/more.mcap"], ["bag/sub/more.mcap"]),
         (["died.bag.active"], ["died.bag.active"]),
         (["crashed/crashed_0.mcap", "crashed/crashed_1.mcap"], ["crashed"]),
+        (["packed/packed_0.db3.zstd", "packed/packed_1.db3"], ["packed"]),
         (["robot/robot_1.mcap", "robot/robot_2.mcap"], ["robot/robot_1.mcap", "robot/robot_2.mcap"]),
         (["maps/m1.yaml", "maps/m1.pgm", "maps/m2.yaml", "maps/m2.pgm"], ["maps"]),
         (["run.mcap", "map.yaml", "map.pgm"], ["run.mcap"]),

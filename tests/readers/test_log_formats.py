@@ -33,6 +33,7 @@ from test_messages import SCHEMA, foxglove_message
 
 from rose2_logs.errors import InvalidMapError, LogError, NoMapTopicError
 from rose2_logs.notices import StrictError, gathered
+from rose2_logs.parameters import ReadingParameters
 from rose2_logs.readers import Selection, inspect_log, open_log
 
 needs_shared = pytest.mark.skipif(
@@ -318,6 +319,66 @@ def test_several_files_are_read_as_one_log(tmp_path):
         open_log([tmp_path / "part0.mcap", tmp_path / "part1.bag"])
 
 
+def test_compressed_files_of_one_name_from_several_folders_are_several_files(tmp_path):
+    log = run_of_maps()
+    files = []
+    for k, half in enumerate((log[:6], log[6:])):
+        bag = write_rosbag2(tmp_path / str(k) / "run", half, compression="FILE")
+        files.append(bag / "run.db3.zstd")
+    assert_are(read(files), growing_maps())
+
+
+def test_each_chunk_of_a_bag_written_topic_by_topic_is_decompressed_once(tmp_path, monkeypatch):
+    """Its chunks overlap in time throughout; as many decompressions as messages take hours for a long bag."""
+    from rose2_logs.readers import bag_index
+
+    bag = write_bag(tmp_path / "run.bag", written_topic_by_topic(), compression="LZ4", chunk_bytes=2**14)
+    begins = []
+    chunk_data = bag_index.chunk_data
+
+    def counted(stream, head, most_bytes):
+        begins.append(head.begin)
+        return chunk_data(stream, head, most_bytes)
+
+    monkeypatch.setattr(bag_index, "chunk_data", counted)
+    file = bag_index.BagFile(bag, ReadingParameters())
+    with contextlib.closing(file):
+        times = [message.log_time_ns for message in file.messages()]
+    assert times == sorted(times)
+    assert len(times) == 80
+    assert 4 <= len(begins) == len(set(begins)) < 20
+
+
+def test_no_more_chunks_of_a_bag_are_kept_than_their_size_allows():
+    """The latest always is; the one that was not asked for the longest goes first."""
+    from rose2_logs.readers.bag_index import _Chunks
+
+    read = []
+
+    def chunk(begin):
+        read.append(begin)
+        return bytes(begin)
+
+    chunks = _Chunks(chunk, 10)
+    for begin in (4, 5, 4, 6, 4, 5, 20, 20, 4):
+        assert len(chunks.records(begin)) == begin
+    assert read == [4, 5, 6, 5, 20, 4]
+    one = _Chunks(chunk, 0)
+    read.clear()
+    for begin in (4, 4, 5, 4):
+        one.records(begin)
+    assert read == [4, 5, 4]
+
+
+def written_topic_by_topic():
+    """Two topics of texts of a kilobyte whose times interlace, one topic after the other."""
+    return [
+        (topic, START_NS + k * 10**9 + late, Text(f"{topic}{k}" * 200))
+        for topic, late in (("/one", 0), ("/two", 10**8))
+        for k in range(40)
+    ]
+
+
 @pytest.mark.parametrize("storage", ["SQLITE3", "MCAP"])
 def test_a_split_ros2_bag_is_read_through_all_its_files(storage, tmp_path):
     log = run_of_maps()
@@ -346,6 +407,41 @@ def test_a_ros2_bag_whose_recorder_died_before_writing_metadata_is_read_all_the_
     bag = write_rosbag2(tmp_path / "run", run_of_maps(), storage)
     (bag / "metadata.yaml").unlink()
     assert_are(read(bag), growing_maps())
+
+
+def test_a_folder_of_several_logs_is_not_taken_for_one_without_a_word(tmp_path):
+    """As a bag without its description they may be one; unlike one, they are likely several."""
+    log = run_of_maps()
+    (tmp_path / "run").mkdir()
+    one = write_mcap(tmp_path / "run" / "run_0.mcap", log[:6])
+    two = write_mcap(tmp_path / "run" / "run_1.mcap", log[6:])
+    with gathered() as notices:
+        assert_are(read(one.parent), growing_maps())
+    assert not notices.kinds
+    two.rename(two.with_name("another.mcap"))
+    with gathered() as notices:
+        assert_are(read(one.parent), growing_maps())
+    assert "2 files from another.mcap on" in notices.kinds["files_as_one"].first[0]["message"]
+    write_bag(one.with_name("third.bag"), log)
+    (one.parent / "another.mcap").unlink()
+    with gathered() as notices:
+        assert_are(read(one.parent), growing_maps()[:3])
+    assert (
+        "its run_0.mcap is read as one log, third.bag left out"
+        in (notices.kinds["files_as_one"].first[0]["message"])
+    )
+
+
+def test_an_annotated_copy_beside_a_log_is_no_part_of_it(tmp_path):
+    log = run_of_maps()
+    (tmp_path / "run").mkdir()
+    write_mcap(tmp_path / "run" / "run_0.mcap", log[:6])
+    write_mcap(tmp_path / "run" / "run_0.rose2.mcap", log)
+    with gathered() as notices:
+        assert_are(read(tmp_path / "run"), growing_maps()[:3])
+    assert not notices.kinds
+    (tmp_path / "run" / "run_0.mcap").unlink()
+    assert_are(read(tmp_path / "run"), growing_maps())
 
 
 def test_the_topic_is_the_one_asked_for_else_map_else_the_only_one(tmp_path):

@@ -91,6 +91,13 @@ def test_thinning_keeps_times_that_are_there_with_first_and_last_and_no_more_tha
     assert most == 1 or chosen[0] == thinned[0]
 
 
+@pytest.mark.parametrize("every_s", [1e10, 1e300])
+def test_a_longer_time_between_maps_than_a_log_can_last_takes_the_first_one(every_s):
+    times = np.array([5, 2**62, 2**63 - 1])
+    assert Selection(every_s=every_s).thin(times).tolist() == [5]
+    assert Selection(every_s=every_s).thin(times[:1]).tolist() == [5]
+
+
 @pytest.mark.parametrize(
     "wrong",
     [

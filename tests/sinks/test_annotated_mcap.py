@@ -21,10 +21,11 @@ from saved_maps import save_run
 
 from rose2_logs.errors import OutputError
 from rose2_logs.readers import open_log
-from rose2_logs.run import RunOptions, analyse_log, start_workers, tracked_snapshots
+from rose2_logs.run import RunOptions, analyse_log
 from rose2_logs.sinks.annotated_mcap import ADDED, ATTACHMENT, METADATA, AnnotatedMcap
 from rose2_logs.sinks.sink import RunInfo
 from rose2_logs.sinks.summary import RunTotals
+from rose2_logs.tracked_stream import start_workers, tracked_snapshots
 
 PROJECT = Path(__file__).parents[2]
 SHARED = PROJECT.parent / "shared" / "bags"

@@ -20,9 +20,10 @@ from benchmarking.gauges import bytes_read, timed
 from rose2_logs.log_facts import describe_log
 from rose2_logs.parameters import Parameters
 from rose2_logs.readers import open_log
-from rose2_logs.run import RunOptions, start_workers, tracked_snapshots
+from rose2_logs.run import RunOptions
 from rose2_logs.sinks.sink import RunInfo, Sink
 from rose2_logs.sinks.summary import RunTotals
+from rose2_logs.tracked_stream import start_workers, tracked_snapshots
 
 MESSAGE_BYTES = 1 << 20
 """Of the log to copy: about a picture or a cloud of points."""
