@@ -52,7 +52,11 @@ def test_rooms_that_are_seen_whole_are_not_hatched():
 def test_a_shape_may_reach_beyond_the_canvas_and_have_holes():
     _, analysis = drawn(np.ones((20, 20)), resolution_m=RESOLUTION_M)
     shape = shapely.box(-1.0, -0.5, 1.5, 1.0).difference(shapely.box(0.0, 0.0, 0.5, 0.5))
-    inside, (row, column) = cells_within(shape, analysis.geometry)
+    (number, inside, (row, column)), other = cells_within(
+        (shapely.Polygon(), shape, shape), analysis.geometry
+    )
+    assert (number, other.number, other.corner) == (1, 2, (row, column))
+    assert np.array_equal(other.inside, inside)
     assert (row, column) == (-6, -11)
     assert inside.sum() * RESOLUTION_M**2 == pytest.approx(shape.area, abs=RESOLUTION_M * shape.length)
     assert not inside[2 - row, 2 - column]
