@@ -10,8 +10,10 @@ import shapely
 from drawn_maps import office, snapshot
 
 from rose2_logs.floor_plan.rooms import outline
+from rose2_logs.occupancy import GridGeometry
 from rose2_logs.parameters import Parameters, TrackingParameters
 from rose2_logs.pipeline import METHODS, analyse
+from rose2_logs.rooms import RoomMap
 from rose2_logs.sinks.ros_messages import (
     ROOMS_TYPE,
     MessageMaker,
@@ -109,6 +111,10 @@ def test_rings_of_shapes_with_parts_and_holes():
     assert sorted(len(ring) for ring in outer_rings(both)) == [5, 5]
     assert ring_segments(outer_rings(both)).shape == (16, 2)
     assert outer_rings(shapely.Polygon()) == []
+    shapes = (shapely.Polygon(), both, shapely.Polygon(), square)
+    rooms = RoomMap(GridGeometry(1.0, (0.0, 0.0), 0.0, "map", (1, 1)), np.zeros((1, 1), np.int32), shapes, [])
+    for shape, rings in zip(shapes, rooms.outer_rings_m, strict=True):
+        assert [ring.tolist() for ring in rings] == [ring.tolist() for ring in outer_rings(shape)]
     assert ring_segments([]).shape == (0, 2)
 
 
