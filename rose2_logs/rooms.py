@@ -102,6 +102,19 @@ class RoomMap:
         points[drawn] = shapely.get_coordinates(shapely.get_point(radii, 0))
         return points
 
+    @cached_property
+    def outer_rings_m(self) -> tuple[list[FloatArray], ...]:
+        """Closed outer rings (K, 2) of each room's polygon in world metres."""
+        import shapely
+
+        parts, room = shapely.get_parts(np.array(self.polygons, object), return_index=True)
+        points, ring = shapely.get_coordinates(shapely.get_exterior_ring(parts), return_index=True)
+        rings = np.split(points, np.flatnonzero(np.diff(ring)) + 1)
+        found: tuple[list[FloatArray], ...] = tuple([] for _ in self.polygons)
+        for number, corners in zip(room[np.unique(ring)].tolist(), rings, strict=False):
+            found[number].append(corners)
+        return found
+
     @property
     def adjacency(self) -> tuple[tuple[int, int], ...]:
         """Pairs of room numbers, smaller first, that at least one doorway connects; sorted."""

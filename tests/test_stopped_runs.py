@@ -9,8 +9,10 @@ import signal
 import subprocess
 import sys
 import time
+from collections import defaultdict
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 from saved_maps import save_map, save_run, two_rooms
@@ -31,7 +33,7 @@ import os, signal, sys
 from pathlib import Path
 from rose2_logs.run import RunOptions, analyse_log
 
-log, folder, moment, overwrite = sys.argv[1:]
+log, folder, moment, overwrite, recording = sys.argv[1:]
 kill = lambda: os.kill(os.getpid(), signal.SIGKILL)
 frames, moves = 0, 0
 
@@ -62,7 +64,9 @@ def remove(self, missing_ok=False):
         kill()
     unlink(self, missing_ok)
 Path.unlink = remove
-options = RunOptions(recording=False, annotated_log=True, overwrite=overwrite == "True")
+options = RunOptions(
+    recording=recording == "True", annotated_log=recording != "True", overwrite=overwrite == "True"
+)
 analyse_log(Path(log), Path(folder), options, count_frames)
 """
 
@@ -89,8 +93,8 @@ def contents(folder: Path) -> dict[str, bytes]:
     return found | {"summary.json": json.dumps(summary).encode()}
 
 
-def kill_at(moment: str, log: Path, folder: Path, overwrite: bool = False) -> None:
-    command = [sys.executable, "-c", KILLED, *map(str, (log, folder, moment, overwrite))]
+def kill_at(moment: str, log: Path, folder: Path, overwrite: bool = False, recording: bool = False) -> None:
+    command = [sys.executable, "-c", KILLED, *map(str, (log, folder, moment, overwrite, recording))]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == -signal.SIGKILL, done.stderr
 
@@ -140,6 +144,51 @@ def count_calls(monkeypatch, analysed: list[int]) -> None:
         return real(snapshot, *arguments, **options)
 
     monkeypatch.setattr(tracked_stream, "analyse", analyse)
+
+
+@pytest.fixture(scope="module")
+def fresh_recording(log: Path, tmp_path_factory) -> dict[str, list[Row]]:
+    folder = tmp_path_factory.mktemp("fresh") / "out"
+    analyse_log(log, folder, RunOptions(annotated_log=False))
+    return recorded(folder / "maps.rrd")
+
+
+Row = dict[str, Any]
+
+
+def recorded(path: Path) -> dict[str, list[Row]]:
+    """Rows of every entity in the order in which they were logged, times and components.
+
+    Left out is what is another one in each run: Rerun's own numbers of the rows, and when the run began.
+    """
+    from rerun.chunk import RrdReader
+
+    reader = RrdReader(path)
+    assert len(reader.blueprints()) == 1
+    (run,) = reader.recordings()
+    found: dict[str, list[tuple[bytes, Row]]] = defaultdict(list)
+    for chunk in reader.stream(store=run):
+        for row in chunk.to_record_batch().to_pylist():
+            row.pop("RecordingInfo:start_time", None)
+            found[str(chunk.entity_path)].append((row.pop("rerun.controls.RowId"), row))
+    return {
+        entity: [row for _, row in sorted(rows, key=lambda each: each[0])] for entity, rows in found.items()
+    }
+
+
+@pytest.mark.parametrize("moment", ["map 5", "renaming"])
+def test_the_recording_of_a_run_that_went_on_holds_what_that_of_a_fresh_one_does(
+    log: Path, fresh_recording, tmp_path: Path, moment: str
+):
+    """Every row of every entity, by Rerun's own reader; the killed run's file does not appear."""
+    kill_at(moment, log, tmp_path / "out", recording=True)
+    assert names(tmp_path) == [JOURNAL, LOCK, PART]
+    analyse_log(log, tmp_path / "out", RunOptions(annotated_log=False, resume=True))
+    found = recorded(tmp_path / "out" / "maps.rrd")
+    assert set(found) == set(fresh_recording) >= {"/world/map", "/run/coverage", "/summary", "/room/001"}
+    for entity, rows in found.items():
+        assert rows == fresh_recording[entity], entity
+    assert names(tmp_path) == ["out"]
 
 
 def test_a_run_killed_after_all_is_in_place_is_whole(log: Path, fresh, tmp_path: Path):

@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 
 ENCAPSULATION = b"\0\1\0\0"
 """Begins each message: plain CDR, little endian. Fields are aligned to the byte after it."""
+SIZES = {code: struct.calcsize(f"<{code}") for code in "BiIfd"}
+"""Bytes of a number of each `struct` type that is written."""
 
 
 class CdrWriter:
@@ -23,8 +25,13 @@ class CdrWriter:
 
     def numbers(self, code: str, *values: float) -> None:
         """Append numbers of one `struct` type."""
-        self._align(struct.calcsize(code))
+        self._align(SIZES[code])
         self._data += struct.pack(f"<{len(values)}{code}", *values)
+
+    def written(self, fields: bytes, alignment: int) -> None:
+        """Append fields that were written before, of which the largest is aligned to so many bytes."""
+        self._align(alignment)
+        self._data += fields
 
     def string(self, text: str) -> None:
         """Append a string; its length counts the zero byte that ends it."""
@@ -56,11 +63,18 @@ class CdrWriter:
 
     def points(self, xy_m: NDArray[np.float64], dtype: type[np.floating] = np.float64) -> None:
         """Append points (N, 2) as a sequence of geometry_msgs/Point, or of Point32 as single precision."""
-        self.sequence(np.column_stack([xy_m, np.zeros(len(xy_m))]).astype(dtype))
+        points = np.zeros((len(xy_m), 3), dtype)
+        points[:, :2] = xy_m
+        self.sequence(points)
+
+    def fields(self) -> bytearray:
+        """Return what was appended, without the beginning."""
+        return self._data[len(ENCAPSULATION) :]
 
     def message(self) -> bytearray:
         """Return the message, which is written no further."""
         return self._data
 
     def _align(self, size: int) -> None:
-        self._data += bytes(-(len(self._data) - len(ENCAPSULATION)) % size)
+        if gap := (len(self._data) - len(ENCAPSULATION)) % size:
+            self._data += bytes(size - gap)

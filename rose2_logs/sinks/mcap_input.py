@@ -223,7 +223,8 @@ class _Files(CopiedLog):
             (number, channel) for number, file in enumerate(files) for channel in file.channels.values()
         ]
         self._bag_types = _definitions([channel for _, channel in channels])
-        self._target = ros2_typestore(self._bag_types)
+        names = {_ros2_name(channel.schema_name) for _, channel in channels}
+        self._target = ros2_typestore(self._bag_types, names)
         self._schema_ids: dict[tuple[str, bytes], int] = {}
         self._channels: dict[tuple[int, int], CopiedChannel] = {}
         self._converters: dict[int, Callable[[Any], bytes | memoryview]] = {}

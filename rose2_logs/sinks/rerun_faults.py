@@ -10,8 +10,8 @@ import rerun as rr
 
 from rose2_logs.errors import OutputError
 
-LEAST_FREE_BYTES = 1 << 23
-"""Space that must be left on the disk while a recording is written: more than a snapshot adds to it."""
+LEAST_FREE_BYTES = 1 << 25
+"""Space that must be left on the disk while a recording is written: more than a snapshot and what waits."""
 
 
 def require_space(part: Path, path: Path) -> None:

@@ -1,25 +1,27 @@
 """Layers of a recording: on every timeline, only where they change, many snapshots to a chunk.
 
-A chunk of a recording costs some kilobytes in the file, and in memory until the file is closed. So rows wait
-until those of an entity are worth a chunk.
+A chunk of a recording costs some kilobytes in the file, and in memory until the file is closed, as Rerun
+lists all chunks at the file's end. So rows wait until those of an entity are worth a chunk.
 """
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from operator import attrgetter
 from typing import Any, NamedTuple
 
 import numpy as np
 import rerun as rr
 
-from rose2_logs.sinks.rerun_columns import LayerKind, columns_of
+from rose2_logs.sinks.rerun_columns import Entry, Label, LayerKind, Picture, Scalar, Strips, columns_of
 
-CHUNK_BYTES = 1 << 15
-"""Rows of an entity are written together from this size on: their chunk's overhead is some percent of it."""
-ROW_BYTES = 200
-"""About what a row takes while it waits, besides its arrays."""
+CHUNK_BYTES = 1 << 20
+"""Rows of an entity are written together from this size on; as Rerun's own batcher does."""
+ROW_BYTES = 1 << 10
+"""What a row counts for besides its arrays: several times what it takes, so that a thousand wait at most."""
+WAITING_BYTES = 1 << 24
+"""Rows of all entities that wait at most: some large pictures, or outlines of a large building's rooms."""
 
 
 class Instant(NamedTuple):
@@ -56,11 +58,20 @@ class Layers:
         Where to.
     chunk_bytes : int
         Rows of an entity wait until they have this size; with 0 they do not wait.
+    waiting_bytes : int
+        When all that wait have this size, those of the entity that has most are written.
     """
 
-    def __init__(self, recording: rr.RecordingStream, chunk_bytes: int = CHUNK_BYTES) -> None:
+    def __init__(
+        self,
+        recording: rr.RecordingStream,
+        chunk_bytes: int = CHUNK_BYTES,
+        waiting_bytes: int = WAITING_BYTES,
+    ) -> None:
         self._recording = recording
         self._chunk_bytes = chunk_bytes
+        self._waiting_bytes = waiting_bytes
+        self._nbytes = 0
         self._entities: dict[str, _Entity] = {}
         self._stretch = 0
         self._stamps_went_back = False
@@ -93,11 +104,13 @@ class Layers:
         entity.shown, entity.stretch = layer, self._stretch
         entity.instants.append(self._now)
         entity.rows.append(layer)
-        entity.nbytes += ROW_BYTES + sum(
-            value.nbytes for value in _values(layer) if isinstance(value, np.ndarray)
-        )
+        nbytes = ROW_BYTES + sum(value.nbytes for value in _values(layer) if isinstance(value, np.ndarray))
+        entity.nbytes += nbytes
+        self._nbytes += nbytes
         if entity.nbytes >= self._chunk_bytes:
             self._write(path, entity)
+        elif self._nbytes >= self._waiting_bytes:
+            self._write(*max(self._entities.items(), key=lambda item: item[1].nbytes))
 
     def clear(self, path: str) -> None:
         """Show nothing under a path and what lies below from the present snapshot on."""
@@ -124,6 +137,7 @@ class Layers:
         if not entity.rows:
             return
         self._recording.send_columns(path, time_columns(entity.instants), columns_of(entity.rows))
+        self._nbytes -= entity.nbytes
         entity.instants, entity.rows, entity.nbytes = [], [], 0
 
 
@@ -140,8 +154,19 @@ def time_columns(instants: Sequence[Instant]) -> list[rr.TimeColumn]:
     return times + [rr.TimeColumn(name, sequence=columns[name]) for name in ("snapshot", "coverage")]
 
 
-def _values(layer: LayerKind) -> list[Any]:
-    return [getattr(layer, each.name) for each in dataclasses.fields(layer)]
+# What `dataclasses.fields` would tell of each layer again.
+_VALUES = {
+    Strips: attrgetter("points_m", "lengths", "colours"),
+    Picture: attrgetter("pixels", "cell_m", "corner_m", "yaw_rad", "colormap"),
+    Label: attrgetter("point_m", "text"),
+    Scalar: attrgetter("value"),
+    Entry: attrgetter("text", "level"),
+}
+
+
+def _values(layer: LayerKind) -> tuple[Any, ...]:
+    found = _VALUES[type(layer)](layer)
+    return found if isinstance(found, tuple) else (found,)
 
 
 def _equal(one: LayerKind, other: LayerKind) -> bool:

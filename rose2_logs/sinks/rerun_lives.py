@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from array import array
+
 import numpy as np
 import rerun as rr
 
@@ -29,7 +31,8 @@ class Lives:
 
     def __init__(self, recording: rr.RecordingStream) -> None:
         self._recording = recording
-        self._instants: list[Instant] = []
+        # The times of each map, one after the other: as objects they would take several times as much.
+        self._times = array("q")
         # For each track the indices of instants at which it appears and is gone, in turns.
         self._turns: dict[int, list[int]] = {}
         self._shown: set[int] = set()
@@ -38,13 +41,16 @@ class Lives:
         """Take one map."""
         now = set(track_ids)
         for track in sorted(now ^ self._shown):
-            self._turns.setdefault(track, []).append(len(self._instants))
+            self._turns.setdefault(track, []).append(self._maps)
         self._shown = now
-        self._instants.append(instant)
+        self._times.extend(instant)
 
     def log(self, hindsight: Hindsight | None) -> None:
         """Log everything, once, after the last map."""
-        number = {instant.snapshot: index for index, instant in enumerate(self._instants)}
+        instants = [
+            Instant(*each) for each in np.array(self._times).reshape(-1, len(Instant._fields)).tolist()
+        ]
+        number = {instant.snapshot: index for index, instant in enumerate(instants)}
         for track, turns in sorted(self._turns.items()):
             changes = self._changes(track, turns, number, hindsight)
             path = f"{LIVES}/{track:03d}"
@@ -57,19 +63,23 @@ class Lives:
                 ),
                 static=True,
             )
-            instants = [self._instants[index] for index in changes]
+            times = time_columns([instants[index] for index in changes])
             states = rr.StateChange.columns(state=list(changes.values()))
-            self._recording.send_columns(path, time_columns(instants), states)
+            self._recording.send_columns(path, times, states)
         if hindsight is not None:
             for path, figures in (
                 (FINAL_SHARE, hindsight.final_share),
                 (FINAL_IOU, hindsight.final_iou),
             ):
-                known = [(at, figures.get(at.snapshot)) for at in self._instants]
+                known = [(at, figures.get(at.snapshot)) for at in instants]
                 points = [(at, value) for at, value in known if value is not None]
                 if points:
                     values = rr.Scalars.columns(scalars=np.array([value for _, value in points]))
                     self._recording.send_columns(path, time_columns([at for at, _ in points]), values)
+
+    @property
+    def _maps(self) -> int:
+        return len(self._times) // len(Instant._fields)
 
     def _changes(
         self, track: int, turns: list[int], number: dict[int, int], hindsight: Hindsight | None
@@ -77,15 +87,15 @@ class Lives:
         """State of a room from each index on where it changes, in order."""
 
         def index_of(moment: Moment | None) -> int:
-            return len(self._instants) if moment is None else number[moment.snapshot]
+            return self._maps if moment is None else number[moment.snapshot]
 
         shaped = index_of(None if hindsight is None else hindsight.shape_right.get(track))
         settled = index_of(None if hindsight is None else hindsight.area_settled.get(track))
-        ends = [*turns, len(self._instants)] if len(turns) % 2 else turns
+        ends = [*turns, self._maps] if len(turns) % 2 else turns
         changes: dict[int, str] = {}
         for begin, end in zip(ends[::2], ends[1::2], strict=True):
             for index in sorted({begin, *(each for each in (shaped, settled) if begin < each < end)}):
                 changes[index] = SETTLED if index >= settled else SHAPED if index >= shaped else FORMING
-            if end < len(self._instants):
+            if end < self._maps:
                 changes[end] = LOST
         return changes

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+import cv2
 import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
@@ -17,6 +18,9 @@ FILL_OPACITY = 0.6
 """Share of a room's colour in its cells: the map shows through."""
 CLUTTER_VALUE = 20
 """Occupancy that cells left out of the clean map are drawn with: they can be seen and do not matter."""
+_VALUES = np.arange(256, dtype=np.uint8)
+CLUTTER_VALUES = np.where(_VALUES.view(np.int8) > 0, np.uint8(CLUTTER_VALUE), _VALUES)
+"""What a cell of each value, as an unsigned byte, is drawn with that is no structure."""
 UNKNOWN_SHADE = 205
 """Grey of unknown cells, as map_server draws them."""
 
@@ -54,14 +58,14 @@ class MapPictures:
 
     def clean_map(self, clean: NDArray[np.bool_], height_m: float) -> Picture:
         """Draw the clean map (H, W): structure black, what was left out of it light grey."""
-        known = np.where(self._cells.view(np.int8) > 0, np.uint8(CLUTTER_VALUE), self._cells)
-        cells = np.where(clean[self._part], np.uint8(100), known)
+        cells = np.asarray(cv2.LUT(self._cells, CLUTTER_VALUES), np.uint8)
+        np.copyto(cells, 100, where=clean[self._part])
         return self._picture(cells, height_m, rr.components.Colormap.RvizMap)
 
     def score(self, score: NDArray[np.float32], height_m: float) -> Picture:
         """Draw the structure score (H, W) of occupied cells, from dark to bright."""
-        shown = np.rint(255 * score[self._part]).astype(np.uint8)
-        return self._picture(shown, height_m, rr.components.Colormap.Inferno)
+        shown = cv2.convertScaleAbs(np.ascontiguousarray(score[self._part]), alpha=255)
+        return self._picture(np.asarray(shown, np.uint8), height_m, rr.components.Colormap.Inferno)
 
     def _painted(
         self, labels: NDArray[np.integer] | NDArray[np.bool_], colours: Iterable[FloatArray]
@@ -70,7 +74,11 @@ class MapPictures:
         opaque = [np.pad(table, ((0, 0), (0, 1)), constant_values=255).astype(np.uint8) for table in colours]
         # A pixel as one number is looked up several times faster than as four.
         table = np.concatenate(opaque).view(np.uint32).ravel()
-        pixels: NDArray[np.uint8] = table[labels.astype(np.int32) * 256 + self._cells].view(np.uint8)
+        index = labels.astype(np.intp)
+        index <<= 8
+        index |= self._cells
+        # No index lies beyond the table; said so, it is not looked for in a pass of its own.
+        pixels: NDArray[np.uint8] = table.take(index, mode="clip").view(np.uint8)
         return pixels.reshape(*self._cells.shape, 4)
 
     def _picture(

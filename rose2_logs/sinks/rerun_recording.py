@@ -133,8 +133,8 @@ class RerunRecording:
                 self._layers.add("/events", Entry(text, _event_level(event)))
         if self._tables is None:
             self._lives.add(frame)
-        if self._frames == 0:
-            # A live viewer shows the layout from the beginning; the file gets the final one.
+        if self._live and self._frames == 0:
+            # A live viewer shows the layout from the beginning; a file alone gets the final one.
             self._send_blueprint()
         self._frames += 1
         self._flush()

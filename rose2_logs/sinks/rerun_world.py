@@ -14,7 +14,6 @@ from rose2_logs.sinks.palette import track_colour
 from rose2_logs.sinks.rerun_columns import Label, Strips
 from rose2_logs.sinks.rerun_layers import Layers
 from rose2_logs.sinks.rerun_pictures import MapPictures, spectrum_picture
-from rose2_logs.sinks.ros_messages import outer_rings
 from rose2_logs.tracking.frames import TrackedSnapshot
 
 LAYER_STEP_M = 0.01
@@ -139,8 +138,7 @@ class World:
             if track not in self._known:
                 self._known.add(track)
                 self._begin_track(track)
-            rings = outer_rings(rooms.polygons[number])
-            self._layers.show(f"{ROOMS}/{track}", _rings(rings))
+            self._layers.show(f"{ROOMS}/{track}", _rings(rooms.outer_rings_m[number]))
             x, y, z = points[number]
             text = f"Room {track}, {rooms.areas_m2[number]:.0f} m²"
             self._layers.show(f"{ROOMS}/{track}/label", Label((x, y, z), text))

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
+import cv2
 import numpy as np
 import shapely
 from numpy.typing import NDArray
@@ -35,6 +36,7 @@ geometry_msgs/Point label_point
 geometry_msgs/Polygon[] outline   # outer rings of its shape
 uint32[] neighbours         # tracks of the rooms that a doorway connects it with
 """
+WRITTEN_TYPES = ("nav_msgs/msg/OccupancyGrid", "visualization_msgs/msg/MarkerArray", ROOMS_TYPE)
 HIGHEST_VALUE = 98
 """`/rose2/segmented_map` holds 1 + (track - 1) % 98 for a room: between free 0 and occupied 100."""
 FILL_OPACITY = 0.45
@@ -53,13 +55,15 @@ NO_TURN = (0.0, 0.0, 0.0, 1.0)
 """Quaternion x, y, z, w."""
 
 
-def ros2_typestore(extra: Mapping[str, Any] | None = None) -> Typestore:
+def ros2_typestore(extra: Mapping[str, Any] | None = None, wanted: Iterable[str] | None = None) -> Typestore:
     """Build a store with the ROS 2 types, what a log defines besides, and the rooms message.
 
     Parameters
     ----------
     extra : mapping of type name to fields, optional
         Definitions of a bag; ROS 2's own Header wins over that of ROS 1.
+    wanted : iterable of str, optional
+        Types that are enough, with all that they are made of: each takes its time.
     """
     from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
@@ -70,8 +74,29 @@ def ros2_typestore(extra: Mapping[str, Any] | None = None) -> Typestore:
     own.update(get_types_from_msg(ROOMS_DEFINITION, ROOMS_TYPE))
     definitions = {**ros2.fielddefs, **(extra or {}), **own}
     definitions["std_msgs/msg/Header"] = ros2.fielddefs["std_msgs/msg/Header"]
-    store.register(definitions)
+    store.register(definitions if wanted is None else _needed(definitions, wanted))
     return store
+
+
+def _needed(definitions: Mapping[str, Any], wanted: Iterable[str]) -> dict[str, Any]:
+    """Those of some definitions that the wanted types are made of."""
+    found: dict[str, Any] = {}
+    left = list(wanted)
+    while left:
+        name = left.pop()
+        if name in definitions and name not in found:
+            found[name] = definitions[name]
+            left += [_type_name(kind) for _, kind in definitions[name][1]]
+    return found
+
+
+def _type_name(kind: Any) -> str:
+    """Name of a field's type, or of the elements of an array; of types without fields it does not matter."""
+    _, inner = kind
+    # A name, or for an array the kind of its elements and their number, or for a number its name and size.
+    return (
+        inner if isinstance(inner, str) else inner[0] if isinstance(inner[0], str) else _type_name(inner[0])
+    )
 
 
 class MessageMaker:
@@ -84,9 +109,12 @@ class MessageMaker:
     """
 
     def __init__(self, occupancy: OccupancyParameters = DEFAULT_OCCUPANCY) -> None:
-        self._occupancy = occupancy
-        self._store = ros2_typestore()
-        self._triangles: dict[bytes, FloatArray] = {}
+        self._store = ros2_typestore(wanted=WRITTEN_TYPES)
+        self._triangles = Triangles()
+        # What the segmented map holds outside of rooms for each value of a cell, as an unsigned byte.
+        values = np.arange(256, dtype=np.uint8).view(np.int8)
+        free, occupied = classify(values, occupancy)
+        self._unroomed = np.where(occupied, np.int8(100), np.where(free, np.int8(0), np.int8(UNKNOWN)))
 
     def definition(self, message_type: str) -> bytes:
         """Text of a type's definition with all it is made of, as MCAP's ros2msg schema."""
@@ -101,18 +129,19 @@ class MessageMaker:
         values = np.array([0, *(1 + (track - 1) % HIGHEST_VALUE for track in frame.track_ids)], np.int8)
         labels = frame.analysis.rooms.labels
         # A probability, as some maps hold, would look like a room.
-        free, occupied = classify(frame.snapshot.cells, self._occupancy)
-        cells = np.full(labels.shape, UNKNOWN, np.int8)
-        cells[free], cells[occupied] = 0, 100
-        return _grid(frame, np.where(labels == 0, cells, values[labels]))
+        known = np.ascontiguousarray(frame.snapshot.cells).view(np.uint8)
+        cells = cv2.LUT(known, self._unroomed.view(np.uint8)).view(np.int8)
+        np.copyto(cells, values.take(labels, mode="clip"), where=labels > 0)
+        return _grid(frame, cells)
 
     def clean_map(self, frame: TrackedSnapshot) -> bytearray | None:
         """Make the clean map: 100 where structure, 0 where free or clutter, -1 unknown; None without one."""
         structure = frame.analysis.structure
         if structure is None:
             return None
-        known = np.clip(frame.snapshot.cells, UNKNOWN, 0)
-        return _grid(frame, np.where(structure.clean, np.int8(100), known))
+        known = np.minimum(frame.snapshot.cells, np.int8(0))
+        np.copyto(known, np.int8(100), where=structure.clean)
+        return _grid(frame, known)
 
     def rooms(self, frame: TrackedSnapshot) -> bytearray:
         """Make the rooms message, by ascending track."""
@@ -126,7 +155,7 @@ class MessageMaker:
             shape = rooms.polygons[number - 1]
             message.numbers("I", track)
             message.numbers("d", float(rooms.areas_m2[number - 1]), shape.area, *points[number - 1], 0.0)
-            rings = outer_rings(shape)
+            rings = rooms.outer_rings_m[number - 1]
             message.numbers("I", len(rings))
             for ring in rings:
                 # The last corner of a ring repeats the first; a ROS polygon closes by itself.
@@ -140,19 +169,22 @@ class MessageMaker:
         analysis, rooms = frame.analysis, frame.analysis.rooms
         made = [Marker("", 0, TRIANGLES, action=DELETE_ALL)]
         points = np.nan_to_num(rooms.label_points_m).tolist()
-        triangles: dict[bytes, FloatArray] = {}
+        corners = self._triangles.corners_of(rooms.polygons)
         for track, number in sorted(zip(frame.track_ids, range(len(rooms)), strict=True)):
             shape = rooms.polygons[number]
             red, green, blue = (value / 255 for value in track_colour(track))
             fill, line = (red, green, blue, FILL_OPACITY), (red * 0.7, green * 0.7, blue * 0.7, 1.0)
-            # Many a shape is that of the map before, and large ones take long to triangulate.
-            if (corners := self._triangles.get(key := shape.wkb)) is None:
-                corners = triangle_corners(shape)
-            triangles[key] = corners
             x, y = points[number]
             made += [
-                Marker("rooms", track, TRIANGLES, corners, fill),
-                Marker("outlines", track, LINE_LIST, ring_segments(shape), line, OUTLINE_WIDTH_M),
+                Marker("rooms", track, TRIANGLES, corners[number], fill),
+                Marker(
+                    "outlines",
+                    track,
+                    LINE_LIST,
+                    ring_segments(rooms.outer_rings_m[number]),
+                    line,
+                    OUTLINE_WIDTH_M,
+                ),
                 Marker(
                     "labels",
                     track,
@@ -163,7 +195,6 @@ class MessageMaker:
                     position_m=(x, y),
                 ),
             ]
-        self._triangles = triangles
         if analysis.walls is not None:
             walls, lines = analysis.walls.segments_m.reshape(-1, 2), analysis.walls.lines_m.reshape(-1, 2)
             made.append(Marker("walls", 0, LINE_LIST, walls, (0.1, 0.1, 0.1, 1.0), OUTLINE_WIDTH_M))
@@ -174,9 +205,44 @@ class MessageMaker:
         heights = {name: LAYER_STEP_M * (layer + 1) for layer, name in enumerate(MARKER_LAYERS)}
         message = CdrWriter()
         message.numbers("I", len(made))
-        for marker in (replace(each, height_m=heights.get(each.ns, 0.0)) for each in made):
-            marker.write(message, frame.snapshot.stamp_ns, analysis.geometry.frame_id)
+        shared = SharedFields.of(frame.snapshot.stamp_ns, analysis.geometry.frame_id)
+        for marker in made:
+            marker.write(message, shared, heights.get(marker.ns, 0.0))
         return message.message()
+
+
+class SharedFields(NamedTuple):
+    """What all markers of a map have in common, as it stands in the message from an aligned place on.
+
+    Attributes
+    ----------
+    header : bytes
+        Stamp and frame.
+    after_points : bytes
+        Colours and texture, of which there are none, up to the text.
+    after_text : bytes
+        The mesh, of which there is none.
+    """
+
+    header: bytes
+    after_points: bytes
+    after_text: bytes
+
+    @classmethod
+    def of(cls, stamp_ns: int, frame_id: str) -> Self:
+        """Write the fields."""
+        header, after_points, after_text = CdrWriter(), CdrWriter(), CdrWriter()
+        header.header(stamp_ns, frame_id)
+        after_points.numbers("I", 0)  # colors
+        after_points.string("")  # texture_resource
+        after_points.header(stamp_ns, frame_id)  # texture: an empty picture
+        after_points.string("")
+        after_points.numbers("I", 0, 0)  # data of the texture, uv_coordinates
+        after_text.string("")  # mesh_resource
+        after_text.string("")  # mesh_file: its name and data
+        after_text.numbers("I", 0)
+        after_text.numbers("B", 0)  # mesh_use_embedded_materials
+        return cls(*(bytes(each.fields()) for each in (header, after_points, after_text)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,8 +267,6 @@ class Marker:
         What it says.
     position_m : (float, float)
         Where the text stands.
-    height_m : float
-        How far it lies above the map.
     """
 
     ns: str
@@ -214,28 +278,21 @@ class Marker:
     action: int = ADD
     text: str = ""
     position_m: tuple[float, float] = (0.0, 0.0)
-    height_m: float = 0.0
 
-    def write(self, message: CdrWriter, stamp_ns: int, frame_id: str) -> None:
-        """Append the marker, with the stamp and frame of its map."""
-        message.header(stamp_ns, frame_id)
+    def write(self, message: CdrWriter, shared: SharedFields, height_m: float) -> None:
+        """Append the marker, so high above the map."""
+        width_m = self.width_m
+        message.written(shared.header, 4)
         message.string(self.ns)
         message.numbers("i", self.number, self.kind, self.action)
-        message.numbers("d", *self.position_m, self.height_m, *NO_TURN, *[self.width_m] * 3)
+        message.numbers("d", *self.position_m, height_m, *NO_TURN, width_m, width_m, width_m)
         message.numbers("f", *self.colour)
         message.numbers("i", 0, 0)  # lifetime: for ever
         message.numbers("B", 0)  # frame_locked
         message.points(self.points_m)
-        message.numbers("I", 0)  # colors
-        message.string("")  # texture_resource
-        message.header(stamp_ns, frame_id)  # texture: an empty picture
-        message.string("")
-        message.numbers("I", 0, 0)  # data of the texture, uv_coordinates
+        message.written(shared.after_points, 4)
         message.string(self.text)
-        message.string("")  # mesh_resource
-        message.string("")  # mesh_file: its name and data
-        message.numbers("I", 0)
-        message.numbers("B", 0)  # mesh_use_embedded_materials
+        message.written(shared.after_text, 4)
 
 
 def _grid(frame: TrackedSnapshot, cells: NDArray[np.int8]) -> bytearray:
@@ -252,20 +309,45 @@ def _grid(frame: TrackedSnapshot, cells: NDArray[np.int8]) -> bytearray:
     return message.message()
 
 
-def triangle_corners(shape: BaseGeometry) -> FloatArray:
-    """Corners (3 K, 2) of triangles that fill a shape, world metres.
+class Triangles:
+    """Fills shapes with triangles; what it found for those of the map before, it gives again.
+
+    Many a part of a shape is that of the map before, and large ones take long.
+    """
+
+    def __init__(self) -> None:
+        self._known: dict[bytes, FloatArray] = {}
+
+    def corners_of(self, shapes: Sequence[BaseGeometry]) -> list[FloatArray]:
+        """Corners (3 K, 2) of the triangles of each shape, world metres."""
+        parts, shape = shapely.get_parts(np.array(shapes, object), return_index=True)
+        keys = shapely.to_wkb(parts).tolist()
+        new = {key: number for number, key in enumerate(keys) if key not in self._known}
+        found = self._known | dict(zip(new, _triangulated(parts[list(new.values())]), strict=True))
+        self._known = {key: found[key] for key in keys}
+        corners: list[list[FloatArray]] = [[np.zeros((0, 2))] for _ in shapes]
+        for number, key in zip(shape.tolist(), keys, strict=True):
+            corners[number].append(found[key])
+        return [np.concatenate(each) for each in corners]
+
+
+def _triangulated(parts: NDArray[np.object_]) -> list[FloatArray]:
+    """Corners (3 K, 2) of the triangles of each polygon.
 
     GEOS fails on some outlines of cells in which a ring touches itself at a corner; a hair wider they touch
     along a line instead, and it does not.
     """
-    triangles = []
-    for part in shapely.get_parts(shape):
-        try:
-            found = shapely.constrained_delaunay_triangles(part)
-        except shapely.errors.GEOSException:
-            found = shapely.constrained_delaunay_triangles(part.buffer(TOUCH_M, join_style="mitre"))
-        triangles.append(shapely.get_coordinates(shapely.get_parts(found)).reshape(-1, 4, 2)[:, :3])
-    return np.concatenate([np.zeros((0, 2)), *(corners.reshape(-1, 2) for corners in triangles)])
+    try:
+        found = shapely.constrained_delaunay_triangles(parts)
+    except shapely.errors.GEOSException:
+        if len(parts) > 1:
+            return [corners for part in parts for corners in _triangulated(np.array([part]))]
+        wider = shapely.buffer(parts, TOUCH_M, join_style="mitre")
+        found = shapely.constrained_delaunay_triangles(wider)
+    triangles, part = shapely.get_parts(found, return_index=True)
+    corners = shapely.get_coordinates(triangles).reshape(-1, 4, 2)[:, :3]
+    ends = np.cumsum(np.bincount(part, minlength=len(parts)))
+    return [each.reshape(-1, 2) for each in np.split(corners, ends[:-1])] if len(parts) else []
 
 
 def outer_rings(shape: BaseGeometry) -> list[FloatArray]:
@@ -276,7 +358,7 @@ def outer_rings(shape: BaseGeometry) -> list[FloatArray]:
     return np.split(points, np.flatnonzero(np.diff(ring)) + 1) if len(points) else []
 
 
-def ring_segments(shape: BaseGeometry) -> FloatArray:
-    """Ends (2 N, 2) of the segments that the outer rings of a shape are made of, world metres."""
-    ends = [np.repeat(ring, 2, axis=0)[1:-1] for ring in outer_rings(shape)]
+def ring_segments(rings: Sequence[FloatArray]) -> FloatArray:
+    """Ends (2 N, 2) of the segments that closed rings are made of, world metres."""
+    ends = [np.repeat(ring, 2, axis=0)[1:-1] for ring in rings]
     return np.concatenate([np.zeros((0, 2)), *ends])

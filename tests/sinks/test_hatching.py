@@ -49,10 +49,29 @@ def test_rooms_that_are_seen_whole_are_not_hatched():
     assert (len(lines_m), len(room)) == (0, 0)
 
 
+def test_what_lies_beyond_the_canvas_is_unknown_too():
+    """Of three rooms, the first half beyond it, the second wholly; the third has no shape."""
+    snapshot, analysis = drawn(np.tile(rows("123"), (30, 10)), resolution_m=RESOLUTION_M)
+    polygons = (shapely.box(-1.5, 0, 1.5, 3), shapely.box(6, 5, 9, 8), shapely.Polygon())
+    rooms = type(analysis.rooms)(analysis.geometry, analysis.rooms.labels, polygons, analysis.rooms.areas_m2)
+    object.__setattr__(analysis, "rooms", rooms)
+    lines_m, room = hatch_unseen(TrackedSnapshot(snapshot, analysis, 0.5, (1, 2, 3), ()))
+    lines = shapely.linestrings(lines_m.reshape(-1, 2, 2))
+    for number, hidden in enumerate((shapely.box(-1.5, 0, 0, 3), polygons[1])):
+        own = lines[room == number]
+        assert shapely.within(own, hidden.buffer(RESOLUTION_M)).all()
+        assert shapely.length(own).sum() == pytest.approx(hidden.area * math.sqrt(2) / HATCH_STEP_M, rel=0.2)
+    assert set(room) == {0, 1}
+
+
 def test_a_shape_may_reach_beyond_the_canvas_and_have_holes():
     _, analysis = drawn(np.ones((20, 20)), resolution_m=RESOLUTION_M)
     shape = shapely.box(-1.0, -0.5, 1.5, 1.0).difference(shapely.box(0.0, 0.0, 0.5, 0.5))
-    inside, (row, column) = cells_within(shape, analysis.geometry)
+    (number, inside, (row, column)), other = cells_within(
+        (shapely.Polygon(), shape, shape), analysis.geometry
+    )
+    assert (number, other.number, other.corner) == (1, 2, (row, column))
+    assert np.array_equal(other.inside, inside)
     assert (row, column) == (-6, -11)
     assert inside.sum() * RESOLUTION_M**2 == pytest.approx(shape.area, abs=RESOLUTION_M * shape.length)
     assert not inside[2 - row, 2 - column]

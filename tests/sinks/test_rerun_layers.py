@@ -166,3 +166,29 @@ def test_a_cleared_path_is_empty_from_then_on_where_the_coverage_stays():
             found[str(chunk.entity_path)] = max(rows)
     assert set(last) >= {"/room/1", "/room/1/label"}
     assert cleared["/room/1"] > max(last["/room/1"], last["/room/1/label"])
+
+
+def test_no_more_rows_wait_than_were_allowed():
+    """When all that wait have the size, the entity with most is written; the others go on waiting."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "run.rrd"
+        recording = rr.RecordingStream("test", send_properties=False)
+        recording.set_sinks(rr.FileSink(str(path)))
+        layers = Layers(recording, chunk_bytes=10**6, waiting_bytes=10_000)
+        for index in range(9):
+            layers.begin(index, index, index, index)
+            layers.show("/picture", Picture(np.full((10, 20), index, np.uint8), 0.05, (0.0, 0.0, 0.0), 0.3))
+            if index % 2:
+                layers.show("/label", Label((0.0, 0.0, 0.0), str(index)))
+        layers.flush()
+        layers.begin(9, 9, 9, 9)
+        layers.show("/label", Label((0.0, 0.0, 0.0), "9"))
+        layers.flush()
+        recording.flush(timeout_sec=10)
+        recording.disconnect()
+        chunks = [
+            (str(chunk.entity_path), chunk.to_record_batch()) for chunk in RrdReader(str(path)).stream()
+        ]
+    chunks.sort(key=lambda chunk: chunk[1].column("rerun.controls.RowId")[0].as_py())
+    rows = [(name, batch.num_rows) for name, batch in chunks]
+    assert rows == [("/picture", 6), ("/picture", 3), ("/label", 4), ("/label", 1)]

@@ -111,9 +111,14 @@ def test_a_run_that_fails_leaves_no_recording(tmp_path):
 def test_a_run_is_shown_in_the_viewer_that_is_open_and_stored_too(tmp_path, monkeypatch):
     from rerun.experimental import ViewerClient
 
+    # A port of its own: the usual one may be that of another viewer on this machine.
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    monkeypatch.setattr("rose2_logs.sinks.rerun_viewer.VIEWER_PORT", port)
     monkeypatch.setenv("PATH", f"{BIN}:/usr/bin:/bin")
     monkeypatch.setenv("HOME", str(tmp_path))
-    with ViewerClient.spawn(headless=True, port=9876, detach_process=False) as viewer:
+    with ViewerClient.spawn(headless=True, port=port, detach_process=False) as viewer:
         options = RunOptions(selection=Selection(max_snapshots=3), annotated_log=False, live=True)
         log = PROJECT / "sample_logs" / "office.mcap"
         done = analyse_log(log, tmp_path / "out", options)

@@ -10,15 +10,17 @@ import shapely
 from drawn_maps import office, snapshot
 
 from rose2_logs.floor_plan.rooms import outline
+from rose2_logs.occupancy import GridGeometry
 from rose2_logs.parameters import Parameters, TrackingParameters
 from rose2_logs.pipeline import METHODS, analyse
+from rose2_logs.rooms import RoomMap
 from rose2_logs.sinks.ros_messages import (
     ROOMS_TYPE,
     MessageMaker,
+    Triangles,
     outer_rings,
     ring_segments,
     ros2_typestore,
-    triangle_corners,
 )
 from rose2_logs.tracking.frames import TrackedSnapshot
 from rose2_logs.tracking.tracker import RoomTracker
@@ -107,18 +109,40 @@ def test_rings_of_shapes_with_parts_and_holes():
     square = shapely.box(0, 0, 3, 3).difference(shapely.box(1, 1, 2, 2))
     both = shapely.union_all([square, shapely.box(5, 0, 6, 1)])
     assert sorted(len(ring) for ring in outer_rings(both)) == [5, 5]
-    assert ring_segments(both).shape == (16, 2)
+    assert ring_segments(outer_rings(both)).shape == (16, 2)
     assert outer_rings(shapely.Polygon()) == []
-    assert ring_segments(shapely.Polygon()).shape == (0, 2)
+    shapes = (shapely.Polygon(), both, shapely.Polygon(), square)
+    rooms = RoomMap(GridGeometry(1.0, (0.0, 0.0), 0.0, "map", (1, 1)), np.zeros((1, 1), np.int32), shapes, [])
+    for shape, rings in zip(shapes, rooms.outer_rings_m, strict=True):
+        assert [ring.tolist() for ring in rings] == [ring.tolist() for ring in outer_rings(shape)]
+    assert ring_segments([]).shape == (0, 2)
 
 
 def test_triangles_fill_any_outline_of_cells():
     rng = np.random.default_rng(3)
     for _ in range(60):
         shape = outline(rng.random((14, 14)) < rng.uniform(0.3, 0.9), 0.05)
-        corners = triangle_corners(shape).reshape(-1, 3, 2)
-        area = shapely.area(shapely.polygons(corners)).sum()
-        assert area == pytest.approx(shape.area, rel=0.05)
+        corners, none = Triangles().corners_of([shape, shapely.Polygon()])
+        found = shapely.polygons(corners.reshape(-1, 3, 2))
+        assert shapely.area(found).sum() == pytest.approx(shape.area, rel=0.05)
+        assert shapely.area(shapely.union_all(found).symmetric_difference(shape)) < 0.05 * shape.area
+        assert none.shape == (0, 2)
+
+
+def test_triangles_fill_four_corners_of_any_kind():
+    """Boxes, as most parts of rooms are, and one whose corner points inwards."""
+    shapes = [
+        shapely.box(0, 0, 2, 1),
+        shapely.Polygon([(0, 0), (0, 1), (3, 1), (2, 0)]),
+        shapely.Polygon([(0, 0), (4, 0), (1, 1), (0, 4)]),
+        shapely.MultiPolygon([shapely.box(0, 0, 1, 1), shapely.box(5, 0, 6, 2)]),
+    ]
+    maker = Triangles()
+    for again in (shapes, shapes[2:]):
+        for shape, corners in zip(again, maker.corners_of(again), strict=True):
+            found = shapely.union_all(shapely.polygons(corners.reshape(-1, 3, 2)))
+            assert len(corners) == 6 * len(shapely.get_parts(shape))
+            assert found.symmetric_difference(shape).area == pytest.approx(0.0, abs=1e-9)
 
 
 def test_probabilities_between_rooms_do_not_look_like_rooms(frame: TrackedSnapshot):
