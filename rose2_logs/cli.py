@@ -148,6 +148,14 @@ def analyze(
     no_mcap: NoAnnotatedLog = False,
     strict: Strict = False,
     layers: Layers = "all",
+    smooth: Annotated[
+        bool,
+        typer.Option(
+            "--smooth",
+            help="Read the maps once more in the end and write smoothed.parquet: how much of each of the "
+            "last map's rooms every map shows.",
+        ),
+    ] = False,
     bag: Annotated[
         bool,
         typer.Option(
@@ -184,6 +192,7 @@ def analyze(
                 layers=shown,
                 annotated_log=not no_mcap,
                 bag=bag,
+                smooth=smooth,
                 live=live,
                 overwrite=overwrite,
                 strict=strict,

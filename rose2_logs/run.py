@@ -25,11 +25,13 @@ from rose2_logs.readers.log import LogReader
 from rose2_logs.readers.log_file import LATEST_NS
 from rose2_logs.run_options import NOT_IN_JOURNAL, RunOptions
 from rose2_logs.sinks.sink import CopyingSink, RunInfo, Sink
+from rose2_logs.sinks.smoothed_table import write_smoothed
 from rose2_logs.sinks.summary import RunTotals, write_summary
 from rose2_logs.sinks.tables import Tables
 from rose2_logs.sinks.viewer_layouts import bag_metadata_path, foxglove_path, rviz_path
 from rose2_logs.tracked_stream import SnapshotWorkers, start_workers, tracked_snapshots
-from rose2_logs.tracking.frames import TrackedSnapshot
+from rose2_logs.tracking.alignment import RigidMotion
+from rose2_logs.tracking.frames import TrackedSnapshot, map_motion
 from rose2_logs.tracking.lives import Moment
 
 __all__ = [
@@ -169,6 +171,8 @@ def _analyse(
     planned = _planned_files(folder, path, options)
     totals = RunTotals()
     last = reader.last()
+    motions: dict[int, RigidMotion | None] = {}
+    frame: TrackedSnapshot | None = None
     first_ns: int | None = None
     way = reader.robot_path(last.geometry.frame_id) if "path" in options.shown_layers else None
     with ExitStack() as stack:
@@ -179,6 +183,8 @@ def _analyse(
             for sink in sinks:
                 sink.write(frame)
             totals.add(frame)
+            if options.smooth:
+                motions[frame.snapshot.index] = map_motion(frame.events)
             logger.info(
                 "snapshot %d: coverage %.1f %%, %d rooms",
                 frame.snapshot.index,
@@ -189,10 +195,13 @@ def _analyse(
                 now_ns = frame.snapshot.log_time_ns
                 first_ns = now_ns if first_ns is None else first_ns
                 on_snapshot(frame, (now_ns - first_ns) / max(last.log_time_ns - first_ns, 1))
-        if totals.snapshots == 0:
+        messages = dataclasses.asdict(reader.counts)
+        if frame is None:
             raise InvalidMapError(f"{path}: none of its {totals.invalid} maps can be analysed")
+        if options.smooth:
+            with muted():  # what is odd was told the first time
+                write_smoothed(planned["smoothed"], reader.snapshots(), frame, motions, options.parameters)
         tables.look_back()
-    messages = dataclasses.asdict(reader.counts)
     if options.origin is not None:
         warnings.rename(str(path), options.origin)
     seconds = time.perf_counter() - start
@@ -247,7 +256,8 @@ def _planned_files(folder: Path, log: Path, options: RunOptions) -> dict[str, Pa
         files |= {"annotated_log": log, "foxglove": foxglove_path(log), "rviz": rviz_path(log)}
         if options.bag:
             files["bag"] = bag_metadata_path(log)
-    files |= {name: folder / f"{name}.parquet" for name in TABLES}
+    tables = (*TABLES, "smoothed") if options.smooth else TABLES
+    files |= {name: folder / f"{name}.parquet" for name in tables}
     return files | {"summary": folder / SUMMARY}
 
 

@@ -10,7 +10,7 @@ from rose2_logs.sinks.sink import RECORDING_LAYERS
 
 NOT_IN_JOURNAL = (
     *("topic", "selection", "parameters", "workers", "recording", "layers", "annotated_log", "bag"),
-    *("live", "origin", "overwrite", "resume", "journal", "strict"),
+    *("live", "smooth", "origin", "overwrite", "resume", "journal", "strict"),
 )
 """Options that the analysis does not depend on, or that a journal names otherwise."""
 
@@ -38,6 +38,9 @@ class RunOptions:
         Whether the folder becomes a bag of ROS 2 that holds the annotated MCAP.
     layers : tuple of str
         Those of `RECORDING_LAYERS` that the recording gets.
+    smooth : bool
+        Whether to go through the maps once more in the end and tell how much of the last map's rooms each
+        shows.
     live : bool
         Also send the recording to an open Rerun viewer.
     overwrite : bool
@@ -61,6 +64,7 @@ class RunOptions:
     annotated_log: bool = True
     bag: bool = False
     layers: tuple[str, ...] = RECORDING_LAYERS
+    smooth: bool = False
     live: bool = False
     overwrite: bool = False
     resume: bool = False

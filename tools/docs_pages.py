@@ -27,6 +27,10 @@ TABLES = {
     "tracks.parquet": (table_schemas.TRACKS, "One row a room over the run."),
     "events.parquet": (table_schemas.EVENTS, "One row an event."),
     "doorways.parquet": (table_schemas.DOORWAYS, "One row a doorway and map."),
+    "smoothed.parquet (analyze --smooth)": (
+        table_schemas.SMOOTHED,
+        "One row a room of the last map and map that shows some of it.",
+    ),
     "room_changes.parquet": (
         table_schemas.ROOM_CHANGES,
         "Of `compare`: one row a group of rooms that belong together, or a room alone.",

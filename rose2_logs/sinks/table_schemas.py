@@ -179,6 +179,19 @@ DOORWAYS = _table(
     }
 )
 
+SMOOTHED = _table(
+    {
+        **_SNAPSHOT,
+        "track": (pa.int32(), "a room of the run's last map"),
+        "area_m2": (pa.float64(), "area of it that this map shows, square metres"),
+        "last_area_share": (
+            pa.float64(),
+            "that over its area in the last map; above 1 where a later map lost some",
+        ),
+    }
+)
+"""The last map's rooms on all maps, of `analyze --smooth`."""
+
 TRACKS = _table(
     {
         "track": (pa.int32(), "number of the room over the run, from 1"),

@@ -40,8 +40,8 @@ class Smoother:
     """Carries the rooms of a run's last map over to the maps before it.
 
     A map is laid over the last one: first as it moved from map to map, then by its walls. Each of its free
-    cells takes the room that lies there in the end, or the nearest. Pieces of a room smaller than
-    `smoothed_min_area_m2` take the room beside them.
+    cells takes the room that lies there in the end; the nearest, where the last map shows no free space.
+    Pieces of a room smaller than `smoothed_min_area_m2` take the room beside them.
 
     Parameters
     ----------
@@ -66,7 +66,9 @@ class Smoother:
         self._occupancy = occupancy or OccupancyParameters()
         self._window = known_window(rooms.labels > 0)
         self._geometry, self._count = rooms.geometry, len(rooms)
-        self._nearest = _filled(rooms.labels[self._window])
+        labels = rooms.labels[self._window]
+        free, _ = classify(last.cells[self._window], self._occupancy)
+        self._nearest = np.where(free, labels, _filled(labels))
         points = wall_points(last, self._occupancy)
         self._fit = WallFit(points, last.geometry.resolution_m) if len(points) >= POINTS_MIN else None
 
