@@ -10,7 +10,7 @@ import pytest
 from saved_maps import two_rooms
 
 from rose2_logs.explored import ExploredPart, block_side
-from rose2_logs.occupancy import GridGeometry, OccupancySnapshot
+from rose2_logs.occupancy import GridGeometry, OccupancySnapshot, is_same_to_analysis
 from rose2_logs.parameters import OccupancyParameters, Parameters
 from rose2_logs.pipeline import analyse
 
@@ -106,3 +106,18 @@ def test_a_large_map_is_analysed_coarser_and_labelled_at_its_own_resolution():
     assert blocks.rooms.labels.shape == cells.shape
     assert ((blocks.rooms.labels > 0) <= (cells == FREE)).all()
     assert (blocks.rooms.labels == whole.rooms.labels)[whole.rooms.labels > 0].mean() > 0.97
+
+
+@pytest.mark.parametrize("before", [-1, 0, 40, 100])
+@pytest.mark.parametrize("now", [-1, 0, 40, 100])
+def test_maps_are_the_same_to_the_analysis_if_no_cell_changes_its_kind(before: int, now: int):
+    """Free, occupied, unknown, or known but neither; a probability may change within its kind."""
+    geometry = GridGeometry(0.05, (0.0, 0.0), 0.0, "map", (2, 2))
+
+    def one(value: int) -> OccupancySnapshot:
+        return OccupancySnapshot(0, 0, 0, "/map", np.array([[0, value], [100, -1]], np.int8), geometry)
+
+    same = is_same_to_analysis(one(before), one(now), OccupancyParameters())
+    assert same == (before == now)
+    assert is_same_to_analysis(one(0), one(19), OccupancyParameters())
+    assert not is_same_to_analysis(one(0), one(20), OccupancyParameters())

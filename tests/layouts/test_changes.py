@@ -12,7 +12,7 @@ from moved_maps import motion_about, moved
 
 from rose2_logs.layouts.comparison import compare_layouts
 from rose2_logs.layouts.room_changes import compare_rooms
-from rose2_logs.layouts.wall_changes import compare_walls
+from rose2_logs.layouts.wall_changes import STEP_M, _stretches, compare_walls
 from rose2_logs.readers import open_log
 from rose2_logs.tracking.alignment import RigidMotion
 
@@ -142,3 +142,16 @@ def test_a_run_without_rooms_is_compared(office):
     assert compare_layouts(office, without).room_counts == {"missing": 3}
     assert compare_layouts(without, office).room_counts == {"new": 3}
     assert compare_layouts(without, without).room_counts == {}
+
+
+@pytest.mark.parametrize("kept", [0, 1])
+def test_a_wall_of_which_one_face_is_there_is_not_gone(kept: int):
+    """Where the other map drew it thinner, its second face lies on free space."""
+    steps = np.arange(30) * STEP_M + STEP_M / 2
+    points = np.concatenate([np.column_stack([steps, np.full(30, y)]) for y in (0.0, 0.15)])
+    on = np.repeat([kept == 0, kept == 1], 30)
+    line = np.array([0.0, 0.0, 3.0, 0.0])
+    gone, compared, there = _stretches(points, on, ~on, line, reach_m=0.2)
+    assert (len(gone), compared, there) == (0, 30, 30)
+    gone, compared, there = _stretches(points, np.zeros(60, bool), np.ones(60, bool), line, reach_m=0.2)
+    assert (len(gone), compared, there) == (1, 30, 0)

@@ -12,10 +12,11 @@ from layout_makers import layout_of
 from moved_maps import motion_about, moved
 
 from rose2_logs.layouts.comparison import compare_layouts
-from rose2_logs.layouts.placing import PlacedMap, place
+from rose2_logs.layouts.placing import PlacedMap, _is_same, place
 from rose2_logs.occupancy import OccupancySnapshot
 from rose2_logs.parameters import OccupancyParameters
 from rose2_logs.readers import open_log
+from rose2_logs.tracking.alignment import RigidMotion
 
 SAMPLES = Path(__file__).parents[2] / "sample_logs"
 OCCUPANCY = OccupancyParameters()
@@ -120,3 +121,14 @@ def test_a_map_without_walls_cannot_be_laid(cells):
     drawn, _ = office()
     assert place(placed(snapshot(cells)), placed(snapshot(drawn))) is None
     assert place(placed(snapshot(drawn)), placed(snapshot(cells))) is None
+
+
+@pytest.mark.parametrize(
+    ("shift_m", "turn_rad", "is_same"),
+    [(0.9, 0.0, True), (1.1, 0.0, False), (0.0, 0.04, True), (0.0, 0.06, False), (0.0, 2 * np.pi, True)],
+)
+def test_placements_are_one_where_the_map_lies_and_is_turned_about_the_same(shift_m, turn_rad, is_same):
+    centre = np.array([30.0, -20.0])
+    one = RigidMotion.moving(centre, centre + 5.0, 1.0)
+    other = RigidMotion.moving(centre, centre + 5.0 + np.array([0.0, shift_m]), 1.0 + turn_rad)
+    assert _is_same(one, other, centre) == is_same

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from reader_logs import START_NS, Map, Update, serialized, serialized_costmap, typestore
 
 from rose2_logs.errors import InvalidMapError
-from rose2_logs.readers.messages import Grid, Patch, decoder
+from rose2_logs.readers.messages import Grid, Patch, decoder, flat_yaw_of
 
 GRID = "nav_msgs/msg/OccupancyGrid"
 ENCODINGS = {1: "ros1", 2: "cdr"}
@@ -286,3 +286,16 @@ def test_broken_protobuf_is_an_error():
         decode(b"\x0a\xff\xff", "foxglove.Grid", "protobuf", SCHEMA)
     with pytest.raises(InvalidMapError, match="schema"):
         decoder("foxglove.Grid", "protobuf", b"\x0a\xff\xff")
+
+
+@pytest.mark.parametrize("degrees", [4.0, 10.0, 90.0])
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_map_that_is_tilted_about_either_axis_is_no_flat_one(axis, degrees):
+    """By some degrees it is, and keeps its yaw: its lengths are right to half a percent."""
+    quaternion = [0.0, 0.0, 0.0, math.cos(math.radians(degrees) / 2)]
+    quaternion[axis] = math.sin(math.radians(degrees) / 2)
+    if degrees < 5:
+        assert flat_yaw_of(tuple(quaternion), []) == pytest.approx(0.0, abs=1e-6)
+    else:
+        with pytest.raises(InvalidMapError, match=f"tilted by {degrees:.0f} degrees"):
+            flat_yaw_of(tuple(quaternion), [])

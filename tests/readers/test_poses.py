@@ -12,7 +12,7 @@ from mcap.writer import Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from rose2_logs.readers import Selection, open_log
-from rose2_logs.readers.poses import BASE_FRAMES, POSE_STEP_M
+from rose2_logs.readers.poses import BASE_FRAMES, POSE_STEP_M, POSE_STEP_S
 
 PROJECT = Path(__file__).parents[2]
 ROS2, ROS1 = get_typestore(Stores.ROS2_HUMBLE), get_typestore(Stores.ROS1_NOETIC)
@@ -214,3 +214,41 @@ def test_a_log_that_was_cut_off_tells_the_way_so_far(tmp_path):
     assert origin == "/tf"
     assert 50 < len(found) < len(expected)
     assert found == pytest.approx(expected[: len(found)])
+
+
+def test_a_fixed_transform_from_long_before_the_selection_still_holds(tmp_path):
+    """It is sent once, when the robot starts."""
+    kind = ROS2.types[TF]
+    messages = [
+        (0, "/tf_static", TF, kind([transform(ROS2, 0, "map", "odom", 5.0, 0.0, 0.0)])),
+        *(
+            (second * SECOND, "/tf", TF, kind([transform(ROS2, 0, "odom", "base_link", second, 0.0, 0.0)]))
+            for second in range(100)
+        ),
+    ]
+    _, found = way(write(tmp_path / "run.mcap", iter(messages)), start_ns=90 * SECOND)
+    assert found[:, 0].tolist() == [95.0, 96.0, 97.0, 98.0, 99.0, 100.0, 101.0, 102.0, 103.0, 104.0]
+
+
+@pytest.mark.parametrize("topic", ["/tf", "/odom"])
+def test_a_fast_robot_is_looked_at_no_oftener_than_its_poses_are_far_apart_in_time(tmp_path, topic):
+    """A hundred messages a second, a metre from each to the next."""
+    kind = ROS2.types[TF]
+    messages = (
+        (tick * SECOND // 100, topic, TF, kind([transform(ROS2, 0, "map", "base_link", tick, 0.0, 0.0)]))
+        if topic == "/tf"
+        else (tick * SECOND // 100, topic, ODOMETRY, odometry(ROS2, 0, float(tick)))
+        for tick in range(300)
+    )
+    _, found = way(write(tmp_path / "run.mcap", messages))
+    assert found[:, 0].tolist() == list(range(0, 300, round(100 * POSE_STEP_S)))
+
+
+def test_turns_along_a_chain_add_up_within_a_circle(tmp_path):
+    kind = ROS2.types[TF]
+    chain = [
+        transform(ROS2, 0, "map", "odom", 0.0, 0.0, 3.0),
+        transform(ROS2, 0, "odom", "base_link", 0.0, 0.0, 3.0),
+    ]
+    _, found = way(write(tmp_path / "run.mcap", iter([(SECOND, "/tf", TF, kind(chain))])))
+    assert found[0, 2] == pytest.approx(6.0 - math.tau)

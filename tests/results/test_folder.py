@@ -72,6 +72,7 @@ def test_a_map_is_chosen_by_number_coverage_or_as_the_last(office_results: Path)
     assert results.choose(2) == 2
     half = results.choose(coverage=0.5)
     assert coverage[half] >= 0.5 > coverage[half - 1]
+    assert results.choose(coverage=float(coverage[2])) == 2
     with pytest.raises(ParameterError, match="from 0 to 5"):
         results.choose(6)
     with pytest.raises(ParameterError, match=r"half is 0\.5"):

@@ -169,6 +169,10 @@ def test_shapes_are_compared_where_the_last_map_has_them():
     lives.lives[1] = dataclasses.replace(lives.lives[1], polygon=moved[0])
     all_rows[1] = dataclasses.replace(all_rows[1], polygons=moved)
     drifts = {0: RigidMotion.none(), 1: RigidMotion.none().then(MOTION)}
+    # And if the map had moved before: only the way from map to map counts.
+    earlier = RigidMotion.none().then(RigidMotion((2.0, -1.0), (0.7, 0.3), -0.4))
+    later = {0: earlier, 1: earlier.then(MOTION)}
+    assert look_back(all_rows, lives, moments, later).final_iou == pytest.approx({0: 1.0, 1: 1.0})
     assert look_back(all_rows, lives, moments, drifts).final_iou == pytest.approx({0: 1.0, 1: 1.0})
     unmoved = look_back(all_rows, lives, moments, dict.fromkeys(moments, RigidMotion.none()))
     assert unmoved.final_iou[0] is not None
