@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import shutil
+import socket
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +22,13 @@ needs_chromium = pytest.mark.skipif(
     CHROMIUM is None or importlib.util.find_spec("playwright") is None,
     reason="needs a browser (chromium) and the package playwright",
 )
+
+
+def free_port() -> int:
+    """Return a port that no one listens at: a fixed one may be in use by tests that run beside."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
 
 
 def coloured_share(picture: Path, window: tuple[slice, slice]) -> float:

@@ -27,7 +27,7 @@ def test_the_summary_tells_rooms_and_since_when_they_were_right():
     info = RunInfo(Path("a|b.mcap"), "/map", "rose2", Parameters(), {"tool": "1"}, {})
     text = summary_text(info, lives, hindsight, 10)
     assert text.startswith("# a/b.mcap\n")
-    assert "**1 rooms** at the end, 2 over the run; 10 maps, 1 min 30 s." in text
+    assert "**1 room** at the end, 2 over the run; 10 maps, 1 min 30 s." in text
     assert "**from 80 % coverage on** (1 min 15 s)" in text
     assert "| 1 | 20.0 | 25 % | 50 % | 100 % | 90 % |" in text
     assert "| version of tool | 1 |" in text
