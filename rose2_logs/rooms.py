@@ -106,7 +106,7 @@ class RoomMap:
                 cells = np.pad((self.labels[box] == room).astype(np.uint8), 1)
                 depth = cv2.distanceTransform(cells, cv2.DIST_L2, cv2.DIST_MASK_3)[1:-1, 1:-1]
                 deep = np.argwhere(depth >= LABEL_DEPTH_SHARE * depth.max())
-                middle = np.argwhere(depth > 0).mean(axis=0)
+                middle = [np.average(np.arange(len(n)) - 1, weights=n) for n in (cells.sum(1), cells.sum(0))]
                 row, column = deep[np.argmin(((deep - middle) ** 2).sum(axis=1))]
                 points[room - 1] = self.geometry.cell_centres(box[0].start + row, box[1].start + column)
             elif not shape.is_empty:

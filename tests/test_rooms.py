@@ -28,7 +28,8 @@ def test_the_name_stands_in_the_seen_part_however_large_the_prediction():
     labels = np.zeros(GEOMETRY.shape, np.int32)
     labels[2:8, 3:9] = 1
     row, column = GEOMETRY.world_to_cell(point_of(labels, shapely.box(0, 0, 50, 50)))
-    assert (3 <= row <= 6) and (4 <= column <= 7)
+    assert 3 <= row <= 6
+    assert 4 <= column <= 7
 
 
 def test_the_name_of_a_ring_stands_on_its_floor():
