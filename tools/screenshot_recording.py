@@ -27,8 +27,8 @@ SETTLE_S = 1.0
 """Between two pictures that have to be the same before one is taken for drawn."""
 DRAW_TIMEOUT_S = 60.0
 """Longest wait for a picture: a busy machine that draws in software may take many seconds."""
-OF_THE_MACHINE = ("rasterizer", "Docker", "containerized")
-"""Words of warnings that are about the machine, not about the recording."""
+OF_THE_MACHINE = ("rasterizer", "Docker", "containerized", "Failed to render screenshot")
+"""Words of warnings that are about the machine, how busy it is too, not about the recording."""
 
 
 @dataclass(frozen=True)
