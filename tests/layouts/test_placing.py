@@ -120,3 +120,19 @@ def test_a_map_without_walls_cannot_be_laid(cells):
     drawn, _ = office()
     assert place(placed(snapshot(cells)), placed(snapshot(drawn))) is None
     assert place(placed(snapshot(drawn)), placed(snapshot(cells))) is None
+
+
+@pytest.mark.parametrize("stated", [0.7, 1.4])
+def test_a_map_of_a_wrong_cell_size_is_told_with_the_scale_that_fits(sample, stated: float):
+    """Whichever way it is wrong; the same building it is not called."""
+    other, _ = without_labels(sample, (12.0, -7.0), 30.0)
+    wrong = placed(other).scaled(stated).snapshot
+    found = compare_layouts(layout_of(sample), layout_of(wrong))
+    assert not found.same_building
+    assert found.scale == pytest.approx(1 / stated, rel=0.02)
+
+
+def test_no_scale_makes_another_building_fit(sample):
+    found = compare_layouts(layout_of(sample), layout_of(last_map("wing.bag")))
+    assert not found.same_building
+    assert found.scale is None
