@@ -33,7 +33,7 @@ def summary_text(info: RunInfo, lives: RoomLives, hindsight: Hindsight | None, m
     text = [
         f"# {_cell(info.log_path.name)}",
         f"**{rooms} room{'' if rooms == 1 else 's'}** at the end, {len(lives.lives)} over the run; "
-        f"{maps} maps{minutes}.",
+        f"{maps} map{'' if maps == 1 else 's'}{minutes}.",
     ]
     if hindsight is not None:
         final = hindsight.layout_final
