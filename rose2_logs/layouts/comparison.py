@@ -107,4 +107,4 @@ def compare_layouts(a: FinalLayout, b: FinalLayout) -> LayoutComparison | None:
     found = LayoutComparison(a, b, placement, rooms, compare_walls(a, b, placement.motion))
     if found.same_building:
         return found
-    return dataclasses.replace(found, scale=fitting_scale(b.map, a.map, SAME_BUILDING_SCORE))
+    return dataclasses.replace(found, scale=fitting_scale(b.map, a.map))

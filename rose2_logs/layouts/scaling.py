@@ -15,8 +15,12 @@ count."""
 SCALE_MIN_CHANGE = 0.03
 """Scales nearer to 1 are no other than the one that was tried."""
 
+SCALED_SCORE = 0.6
+"""Placements at another scale need this score. Of the benchmark's maps those of two buildings reach 0.43 where the
+scale is free, those that differ by their scale alone 0.93."""
 
-def fitting_scale(moving: PlacedMap, fixed: PlacedMap, score: float) -> float | None:
+
+def fitting_scale(moving: PlacedMap, fixed: PlacedMap, least_score: float = SCALED_SCORE) -> float | None:
     """Find how many times larger a map has to be to lie over another.
 
     The lengths and the widths of the two, along the strongest direction of their walls and across it, give
@@ -25,7 +29,7 @@ def fitting_scale(moving: PlacedMap, fixed: PlacedMap, score: float) -> float | 
     Parameters
     ----------
     moving, fixed : PlacedMap
-    score : float
+    least_score : float
         What a placement has to reach.
 
     Returns
@@ -34,7 +38,7 @@ def fitting_scale(moving: PlacedMap, fixed: PlacedMap, score: float) -> float | 
         The scale of the best placement, None where none is good enough.
     """
     ratios = _extents_m(fixed) / np.maximum(_extents_m(moving), moving.resolution_m)
-    best, found = score, None
+    best, found = least_score, None
     for scale in sorted({*ratios.tolist(), math.sqrt(float(ratios.prod()))}):
         if abs(scale - 1) < SCALE_MIN_CHANGE:
             continue
