@@ -16,8 +16,8 @@ SCALE_MIN_CHANGE = 0.03
 """Scales nearer to 1 are no other than the one that was tried."""
 
 SCALED_SCORE = 0.6
-"""Placements at another scale need this score. Of the benchmark's maps those of two buildings reach 0.43 where the
-scale is free, those that differ by their scale alone 0.93."""
+"""Placements at another scale need this score. Of the benchmark's maps two of different buildings reach 0.43
+where the scale is free, two that differ by their scale alone 0.93."""
 
 
 def fitting_scale(moving: PlacedMap, fixed: PlacedMap, least_score: float = SCALED_SCORE) -> float | None:
