@@ -37,9 +37,10 @@ def summary_text(info: RunInfo, lives: RoomLives, hindsight: Hindsight | None, m
     ]
     if hindsight is not None:
         final = hindsight.layout_final
+        last = None if maps == 1 or lives.last is None else lives.last.snapshot
         text.append(
-            "The layout was never as in the end."
-            if final is None
+            "**The layout still changed up to the last map**: take the rooms as preliminary."
+            if final is None or final.snapshot == last
             else f"The layout was as in the end **from {_percent(final.coverage)} coverage on** "
             f"({_duration(final.time_s)})."
         )

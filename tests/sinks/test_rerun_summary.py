@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 
 import shapely
@@ -33,6 +34,10 @@ def test_the_summary_tells_rooms_and_since_when_they_were_right():
     assert "| 1 | 20.0 | 25 % | 50 % | 100 % | 90 % |" in text
     assert "| version of tool | 1 |" in text
     assert "as in the end" not in summary_text(info, lives, None, 10)
+    late = dataclasses.replace(hindsight, layout_final=last)
+    for never in (late, dataclasses.replace(hindsight, layout_final=None)):
+        assert "still changed up to the last map" in summary_text(info, lives, never, 10)
+    assert "**from 100 % coverage on**" in summary_text(info, lives, late, 1)
 
 
 def test_the_summary_names_unsure_rooms_and_the_largest_shift():
