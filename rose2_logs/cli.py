@@ -16,6 +16,7 @@ from rose2_logs.cli_options import (
     EXIT_FAULT,
     EXIT_INTERRUPTED,
     EXIT_KNOWN,
+    Bag,
     Config,
     Debug,
     End,
@@ -35,6 +36,7 @@ from rose2_logs.cli_options import (
     chosen_layers,
     resolve_parameters,
     state,
+    wanted_bag,
 )
 from rose2_logs.errors import AlreadyWholeError, ParameterError, Rose2LogsError
 
@@ -156,12 +158,7 @@ def analyze(
             "last map's rooms every map shows.",
         ),
     ] = False,
-    bag: Annotated[
-        bool,
-        typer.Option(
-            "--bag", help="Also write metadata.yaml: `ros2 bag play OUT/NAME` then plays the annotated MCAP."
-        ),
-    ] = False,
+    bag: Bag = False,
     debug: Debug = False,
 ) -> None:
     """Find and follow the rooms in all maps of a log; write recording, annotated MCAP and tables."""
@@ -173,8 +170,6 @@ def analyze(
     keep_freed_memory()
     parameters = resolve_parameters(config, settings, method)
     shown = chosen_layers(layers)
-    if bag and no_mcap:
-        raise ParameterError("--bag is about the annotated MCAP: leave --no-mcap out")
     names = [log_stem(log) for log in logs]
     if twice := {name for name in names if names.count(name) > 1}:
         raise ParameterError(f"several logs are named {min(twice)}: analyze them to different folders")
@@ -191,7 +186,7 @@ def analyze(
                 recording=not no_rrd,
                 layers=shown,
                 annotated_log=not no_mcap,
-                bag=bag,
+                bag=wanted_bag(bag, no_mcap),
                 smooth=smooth,
                 live=live,
                 overwrite=overwrite,

@@ -9,10 +9,12 @@ import typer
 
 from rose2_logs.cli_options import (
     EXIT_KNOWN,
+    Bag,
     Config,
     Debug,
     End,
     Every,
+    Layers,
     MaxSnapshots,
     Method,
     MinChange,
@@ -20,9 +22,12 @@ from rose2_logs.cli_options import (
     NoRecording,
     Settings,
     Start,
+    Strict,
     Topic,
+    chosen_layers,
     resolve_parameters,
     state,
+    wanted_bag,
 )
 
 BATCH_EXAMPLE = (
@@ -96,6 +101,9 @@ def batch(
     ] = False,
     no_rrd: NoRecording = False,
     no_mcap: NoAnnotatedLog = False,
+    strict: Strict = False,
+    layers: Layers = "all",
+    bag: Bag = False,
     debug: Debug = False,
 ) -> None:
     """Analyze many logs, each to a folder of its own; one data set and one summary of all."""
@@ -114,6 +122,9 @@ def batch(
         method=method,
         recording=not no_rrd,
         annotated_log=not no_mcap,
+        layers=chosen_layers(layers),
+        bag=wanted_bag(bag, no_mcap),
+        strict=strict,
     )
     options = BatchOptions(asked, workers, scheduler, retries, overwrite, rerun)
     with reporting_batch.BatchDisplay(debug=state["debug"]) as display:

@@ -70,6 +70,12 @@ Layers = Annotated[
     ),
 ]
 NoAnnotatedLog = Annotated[bool, typer.Option("--no-mcap", help="Write no annotated MCAP.")]
+Bag = Annotated[
+    bool,
+    typer.Option(
+        "--bag", help="Also write metadata.yaml: `ros2 bag play` of the folder then plays the annotated MCAP."
+    ),
+]
 Method = Annotated[str, typer.Option(help="Segmentation: rose2, morphological, distance or voronoi.")]
 Strict = Annotated[
     bool,
@@ -95,6 +101,19 @@ Settings = Annotated[
         show_default=False,
     ),
 ]
+
+
+def wanted_bag(bag: bool, no_mcap: bool) -> bool:
+    """Check that what is to become a bag is written.
+
+    Raises
+    ------
+    ParameterError
+        If it is not.
+    """
+    if bag and no_mcap:
+        raise ParameterError("--bag is about the annotated MCAP: leave --no-mcap out")
+    return bag
 
 
 def chosen_layers(names: str) -> tuple[str, ...]:

@@ -26,6 +26,13 @@ def print_comparison(result: ComparisonResult) -> None:
             "these do not seem to be two runs in one building: hardly any walls agree, and what is told "
             "below means little"
         )
+        if found.scale is not None:
+            cell_a_m, cell_b_m = found.a.map.resolution_m, found.b.map.resolution_m
+            warning(
+                f"B would fit if it were {found.scale:.2f} times as large: is the size of a cell right? With "
+                f"{cell_b_m * found.scale:.4f} m instead of {cell_b_m:.4f} m in B, or "
+                f"{cell_a_m / found.scale:.4f} m instead of {cell_a_m:.4f} m in A, they show one building"
+            )
     elif found.ambiguous:
         warning(
             "the building fits about as well in another way, as when it looks the same turned by half a "

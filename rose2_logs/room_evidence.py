@@ -15,6 +15,8 @@ from rose2_logs.rooms import RoomMap
 
 OUTLINE_STEP_M = 0.1
 """Outlines are looked at every so many metres: two cells of usual maps."""
+UNSURE_BELOW = 0.7
+"""Rooms whose outline walls back less are unsure: doorways alone take an ordinary room to about 0.9."""
 WALL_REACH_M = 0.2
 """An outline is backed by occupied cells this near: it runs in the middle of walls of usual thickness."""
 

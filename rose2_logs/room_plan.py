@@ -34,7 +34,7 @@ class PlanRoom:
     area_m2 : float
         As far as it was seen.
     label_point_m : (float, float) or None
-        Point deepest inside the shape, None for an empty one.
+        Point well inside what was seen of the room, None for an empty shape.
     neighbours : tuple of int
         Rooms behind its doorways, ascending.
     confidence : float or None

@@ -12,8 +12,8 @@ from shapely.geometry.base import BaseGeometry
 
 from rose2_logs.occupancy import FloatArray, GridGeometry, label_sizes
 
-LABEL_TOLERANCE_M = 0.05
-"""A label's point is the deepest of its room to this: one cell of usual maps."""
+LABEL_DEPTH_SHARE = 0.8
+"""A label stands at most this much less deep than its room is at most: along a corridor in the middle."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,14 +92,25 @@ class RoomMap:
 
     @cached_property
     def label_points_m(self) -> FloatArray:
-        """World point (R, 2) deepest inside each room's polygon, metres; NaN for an empty polygon."""
-        import shapely
+        """World point (R, 2) for the name of each room, metres: well inside its cells, so where it was seen.
 
-        shapes = np.array(self.polygons, object)
-        points = np.full((len(shapes), 2), np.nan)
-        drawn = ~shapely.is_empty(shapes)
-        radii = shapely.maximum_inscribed_circle(shapes[drawn], tolerance=LABEL_TOLERANCE_M)
-        points[drawn] = shapely.get_coordinates(shapely.get_point(radii, 0))
+        Of a room without cells it is a point of its polygon, NaN where that is empty.
+        """
+        import cv2
+        from scipy import ndimage
+
+        points = np.full((len(self), 2), np.nan)
+        for room, box in enumerate(ndimage.find_objects(self.labels, max_label=len(self)), start=1):
+            shape = self.polygons[room - 1]
+            if box is not None:
+                cells = np.pad((self.labels[box] == room).astype(np.uint8), 1)
+                depth = cv2.distanceTransform(cells, cv2.DIST_L2, cv2.DIST_MASK_3)[1:-1, 1:-1]
+                deep = np.argwhere(depth >= LABEL_DEPTH_SHARE * depth.max())
+                middle = [np.average(np.arange(len(n)) - 1, weights=n) for n in (cells.sum(1), cells.sum(0))]
+                row, column = deep[np.argmin(((deep - middle) ** 2).sum(axis=1))]
+                points[room - 1] = self.geometry.cell_centres(box[0].start + row, box[1].start + column)
+            elif not shape.is_empty:
+                points[room - 1] = shape.representative_point().coords[0]
         return points
 
     @cached_property

@@ -2,8 +2,9 @@
 
     python tools/make_docs_pictures.py docs/images
 
-The pictures are made by the tool's own stages, so they show what it does. ``overview.png`` is a screenshot of
-the viewer and not made here; see ``tools/screenshot_recording.py``.
+The pictures are made by the tool's own stages, so they show what it does. ``overview.png`` and ``report.png``
+are screenshots and not made here: of the viewer, see ``tools/screenshot_recording.py``, and of a report in a
+browser.
 """
 
 from __future__ import annotations
@@ -22,12 +23,15 @@ from numpy.typing import NDArray
 from PIL import Image as PillowImage
 
 from rose2_logs.comparing import compare_runs
+from rose2_logs.drawing.pixels import as_pixels
+from rose2_logs.drawing.plan import PANEL, draw_plan
 from rose2_logs.explored import ExploredPart
 from rose2_logs.floor_plan.stage import make_floor_plan
 from rose2_logs.occupancy import UNKNOWN, BoolArray, FloatArray, OccupancySnapshot, known_window
 from rose2_logs.parameters import Parameters, ReadingParameters
 from rose2_logs.pipeline import SnapshotAnalysis, analyse
 from rose2_logs.readers import Selection, open_log
+from rose2_logs.results.folder import RunResults
 from rose2_logs.rose.spectrum import Spectrum, compute_spectrum
 from rose2_logs.rose.stage import find_structure
 from rose2_logs.run import RunOptions, analyse_log, seconds_into_log
@@ -47,6 +51,7 @@ METHOD_SNAPSHOT = 24
 HALF_WAY_S = 200.0
 """The second run of the comparison ends here: some rooms are not entered yet."""
 TUTORIAL_COVERAGES = (0.35, 0.7, 1.0)
+GROWTH_PANEL_PX = 700
 SCALE = 2
 """Pixels along a cell."""
 MARGIN_CELLS = 24
@@ -232,27 +237,17 @@ def _spectrum_picture(spectrum: Spectrum, directions_rad: FloatArray) -> Image:
     return image
 
 
-def tutorial_pictures(log: Path, parameters: Parameters) -> Iterator[tuple[str, Image]]:
-    """Yield the rooms at some coverages of a run, side by side, on the canvas of its last map."""
-    with open_log(log) as reader:
-        snapshots = list(reader.snapshots())
-    found = [analyse(snapshot, parameters) for snapshot in snapshots]
-    coverage = np.array([each.free_area_m2 for each in found]) / found[-1].free_area_m2
-    panels = []
-    for wanted in TUTORIAL_COVERAGES:
-        chosen = int(np.abs(coverage - wanted).argmin())
-        image = _floor_plan_picture(Painter(snapshots[chosen]), found[chosen])
-        panels.append(image)
-    height, width = (max(panel.shape[axis] for panel in panels) for axis in (0, 1))
-    framed = [
-        np.pad(
-            panel,
-            ((height - panel.shape[0], 0), (0, width - panel.shape[1] + MARGIN_CELLS), (0, 0)),
-            constant_values=255,
-        )
-        for panel in panels
-    ]
-    yield "tutorial_growth", np.concatenate(framed, axis=0 if width > 1.5 * height else 1)
+def growth_picture(log: Path) -> tuple[str, Image]:
+    """Draw the rooms at some coverages of a run, side by side, as `figure` and the report do."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = analyse_log(log, Path(name) / "run", RunOptions(recording=False)).folder
+        results = RunResults(folder)
+        with results.open_maps() as maps:
+            plans = [results.plan(results.choose(coverage=each), maps) for each in TUTORIAL_COVERAGES]
+    corners = np.array([plan.bounds_m for plan in plans])
+    low, high = corners[:, :2].min(axis=0).tolist(), corners[:, 2:].max(axis=0).tolist()
+    drawings = [draw_plan(plan, PANEL, (*low, *high)) for plan in plans]
+    return "tutorial_growth", np.hstack([as_pixels(drawing, GROWTH_PANEL_PX) for drawing in drawings])
 
 
 def comparison_picture(log: Path) -> tuple[str, Image]:
@@ -301,7 +296,7 @@ def main() -> int:
         snapshot = next(found for found in reader.snapshots() if found.index == METHOD_SNAPSHOT)
     for name, image in (
         *method_pictures(snapshot, parameters),
-        *tutorial_pictures(TUTORIAL_LOG, parameters),
+        growth_picture(TUTORIAL_LOG),
         comparison_picture(TUTORIAL_LOG),
     ):
         save(folder / f"{name}.png", image)

@@ -23,10 +23,12 @@ from rose2_logs.sinks.rerun_blueprint import COVERAGE_UNIT
 
 PORT = 9899
 LOAD_TIMEOUT_S = 60.0
-SETTLE_S = 2.0
-"""Time for the views to draw after the cursor has moved."""
-OF_THE_MACHINE = ("rasterizer", "Docker", "containerized")
-"""Words of warnings that are about the machine, not about the recording."""
+SETTLE_S = 1.0
+"""Between two pictures that have to be the same before one is taken for drawn."""
+DRAW_TIMEOUT_S = 60.0
+"""Longest wait for a picture: a busy machine that draws in software may take many seconds."""
+OF_THE_MACHINE = ("rasterizer", "Docker", "containerized", "Failed to render screenshot")
+"""Words of warnings that are about the machine, how busy it is too, not about the recording."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +41,10 @@ class Shot:
         The PNG to write.
     coverage : float
         Where along the run, 0 to 1.
+    log_time_s : float, optional
+        Where along the time of the log instead, seconds since 1970.
+    snapshot : int, optional
+        At which map instead.
     tabs : tuple of str
         Names of views to bring to the front.
     is_view : bool
@@ -49,6 +55,8 @@ class Shot:
     coverage: float = 1.0
     tabs: tuple[str, ...] = ()
     is_view: bool = False
+    log_time_s: float | None = None
+    snapshot: int | None = None
 
 
 def take(recording: Path, shots: Sequence[Shot], port: int = PORT, settle_s: float = SETTLE_S) -> list[str]:
@@ -67,9 +75,14 @@ def take(recording: Path, shots: Sequence[Shot], port: int = PORT, settle_s: flo
         _wait_until_loaded(viewer)
         for shot in shots:
             views = _bring_to_front(viewer, shot.tabs)
-            viewer.set_time("coverage", sequence=round(shot.coverage / COVERAGE_UNIT), play_state="paused")
-            time.sleep(settle_s)
-            shot.picture.write_bytes(viewer.take_screenshot(views[0] if shot.is_view else None))
+            if shot.log_time_s is not None:
+                viewer.set_time("message_log_time", timestamp=shot.log_time_s, play_state="paused")
+            elif shot.snapshot is not None:
+                viewer.set_time("snapshot", sequence=shot.snapshot, play_state="paused")
+            else:
+                step = round(shot.coverage / COVERAGE_UNIT)
+                viewer.set_time("coverage", sequence=step, play_state="paused")
+            shot.picture.write_bytes(_drawn(viewer, views[0] if shot.is_view else None, settle_s))
             problems += _reports(viewer)
         problems += [
             f"{entry.level}: {entry.message}"
@@ -83,10 +96,32 @@ def take(recording: Path, shots: Sequence[Shot], port: int = PORT, settle_s: flo
 def _wait_until_loaded(viewer: ViewerClient) -> None:
     end = time.monotonic() + LOAD_TIMEOUT_S
     while time.monotonic() < end:
-        if viewer.get_state().views:
+        state = viewer.get_state()
+        if state.views and not state.loading:
             return
         time.sleep(0.5)
     raise RuntimeError(f"the recording did not load within {LOAD_TIMEOUT_S:.0f} s")
+
+
+def _drawn(viewer: ViewerClient, view: str | None, settle_s: float) -> bytes:
+    """Take a picture as soon as it does not change any more.
+
+    A view whose tab has just come to the front is not there until the viewer has drawn once.
+    """
+    end = time.monotonic() + DRAW_TIMEOUT_S
+    before = b""
+    while True:
+        time.sleep(settle_s)
+        try:
+            now = viewer.take_screenshot(view)
+        except Exception as error:
+            # What the client raises depends on its version.
+            if time.monotonic() > end:
+                raise RuntimeError(f"no picture within {DRAW_TIMEOUT_S:.0f} s: {error}") from error
+            continue
+        if now == before or (before and time.monotonic() > end):
+            return now
+        before = now
 
 
 def _bring_to_front(viewer: ViewerClient, names: Sequence[str]) -> list[str]:
@@ -119,10 +154,15 @@ def main() -> int:
     parser.add_argument("recording", type=Path, help="the .rrd file")
     parser.add_argument("picture", type=Path, help="the PNG to write")
     parser.add_argument("--coverage", type=float, default=1.0, help="where along the run, 0 to 1 (default 1)")
+    parser.add_argument(
+        "--time", type=float, metavar="S", help="where along the log's time instead, seconds since 1970"
+    )
+    parser.add_argument("--snapshot", type=int, metavar="N", help="at which map instead")
     parser.add_argument("--tab", action="append", default=[], help="name of a view to bring to the front")
     parser.add_argument("--view", action="store_true", help="the first of these alone, not the whole window")
     arguments = parser.parse_args()
-    shot = Shot(arguments.picture, arguments.coverage, tuple(arguments.tab), arguments.view)
+    place = {"log_time_s": arguments.time, "snapshot": arguments.snapshot}
+    shot = Shot(arguments.picture, arguments.coverage, tuple(arguments.tab), arguments.view, **place)
     if arguments.view and not arguments.tab:
         parser.error("--view needs --tab")
     problems = take(arguments.recording, [shot])

@@ -22,6 +22,7 @@ from rose2_logs.batch.names import assign_names
 from rose2_logs.batch.record import BatchSettings, Record, Signature, local_signature, read_record
 from rose2_logs.batch.task import LogOutcome, LogTask, Progress
 from rose2_logs.errors import LogError, OutputError, ParameterError
+from rose2_logs.readers.discovery import BAG_DESCRIPTION
 from rose2_logs.run import SUMMARY, TABLES
 
 logger = logging.getLogger(__name__)
@@ -267,8 +268,12 @@ class _Batch:
     def _is_whole(self, name: str) -> bool:
         """Whether results that stand have all the files that are wanted now."""
         wanted = [SUMMARY, *(f"{table}.parquet" for table in TABLES)]
-        wanted += ["*.rrd"] if self._options.settings.recording else []
-        wanted += ["*.rose2.mcap"] if self._options.settings.annotated_log else []
+        asked, record = self._options.settings, self._records.get(name)
+        if asked.recording and record is not None and record.layers != asked.layers:
+            return False
+        wanted += ["*.rrd"] if asked.recording else []
+        wanted += ["*.rose2.mcap"] if asked.annotated_log else []
+        wanted += [BAG_DESCRIPTION] if asked.bag else []
         folder = self._out / LOGS_FOLDER / name
         return all(next(folder.glob(each), None) for each in wanted)
 

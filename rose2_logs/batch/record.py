@@ -14,6 +14,7 @@ from rose2_logs.batch.location import Location
 from rose2_logs.errors import LogError
 from rose2_logs.parameters import Parameters
 from rose2_logs.provenance import log_files
+from rose2_logs.sinks.sink import RECORDING_LAYERS
 from rose2_logs.sinks.summary import write_json
 
 RECORD = ".batch.json"
@@ -40,6 +41,12 @@ class BatchSettings:
         The segmentation method.
     recording, annotated_log : bool
         Whether to write the Rerun recording and the annotated MCAP.
+    layers : tuple of str
+        Those of `RECORDING_LAYERS` that the recordings get.
+    bag : bool
+        Whether each folder becomes a bag of ROS 2 that holds the annotated MCAP.
+    strict : bool
+        Whether the first warning about a log is an error. It is not asked of logs whose results stand.
     """
 
     topic: str | None = None
@@ -52,6 +59,9 @@ class BatchSettings:
     method: str = "rose2"
     recording: bool = True
     annotated_log: bool = True
+    layers: tuple[str, ...] = RECORDING_LAYERS
+    bag: bool = False
+    strict: bool = False
 
     def determining(self) -> dict[str, Any]:
         """Everything that the tables depend on beside the log, as flat JSON values; the version too."""
@@ -134,12 +144,15 @@ class Record:
         Its fingerprint.
     settings : dict
         `BatchSettings.determining`.
+    layers : tuple of str
+        Those of the recording, if there is one.
     """
 
     address: str
     signature: Signature
     sha256: str
     settings: dict[str, Any]
+    layers: tuple[str, ...] = RECORDING_LAYERS
 
     def write(self, folder: Path) -> None:
         """Write it beside the results in a folder.
@@ -168,7 +181,8 @@ def read_record(folder: Path) -> Record | None:
         kept = json.loads((folder / RECORD).read_text(encoding="utf-8"))
         files = tuple((name, size, tuple(version)) for name, size, version in kept["signature"]["files"])
         signature = Signature(files, bool(kept["signature"]["is_sound"]))
-        return Record(str(kept["address"]), signature, str(kept["sha256"]), dict(kept["settings"]))
+        layers = tuple(kept.get("layers", RECORDING_LAYERS))
+        return Record(str(kept["address"]), signature, str(kept["sha256"]), dict(kept["settings"]), layers)
     except (OSError, ValueError, KeyError, TypeError):
         return None
 

@@ -204,7 +204,7 @@ def _analyse(task: LogTask, report: Report, notices: Notices) -> LogOutcome:
         time.sleep(RETRY_PAUSE_S * 2 ** (task.attempt - 2))
     signature = signature_of(task.log)
     if task.known is not None and task.stands_by(signature):
-        return LogOutcome(task.name, "unchanged", record=_record(task, signature, task.known.sha256))
+        return LogOutcome(task.name, "unchanged", record=_confirmed(task, task.known, signature))
     with _local_copy(task.log) as path:
         try:
             return _analyse_local(task, path, signature, report)
@@ -226,7 +226,7 @@ def _analyse_local(task: LogTask, path: Path, signature: Signature, report: Repo
     if task.known is not None:
         is_same = fingerprint(path)["sha256"] == task.known.sha256
         if is_same and task.is_whole:
-            return LogOutcome(task.name, "unchanged", record=_record(task, signature, task.known.sha256))
+            return LogOutcome(task.name, "unchanged", record=_confirmed(task, task.known, signature))
         if not is_same and task.known_name == task.name and not task.may_replace:
             raise OutputError(f"{task.log.address}: has changed since its results; --overwrite replaces them")
     asked = task.settings
@@ -238,7 +238,10 @@ def _analyse_local(task: LogTask, path: Path, signature: Signature, report: Repo
             parameters=asked.parameters,
             method=asked.method,
             recording=asked.recording,
+            layers=asked.layers,
             annotated_log=asked.annotated_log,
+            bag=asked.bag,
+            strict=asked.strict,
             journal=False,  # a log that was stopped is begun anew, in another folder
             origin=task.log.address,
         )
@@ -261,8 +264,14 @@ def _analyse_local(task: LogTask, path: Path, signature: Signature, report: Repo
         return LogOutcome(task.name, "done", results=folder)
 
 
+def _confirmed(task: LogTask, known: Record, signature: Signature) -> Record:
+    """Record of results that stand, as their log lies and looks now."""
+    return dataclasses.replace(_record(task, signature, known.sha256), layers=known.layers)
+
+
 def _record(task: LogTask, signature: Signature, sha256: str) -> Record:
-    return Record(task.log.address, signature, sha256, task.settings.determining())
+    asked = task.settings
+    return Record(task.log.address, signature, sha256, asked.determining(), asked.layers)
 
 
 @contextmanager

@@ -107,12 +107,15 @@ def draw_plan(plan: RoomPlan, style: PlanStyle = FIGURE, bounds_m: Bounds | None
         drawing.add(_picture(plan.map.cropped(), matrix, style.picture_most_px))
     shapes = {room.number: _simpler(on_page(room.shape), style.detail) for room in plan.rooms}
     predicted = predicted_parts(plan)
+    # Names stand on what was seen.
+    seen = dict(shapes)
     for room in plan.rooms:
         shape, colour = shapes[room.number], track_colour(room.number)
         if plan.map is None:
             drawing.add(Area(shape, colour, SHAPE_OPACITY, _told(room)))
         elif room.number in predicted:
             part = _simpler(on_page(predicted[room.number]), style.detail)
+            seen[room.number] = shape.difference(part)
             lines = Lines(hatching(part, style.hatch_gap), _darker(colour, HATCH_DARKER), 0.7 * style.line)
             drawing.add(Area(part, colour, PREDICTED_OPACITY), lines)
     for number, shape in shapes.items():
@@ -125,7 +128,8 @@ def draw_plan(plan: RoomPlan, style: PlanStyle = FIGURE, bounds_m: Bounds | None
         drawing.add(*(Area(shapes[room.number], white, 0.0, _told(room)) for room in plan.rooms))
     if style.font:
         for room in plan.rooms:
-            drawing.add(*_label(room, shapes[room.number], style))
+            name_on = seen[room.number] if seen[room.number].area else shapes[room.number]
+            drawing.add(*_label(room, name_on, style))
     if style.has_legend:
         drawing.add(*_legend(plan, style, scale, left, height, has_predicted=bool(predicted)))
     return drawing

@@ -14,21 +14,24 @@ from rose2_logs.files import replacing
 from rose2_logs.occupancy import classify
 from rose2_logs.parameters import OccupancyParameters
 from rose2_logs.room_plan import PlanMap, RoomPlan
+from rose2_logs.sinks.label_image import write_label_image
 
 logger = logging.getLogger(__name__)
 
 ROOM_VALUES = 99
 """An occupancy grid holds 0 for free and 100 for occupied; the values between are for rooms."""
 FREE, OCCUPIED, UNKNOWN_PIXEL = 0, 100, 255
-ENDINGS = (".rooms.pgm", ".rooms.yaml", ".rooms.list.yaml")
-"""The image, its description for map_server, and what rooms its values are."""
+ENDINGS = (".rooms.pgm", ".rooms.yaml", ".rooms.list.yaml", ".rooms.labels.png")
+"""The image, its description for map_server, what rooms its values are, and the rooms by their numbers."""
 
 
 def write_labelled_map(plan: RoomPlan, folder: Path, stem: str) -> tuple[Path, ...]:
     """Write a plan's map with its rooms.
 
     The description says ``mode: raw``, so that cells load with the values of the image: 0 free, 100 occupied,
-    255 unknown, 1 to 99 a room. Which room a value is stands in the list, with what else is known of it.
+    255 unknown, 1 to 99 a room. Which room a value is stands in the list, with what else is known of it. More
+    rooms than that share values, so a second image of the same cells holds the numbers of the rooms, 0 where
+    there is none.
 
     Returns
     -------
@@ -50,9 +53,13 @@ def write_labelled_map(plan: RoomPlan, folder: Path, stem: str) -> tuple[Path, .
     values = room_values(plan)
     if len(plan.rooms) > ROOM_VALUES:
         logger.warning(
-            "%s: %d rooms share %d values; the list tells which", folder / stem, len(plan.rooms), ROOM_VALUES
+            "%s: %d rooms share the %d values that a map of map_server has for them; %s has them apart",
+            folder / stem,
+            len(plan.rooms),
+            ROOM_VALUES,
+            f"{stem}{ENDINGS[3]}",
         )
-    image, about, listing = (folder / f"{stem}{ending}" for ending in ENDINGS)
+    image, about, listing, labels = (folder / f"{stem}{ending}" for ending in ENDINGS)
     pixels = labelled_pixels(plan.map, values)
     with replacing(image) as part:
         Image.fromarray(pixels).save(part, format="PPM")
@@ -67,8 +74,10 @@ def write_labelled_map(plan: RoomPlan, folder: Path, stem: str) -> tuple[Path, .
         "free_thresh": 0.196,
     }
     _write_yaml(about, described)
-    _write_yaml(listing, _listing(plan, values, about.name))
-    return image, about, listing
+    _write_yaml(listing, _listing(plan, values, about.name, labels.name))
+    numbers = np.where(np.isin(plan.map.labels, list(values)), plan.map.labels, 0)
+    write_label_image(labels, np.flipud(numbers))
+    return image, about, listing, labels
 
 
 def room_values(plan: RoomPlan) -> dict[int, int]:
@@ -89,7 +98,7 @@ def labelled_pixels(below: PlanMap, values: dict[int, int]) -> np.ndarray[Any, n
     return np.flipud(np.where(labelled > 0, labelled, pixels)).copy()
 
 
-def _listing(plan: RoomPlan, values: dict[int, int], map_name: str) -> dict[str, Any]:
+def _listing(plan: RoomPlan, values: dict[int, int], map_name: str, labels_name: str) -> dict[str, Any]:
     rooms = [
         {
             "value": values[room.number],
@@ -113,7 +122,13 @@ def _listing(plan: RoomPlan, values: dict[int, int], map_name: str) -> dict[str,
         }
         for door in plan.doorways
     ]
-    return {"map": map_name, "frame_id": plan.frame_id, "rooms": rooms, "doorways": doorways}
+    return {
+        "map": map_name,
+        "labels": labels_name,
+        "frame_id": plan.frame_id,
+        "rooms": rooms,
+        "doorways": doorways,
+    }
 
 
 def _write_yaml(path: Path, content: dict[str, Any]) -> None:

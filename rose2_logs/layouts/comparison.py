@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections import Counter
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,6 +12,7 @@ import shapely
 from rose2_logs.layouts.layout import FinalLayout
 from rose2_logs.layouts.placing import Placement, place
 from rose2_logs.layouts.room_changes import RoomChange, RoomStatus, compare_rooms
+from rose2_logs.layouts.scaling import fitting_scale
 from rose2_logs.layouts.wall_changes import WallComparison, compare_walls
 
 SAME_BUILDING_SCORE = 0.4
@@ -38,6 +40,8 @@ class LayoutComparison:
         Every room of both.
     walls : WallComparison or None
         None where a method found no walls.
+    scale : float, optional
+        Where they do not seem to show one building: how many times larger B would have to be to lie over A.
     """
 
     a: FinalLayout
@@ -45,6 +49,7 @@ class LayoutComparison:
     placement: Placement
     rooms: tuple[RoomChange, ...]
     walls: WallComparison | None
+    scale: float | None = None
 
     @property
     def same_building(self) -> bool:
@@ -99,4 +104,7 @@ def compare_layouts(a: FinalLayout, b: FinalLayout) -> LayoutComparison | None:
     if placement is None:
         return None
     rooms = compare_rooms(a, b, placement.motion)
-    return LayoutComparison(a, b, placement, rooms, compare_walls(a, b, placement.motion))
+    found = LayoutComparison(a, b, placement, rooms, compare_walls(a, b, placement.motion))
+    if found.same_building:
+        return found
+    return dataclasses.replace(found, scale=fitting_scale(b.map, a.map))

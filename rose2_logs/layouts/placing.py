@@ -6,6 +6,7 @@ starts are fitted wall to wall.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from dataclasses import dataclass
 
@@ -97,6 +98,12 @@ class PlacedMap:
         faces_m = wall_points(snapshot, occupancy)
         least = max(POINTS_MIN, FACES_MIN_SHARE * len(occupied_m))
         self.walls = faces_m if len(faces_m) >= least else occupied_m
+
+    def scaled(self, scale: float) -> PlacedMap:
+        """Return the same map with cells so many times larger."""
+        geometry = self.snapshot.geometry
+        larger = dataclasses.replace(geometry, resolution_m=geometry.resolution_m * scale)
+        return PlacedMap(dataclasses.replace(self.snapshot, geometry=larger), self._occupancy)
 
     @property
     def resolution_m(self) -> float:

@@ -9,10 +9,9 @@ import numpy as np
 
 from rose2_logs.report.words import MISSING, date_of, duration, size
 from rose2_logs.results.folder import RunResults
+from rose2_logs.room_evidence import UNSURE_BELOW
 from rose2_logs.room_plan import RoomPlan
 
-UNSURE_BELOW = 0.7
-"""Rooms whose outline walls back less are unsure: doorways alone take an ordinary room to about 0.9."""
 LATE_COVERAGE = 0.95
 """A layout that became final only beyond would likely have changed if the run had gone on."""
 FRONTIER_MIN_M = 2.0

@@ -93,6 +93,7 @@ def write_comparison_summary(
         "b": {"results": str(folder_b), **_layout(comparison.b)},
         "same_building": comparison.same_building,
         "ambiguous": comparison.ambiguous,
+        "b_fits_if_scaled_by": comparison.scale,
         "b_in_a": {"x_m": x, "y_m": y, "yaw_rad": float(np.remainder(yaw + np.pi, 2 * np.pi) - np.pi)},
         "alignment": {
             "agreement": placement.agreement,

@@ -9,7 +9,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from rose2_logs.occupancy import FloatArray
-from rose2_logs.sinks.rerun_lives import FINAL_IOU, FINAL_SHARE, LIVES
+from rose2_logs.sinks.rerun_lives import FINAL_IOU, FINAL_SHARE, LIVES, SHIFTS
 from rose2_logs.sinks.rerun_world import (
     CLEAN,
     FACES,
@@ -75,7 +75,9 @@ def make_blueprint(
         rrb.Horizontal(
             rrb.Tabs(*views, active_tab=0),
             rrb.Vertical(
-                _curves("How right the layout was", ("/run/coverage", FINAL_SHARE, FINAL_IOU), (0.0, 1.05)),
+                _curves(
+                    "How right the layout was", ("/run/coverage", FINAL_SHARE, FINAL_IOU, SHIFTS), (0.0, 1.05)
+                ),
                 rrb.Tabs(
                     _lives(),
                     _curves("Area, m²", ("/run/area/**",), legend=False),
@@ -146,11 +148,9 @@ def _eye(low: FloatArray, high: FloatArray) -> rrb.EyeControls3D:
 
 
 def _axis() -> rrb.archetypes.TimeAxis:
-    """Return an axis over the whole run; without its range a plot opens zoomed in."""
-    whole_run = rr.encodings.TimeRange(
-        start=rr.encodings.TimeRangeBoundary.absolute(seq=0),
-        end=rr.encodings.TimeRangeBoundary.absolute(seq=round(1 / COVERAGE_UNIT)),
-    )
+    """Return an axis over the whole run, whichever timeline it goes along; by default a plot is zoomed in."""
+    end = rr.encodings.TimeRangeBoundary.infinite()
+    whole_run = rr.encodings.TimeRange(start=end, end=end)
     return rrb.archetypes.TimeAxis(link="Independent", view_range=whole_run)
 
 

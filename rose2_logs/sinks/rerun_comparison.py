@@ -217,7 +217,8 @@ def _document(comparison: LayoutComparison) -> str:
     return (
         f"A: {comparison.a.name}, B: {comparison.b.name}\n\n{told}\n\n"
         f"| rooms | | |\n|---|---|---|\n{counts}\n\n"
-        f"| walls | | |\n|---|---|---|\n{lengths}\n"
+        f"| walls | | |\n|---|---|---|\n{lengths}\n\n"
+        "Missing walls are red, new ones blue, moved ones orange.\n"
     )
 
 

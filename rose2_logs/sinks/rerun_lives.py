@@ -13,6 +13,8 @@ from rose2_logs.tracking.hindsight import Hindsight
 from rose2_logs.tracking.lives import Moment
 
 LIVES, FINAL_SHARE, FINAL_IOU = "/room", "/run/final_share", "/run/final_iou"
+SHIFTS = "/run/map_shifted"
+"""Marks upon the curve of coverage where the whole map shifted."""
 FORMING, SHAPED, SETTLED = "forming", "shape right", "settled"
 STATE_TINTS = {FORMING: 0.3, SHAPED: 0.65, SETTLED: 1.0}
 """States of a room, and the share of its colour that each is shown with."""

@@ -20,12 +20,12 @@ from rose2_logs.sinks.rerun_blueprint import COVERAGE_UNIT, make_blueprint
 from rose2_logs.sinks.rerun_columns import Entry, Scalar
 from rose2_logs.sinks.rerun_faults import abandon, require_space
 from rose2_logs.sinks.rerun_layers import CHUNK_BYTES, Layers
-from rose2_logs.sinks.rerun_lives import FINAL_IOU, FINAL_SHARE, Lives
+from rose2_logs.sinks.rerun_lives import FINAL_IOU, FINAL_SHARE, SHIFTS, Lives
 from rose2_logs.sinks.rerun_summary import summary_text
 from rose2_logs.sinks.rerun_world import World
 from rose2_logs.sinks.sink import RECORDING_LAYERS, RunInfo
 from rose2_logs.sinks.tables import Tables
-from rose2_logs.tracking.frames import RoomEvent, TrackedSnapshot
+from rose2_logs.tracking.frames import RoomEvent, TrackedSnapshot, map_motion
 from rose2_logs.tracking.lives import RoomLives
 
 logger = logging.getLogger(__name__)
@@ -39,6 +39,7 @@ CURVES = {
     "/run/variation_bits": ("variation of information, bits", (250, 100, 100)),
 }
 """Curves of the whole run: what they are called and their colours."""
+SHIFT_COLOUR = (255, 80, 80)
 
 
 class RerunRecording:
@@ -116,6 +117,10 @@ class RerunRecording:
         self._lanes = Lives(self._recording)
         for path, (name, colour) in CURVES.items():
             self._recording.log(path, rr.SeriesLines(names=name, colors=[colour], widths=2), static=True)
+        jumps = rr.SeriesPoints(
+            names="the map shifted", colors=[SHIFT_COLOUR], markers="cross", marker_sizes=8
+        )
+        self._recording.log(SHIFTS, jumps, static=True)
         return self
 
     def write(self, frame: TrackedSnapshot) -> None:
@@ -186,6 +191,8 @@ class RerunRecording:
     def _log_curves(self, frame: TrackedSnapshot) -> None:
         self._layers.add("/run/coverage", Scalar(frame.coverage))
         self._layers.add("/run/rooms", Scalar(len(frame.track_ids)))
+        if map_motion(frame.events) is not None:
+            self._layers.add(SHIFTS, Scalar(frame.coverage))
         if frame.change is not None and frame.change.variation_bits is not None:
             self._layers.add("/run/variation_bits", Scalar(frame.change.variation_bits))
         for track in sorted(self._shown - set(frame.track_ids)):

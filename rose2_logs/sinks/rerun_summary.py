@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
+import math
+
+from rose2_logs.room_evidence import UNSURE_BELOW
+from rose2_logs.sinks.rerun_blueprint import COVERAGE_UNIT
 from rose2_logs.sinks.sink import RunInfo
 from rose2_logs.tracking.hindsight import Hindsight
 from rose2_logs.tracking.lives import Moment, RoomLives
+
+NAMED_MOST = 6
+"""Rooms named in one sentence."""
 
 
 def summary_text(info: RunInfo, lives: RoomLives, hindsight: Hindsight | None, maps: int) -> str:
@@ -22,19 +29,22 @@ def summary_text(info: RunInfo, lives: RoomLives, hindsight: Hindsight | None, m
         Number of maps.
     """
     minutes = "" if lives.last is None else f", {_duration(lives.last.time_s)}"
+    rooms = len(lives.in_last_map)
     text = [
         f"# {_cell(info.log_path.name)}",
-        f"**{len(lives.in_last_map)} rooms** at the end, {len(lives.lives)} over the run; "
-        f"{maps} maps{minutes}.",
+        f"**{rooms} room{'' if rooms == 1 else 's'}** at the end, {len(lives.lives)} over the run; "
+        f"{maps} map{'' if maps == 1 else 's'}{minutes}.",
     ]
     if hindsight is not None:
         final = hindsight.layout_final
+        last = None if maps == 1 or lives.last is None else lives.last.snapshot
         text.append(
-            "The layout was never as in the end."
-            if final is None
+            "**The layout still changed up to the last map**: take the rooms as preliminary."
+            if final is None or final.snapshot == last
             else f"The layout was as in the end **from {_percent(final.coverage)} coverage on** "
             f"({_duration(final.time_s)})."
         )
+    text += _worth_a_look(lives)
     rows = [
         "| room | area, m² | first seen | shape right | area settled | walls |",
         "|--:|--:|--:|--:|--:|--:|",
@@ -52,7 +62,8 @@ def summary_text(info: RunInfo, lives: RoomLives, hindsight: Hindsight | None, m
     text.append(
         "Percent of coverage: when the room was first seen; when its shape with the unseen part first "
         "overlapped its last one by 0.8; from when on its area was within 10 % of its last. "
-        "Walls: share of its outline that walls back."
+        "Walls: share of its outline that walls back. "
+        f"On the timeline `coverage`, {1 / COVERAGE_UNIT:.0f} is 100 %."
     )
     about = {
         "log": info.origin or info.log_path.name,
@@ -66,6 +77,26 @@ def summary_text(info: RunInfo, lives: RoomLives, hindsight: Hindsight | None, m
         )
     )
     return "\n\n".join(text) + "\n"
+
+
+def _worth_a_look(lives: RoomLives) -> list[str]:
+    """Tell which rooms are unsure, and where the whole map shifted."""
+    told = []
+    shares = [(lives.lives[track].outline_wall_share, track) for track in lives.in_last_map]
+    unsure = sorted((share, track) for share, track in shares if share is not None and share < UNSURE_BELOW)
+    if unsure:
+        named = ", ".join(f"{track} ({_percent(share)})" for share, track in unsure[:NAMED_MOST])
+        more = f" and {len(unsure) - NAMED_MOST} more" if len(unsure) > NAMED_MOST else ""
+        told.append(f"**Unsure**, with little wall around: room {named}{more}.")
+    if lives.largest_shift is not None:
+        at, motion = lives.largest_shift
+        x, y = motion.shift_xy_m
+        told.append(
+            f"**The whole map shifted** {'once' if lives.shifts == 1 else f'{lives.shifts} times'}, most by "
+            f"{math.hypot(x, y):.2f} m and {math.degrees(motion.turn_rad):+.1f}° at {_percent(at.coverage)} "
+            "coverage: loop closures, or trouble of SLAM."
+        )
+    return told
 
 
 def _percent(share: float) -> str:

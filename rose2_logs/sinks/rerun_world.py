@@ -9,12 +9,14 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from rose2_logs.occupancy import FloatArray
+from rose2_logs.room_evidence import UNSURE_BELOW
 from rose2_logs.sinks.hatching import hatch_unseen
 from rose2_logs.sinks.palette import track_colour
 from rose2_logs.sinks.rerun_columns import Label, Strips
 from rose2_logs.sinks.rerun_layers import Layers
 from rose2_logs.sinks.rerun_pictures import MapPictures, spectrum_picture
 from rose2_logs.tracking.frames import TrackedSnapshot
+from rose2_logs.tracking.lives import evidence_of
 
 LAYER_STEP_M = 0.01
 """Layers lie this far above each other, so that none flickers through another."""
@@ -140,7 +142,9 @@ class World:
                 self._begin_track(track)
             self._layers.show(f"{ROOMS}/{track}", _rings(rooms.outer_rings_m[number]))
             x, y, z = points[number]
-            text = f"Room {track}, {rooms.areas_m2[number]:.0f} m²"
+            wall_share, _ = evidence_of(frame, number)
+            unsure = "" if wall_share is None or wall_share >= UNSURE_BELOW else ", unsure"
+            text = f"Room {track}, {rooms.areas_m2[number]:.0f} m²{unsure}"
             self._layers.show(f"{ROOMS}/{track}/label", Label((x, y, z), text))
 
     def _begin_track(self, track: int) -> None:

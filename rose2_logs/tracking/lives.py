@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
-from rose2_logs.tracking.frames import RoomEvent, TrackedSnapshot
+from rose2_logs.tracking.alignment import RigidMotion
+from rose2_logs.tracking.frames import RoomEvent, TrackedSnapshot, map_motion
 
 
 @dataclass(frozen=True)
@@ -73,12 +74,18 @@ class RoomLives:
         The last map.
     in_last_map : tuple of int
         The tracks that it shows, ascending.
+    shifts : int
+        How often the whole map shifted.
+    largest_shift : (Moment, RigidMotion) or None
+        The first of the greatest of these.
     """
 
     def __init__(self) -> None:
         self.lives: dict[int, RoomLife] = {}
         self.last: Moment | None = None
         self.in_last_map: tuple[int, ...] = ()
+        self.shifts = 0
+        self.largest_shift: tuple[Moment, RigidMotion] | None = None
         self._first_time_ns: int | None = None
 
     def moment(self, frame: TrackedSnapshot) -> Moment:
@@ -101,6 +108,11 @@ class RoomLives:
             life.outline_wall_share, life.frontier_m = evidence_of(frame, number)
         for event in frame.events:
             self._count(event)
+        if (motion := map_motion(frame.events)) is not None:
+            self.shifts += 1
+            before_m = -1.0 if self.largest_shift is None else math.hypot(*self.largest_shift[1].shift_xy_m)
+            if math.hypot(*motion.shift_xy_m) > before_m:
+                self.largest_shift = now, motion
         self.last, self.in_last_map = now, tuple(sorted(frame.track_ids))
 
     def _count(self, event: RoomEvent) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import errno
 import json
 import shutil
@@ -10,6 +11,7 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 from batches import Heard, WorkersHere, summary, tree
+from rosbags import rosbag2
 from saved_maps import save_run
 
 from rose2_logs.batch import driver, task
@@ -18,6 +20,7 @@ from rose2_logs.batch.folders import LOGS_FOLDER, REPLACED, WORK_FOLDER, put_in_
 from rose2_logs.batch.record import RECORD, BatchSettings
 from rose2_logs.errors import LogError, OutputError, ParameterError
 from rose2_logs.parameters import Parameters
+from rose2_logs.sinks.sink import RECORDING_LAYERS
 
 QUIET = BatchSettings(recording=False, annotated_log=False)
 
@@ -144,6 +147,39 @@ def test_results_that_lack_a_file_are_made_again(batches):
     assert batches.run("one") == {"one_run": "up to date"}
     (batches.out / "logs" / "one_run" / "rooms.parquet").unlink()
     assert batches.run("one") == {"one_run": "done"}
+
+
+def test_a_recording_of_other_layers_is_made_again(batches):
+    """Only where it is asked for; what was written before is remembered."""
+    plain, full = (BatchSettings(annotated_log=False, layers=layers) for layers in ((), RECORDING_LAYERS))
+    recording = batches.out / "logs" / "one_run" / "run.rrd"
+    assert batches.run("one", settings=plain) == {"one_run": "done"}
+    small = recording.stat().st_size
+    assert batches.run("one", settings=plain) == {"one_run": "up to date"}
+    assert batches.run("one") == {"one_run": "up to date"}
+    assert batches.run("one", settings=full) == {"one_run": "done"}
+    assert recording.stat().st_size > small
+
+
+def test_each_folder_becomes_a_bag(batches):
+    """Of results that stand without a description, too."""
+    described = [batches.out / "logs" / name / "metadata.yaml" for name in ("one_run", "two_run")]
+    settings = BatchSettings(recording=False, bag=True)
+    assert batches.run("one", settings=dataclasses.replace(settings, bag=False)) == {"one_run": "done"}
+    assert not described[0].exists()
+    assert batches.run(settings=settings) == {"one_run": "done", "two_run": "done"}
+    for path in described:
+        with rosbag2.Reader(path.parent) as bag:
+            assert "/rose2/rooms" in bag.topics
+
+
+def test_strict_makes_a_warning_about_a_log_its_failure(batches):
+    """The other logs are analysed."""
+    described = batches.logs / "two" / "run" / "map1.yaml"
+    described.write_text(described.read_text().replace("resolution: 0.05", "resolution: 0"))
+    settings = dataclasses.replace(QUIET, strict=True)
+    assert batches.run(settings=settings, rerun=True) == {"one_run": "done", "two_run": "failed"}
+    assert "an error because of --strict" in summary(batches.out)["two_run"]["reason"]
 
 
 def test_a_log_that_moved_is_known_by_its_content(batches):

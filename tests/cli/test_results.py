@@ -34,6 +34,7 @@ def test_exports_name_the_map_unless_it_is_the_last(cli, office_results: Path, t
         "office.rooms.pgm",
         "office.rooms.yaml",
         "office.rooms.list.yaml",
+        "office.rooms.labels.png",
         "office.snapshot1.graph.json",
     }
 

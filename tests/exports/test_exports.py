@@ -14,14 +14,16 @@ import pytest
 import shapely
 import yaml
 from drawn_plans import LEFT, RIGHT, two_rooms_plan
+from PIL import Image
 from shapely.geometry import shape
 
 from rose2_logs.errors import OutputError, ParameterError
 from rose2_logs.exports.dxf import LAYERS
 from rose2_logs.exports.formats import FORMATS, planned_files, write_plan
-from rose2_logs.exports.map_server import room_values
+from rose2_logs.occupancy import GridGeometry
 from rose2_logs.readers import open_log
 from rose2_logs.results.folder import RunResults
+from rose2_logs.room_plan import PlanMap
 
 
 @pytest.fixture(params=[0.0, 0.4], ids=["straight", "turned"])
@@ -106,7 +108,7 @@ def test_the_same_plan_gives_the_same_files(plan, tmp_path: Path):
 
 def test_labelled_map_is_read_as_a_map(plan, tmp_path: Path):
     """Our reader of map_server's files gets the cells, their place, and the rooms as values."""
-    image, about, listing = write_plan(plan, ["map_server"], tmp_path, "two")
+    image, about, listing, labels = write_plan(plan, ["map_server"], tmp_path, "two")
     with open_log(about) as log:
         snapshot = log.first()
     geometry = plan.map.geometry
@@ -120,12 +122,31 @@ def test_labelled_map_is_read_as_a_map(plan, tmp_path: Path):
     assert np.array_equal(snapshot.cells[outside], plan.map.cells[outside])
     assert rooms[LEFT]["neighbours"] == [RIGHT]
     assert image.read_bytes().startswith(b"P5")
+    assert np.array_equal(np.flipud(np.asarray(Image.open(labels))), plan.map.labels)
 
 
-def test_more_rooms_than_values_share_them():
-    rooms = [dataclasses.replace(two_rooms_plan().rooms[0], number=number) for number in range(1, 201)]
-    values = room_values(dataclasses.replace(two_rooms_plan(), rooms=tuple(rooms)))
+def test_more_rooms_than_values_are_still_told_apart(tmp_path: Path, caplog):
+    """The map that map_server loads has 99 values for them, the image of numbers has one for each."""
+    plan = two_rooms_plan()
+    numbers = range(201, 501)
+    labels = np.zeros((40, 60), np.int32)
+    labels[:30, :10] = np.arange(201, 501).reshape(30, 10)
+    rooms = tuple(dataclasses.replace(plan.rooms[0], number=number) for number in numbers)
+    geometry = GridGeometry(0.05, (1.0, 2.0), 0.0, "map", labels.shape)
+    below = PlanMap(geometry, np.zeros(labels.shape, np.int8), labels)
+    many = dataclasses.replace(plan, rooms=rooms, doorways=(), map=below)
+    image, about, listing, apart = write_plan(many, ["map_server"], tmp_path, "many")
+    assert "300 rooms share the 99 values" in caplog.text
+    assert apart.name in caplog.text
+    assert np.array_equal(np.flipud(np.asarray(Image.open(apart))), labels)
+    values = {each["room"]: each["value"] for each in yaml.safe_load(listing.read_text())["rooms"]}
+    assert yaml.safe_load(listing.read_text())["labels"] == apart.name
     assert set(values.values()) == set(range(1, 100))
+    with open_log(about) as log:
+        cells = log.first().cells
+    assert all((cells[labels == number] == values[number]).all() for number in numbers)
+    assert (cells[labels == 0] == 0).all()
+    assert image.read_bytes().startswith(b"P5")
 
 
 def test_graph_is_read_by_networkx(plan, tmp_path: Path):

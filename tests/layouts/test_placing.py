@@ -132,3 +132,19 @@ def test_placements_are_one_where_the_map_lies_and_is_turned_about_the_same(shif
     one = RigidMotion.moving(centre, centre + 5.0, 1.0)
     other = RigidMotion.moving(centre, centre + 5.0 + np.array([0.0, shift_m]), 1.0 + turn_rad)
     assert _is_same(one, other, centre) == is_same
+
+
+@pytest.mark.parametrize("stated", [0.7, 1.4])
+def test_a_map_of_a_wrong_cell_size_is_told_with_the_scale_that_fits(sample, stated: float):
+    """Whichever way it is wrong; the same building it is not called."""
+    other, _ = without_labels(sample, (12.0, -7.0), 30.0)
+    wrong = placed(other).scaled(stated).snapshot
+    found = compare_layouts(layout_of(sample), layout_of(wrong))
+    assert not found.same_building
+    assert found.scale == pytest.approx(1 / stated, rel=0.02)
+
+
+def test_no_scale_makes_another_building_fit(sample):
+    found = compare_layouts(layout_of(sample), layout_of(last_map("wing.bag")))
+    assert not found.same_building
+    assert found.scale is None

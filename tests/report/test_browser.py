@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from finished_runs import SAMPLE_LOGS, renamed_topic, run_of
+from looking import CHROMIUM, needs_chromium
 
 from rose2_logs.report.page import write_report
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+pytestmark = needs_chromium
 PHONE = {"width": 390, "height": 844}
 DESKTOP = {"width": 1280, "height": 900}
 TOPIC = "/<script>document.title='taken over'</script>"
-
-playwright = pytest.importorskip("playwright.sync_api", reason="the browser tests need playwright")
-if CHROMIUM is None:
-    pytest.skip("the browser tests need chromium, as by apt install chromium", allow_module_level=True)
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +27,9 @@ def report(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator:
-    with playwright.sync_playwright() as running:
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as running:
         # A container's root may not use Chromium's sandbox; the page is our own.
         started = running.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
         yield started

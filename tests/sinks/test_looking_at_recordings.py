@@ -1,6 +1,6 @@
 """Recordings as a person sees them: in Rerun's viewer, and in its web viewer in a browser.
 
-The kept pictures are made by this module itself: ``python tests/sinks/test_looking_at_recordings.py``.
+The kept pictures are made by this module itself, run with tests/ on PYTHONPATH.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from itertools import cycle, pairwise
 from pathlib import Path
 
 import numpy as np
-from looking import CHROMIUM, coloured_share, needs_chromium, needs_vulkan, small
+from looking import CHROMIUM, coloured_share, free_port, needs_chromium, needs_vulkan, small
 from numpy.typing import NDArray
 from PIL import Image
 
@@ -29,10 +29,16 @@ COVERAGES = (0.3, 0.6, 1.0)
 TABS = ("Clean map", "Structure score", "Walls", "Faces", "Voronoi graph", "Spectrum")
 PANELS = ("Lives of rooms", "Area, m²", "Count", "Change")
 TEXTS = ("Events", "Summary")
+FIRST_MAP_S = 1_700_000_020.0
+"""Log time of the sample's first map."""
 GOLDEN_WIDTH = 160
 MOST_DIFFERENCE = 6.0
 """Mean difference of two pictures of the same, in steps of 256: another version draws lines otherwise."""
-LOAD_S, LOOK_S = 180.0, 0.7
+END_OF_CURVES, LANES = (slice(70, 280), slice(1750, 1910)), (slice(340, 700), slice(1420, 1910))
+"""Where they stand in the window: rows and columns."""
+CURVES_SHARE, LANES_SHARE = 0.01, 0.3
+"""Share of these that thin curves, and lanes, take at least."""
+LOAD_S, LOOK_S = 180.0, 0.4
 BROWSER_FLAGS = (
     "--no-sandbox",
     "--use-gl=angle",
@@ -60,8 +66,9 @@ def shots(folder: Path) -> dict[str, Path]:
         tab: Shot(folder / f"{tab}.png", 1.0, (tab, panel, text), True)
         for tab, panel, text in zip(TABS, cycle(PANELS), cycle(TEXTS), strict=False)
     }
-    taken = along | others
-    problems = take(record(folder), list(taken.values()), port=9894, settle_s=LOOK_S)
+    over = {"over time": Shot(folder / "time.png", tabs=(PANELS[0],), log_time_s=FIRST_MAP_S)}
+    taken = along | others | over
+    problems = take(record(folder), list(taken.values()), port=free_port(), settle_s=LOOK_S)
     assert not problems
     return {name: shot.picture for name, shot in taken.items()}
 
@@ -78,6 +85,9 @@ def test_the_viewer_shows_the_rooms_as_it_did_and_finds_no_fault_in_any_view(tmp
         assert np.abs(now - kept(at)).mean() < MOST_DIFFERENCE, name
     # The map fills its view.
     assert coloured_share(pictures["rooms_100"], (slice(None), slice(None))) > 0.35
+    # Curves and lanes go over the whole run along the log's time, too; the curves are no stroke at the rim.
+    assert coloured_share(pictures["over time"], END_OF_CURVES) > CURVES_SHARE
+    assert coloured_share(pictures["over time"], LANES) > LANES_SHARE
     for name in TABS:
         assert np.asarray(Image.open(pictures[name]).convert("L")).std() > 5, name
 

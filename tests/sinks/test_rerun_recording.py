@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import socket
 import subprocess
 import sys
 import time
@@ -12,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from looking import needs_vulkan
+from looking import free_port, needs_vulkan
 from saved_maps import save_run
 
 from rose2_logs.errors import OutputError
@@ -111,10 +110,7 @@ def test_a_run_that_fails_leaves_no_recording(tmp_path):
 def test_a_run_is_shown_in_the_viewer_that_is_open_and_stored_too(tmp_path, monkeypatch):
     from rerun.experimental import ViewerClient
 
-    # A port of its own: the usual one may be that of another viewer on this machine.
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
+    port = free_port()
     monkeypatch.setattr("rose2_logs.sinks.rerun_viewer.VIEWER_PORT", port)
     monkeypatch.setenv("PATH", f"{BIN}:/usr/bin:/bin")
     monkeypatch.setenv("HOME", str(tmp_path))
@@ -133,9 +129,7 @@ def test_a_run_is_shown_in_the_viewer_that_is_open_and_stored_too(tmp_path, monk
 def test_a_viewer_that_is_closed_along_the_way_does_not_stop_the_run(tmp_path, monkeypatch):
     from rerun.experimental import ViewerClient
 
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
+    port = free_port()
     monkeypatch.setattr("rose2_logs.sinks.rerun_viewer.VIEWER_PORT", port)
     monkeypatch.setenv("PATH", f"{BIN}:/usr/bin:/bin")
     monkeypatch.setenv("HOME", str(tmp_path))
@@ -160,9 +154,7 @@ def test_live_without_a_viewer_or_a_screen_says_what_to_do(tmp_path, monkeypatch
     for name in ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"):
         monkeypatch.delenv(name, raising=False)
     # A port of its own: the one of the viewers may be in use by another test.
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        monkeypatch.setattr("rose2_logs.sinks.rerun_viewer.VIEWER_PORT", probe.getsockname()[1])
+    monkeypatch.setattr("rose2_logs.sinks.rerun_viewer.VIEWER_PORT", free_port())
     options = RunOptions(selection=Selection(max_snapshots=1), annotated_log=False, live=True)
     with pytest.raises(OutputError, match="no Rerun viewer is open"):
         analyse_log(PROJECT / "sample_logs" / "office.mcap", tmp_path / "out", options)

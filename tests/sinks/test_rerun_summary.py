@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 
 import shapely
@@ -9,6 +10,7 @@ import shapely
 from rose2_logs.parameters import Parameters
 from rose2_logs.sinks.rerun_summary import summary_text
 from rose2_logs.sinks.sink import RunInfo
+from rose2_logs.tracking.alignment import RigidMotion
 from rose2_logs.tracking.hindsight import Hindsight
 from rose2_logs.tracking.lives import Moment, RoomLife, RoomLives
 
@@ -27,8 +29,33 @@ def test_the_summary_tells_rooms_and_since_when_they_were_right():
     info = RunInfo(Path("a|b.mcap"), "/map", "rose2", Parameters(), {"tool": "1"}, {})
     text = summary_text(info, lives, hindsight, 10)
     assert text.startswith("# a/b.mcap\n")
-    assert "**1 rooms** at the end, 2 over the run; 10 maps, 1 min 30 s." in text
+    assert "**1 room** at the end, 2 over the run; 10 maps, 1 min 30 s." in text
     assert "**from 80 % coverage on** (1 min 15 s)" in text
     assert "| 1 | 20.0 | 25 % | 50 % | 100 % | 90 % |" in text
     assert "| version of tool | 1 |" in text
     assert "as in the end" not in summary_text(info, lives, None, 10)
+    late = dataclasses.replace(hindsight, layout_final=last)
+    for never in (late, dataclasses.replace(hindsight, layout_final=None)):
+        assert "still changed up to the last map" in summary_text(info, lives, never, 10)
+    assert "**from 100 % coverage on**" in summary_text(info, lives, late, 1)
+
+
+def test_the_summary_names_unsure_rooms_and_the_largest_shift():
+    """The least sure first, six at most by number; nothing of it where there is none."""
+    first, last = Moment(0, 0.0, 0.25), Moment(9, 90.0, 1.0)
+    lives = RoomLives()
+    lives.lives = {
+        track: RoomLife(first, last, outline_wall_share=share)
+        for track, share in enumerate((0.9, 0.5, 0.31, 0.69, 0.7, 0.6, 0.6, 0.6, 0.6, None), start=1)
+    }
+    lives.in_last_map, lives.last = tuple(lives.lives), last
+    info = RunInfo(Path("a.mcap"), "/map", "rose2", Parameters(), {}, {})
+    text = summary_text(info, lives, None, 1)
+    assert "room 3 (31 %), 2 (50 %), 6 (60 %), 7 (60 %), 8 (60 %), 9 (60 %) and 1 more." in text
+    assert "1 map, 1 min" in text
+    assert "shifted" not in text
+    lives.shifts, lives.largest_shift = 2, (Moment(4, 40.0, 0.4), RigidMotion((0.0, 0.0), (0.3, -0.4), 0.02))
+    text = summary_text(info, lives, None, 10)
+    assert "shifted** 2 times, most by 0.50 m and +1.1° at 40 % coverage" in text
+    lives.in_last_map = (1,)
+    assert "Unsure" not in summary_text(info, lives, None, 10)

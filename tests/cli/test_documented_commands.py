@@ -1,0 +1,58 @@
+"""Every command that README and documentation show can be typed as it stands."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+import typer
+
+from rose2_logs.cli import app
+from rose2_logs.sinks.ros_messages import ROOM_DEFINITION, ROOMS_DEFINITION
+
+PROJECT = Path(__file__).parents[2]
+PAGES = [PROJECT / "README.md", *sorted((PROJECT / "docs").rglob("*.md"))]
+BLOCK = re.compile(r"```(?:sh|text)\n(.*?)```", re.DOTALL)
+INLINE = re.compile(r"`(?:\.venv/bin/)?(rose2-logs\s[a-z]+\s[^`]+)`")
+
+
+def commands(page: Path) -> list[str]:
+    """Those in blocks and in the text, without the names that stand for what the reader has."""
+    text = page.read_text(encoding="utf-8")
+    lines = [line for block in BLOCK.findall(text) for line in block.splitlines()]
+    # A prompt or another command may stand before.
+    shown = [
+        line[line.index("rose2-logs ") :] for line in lines if re.search(r"(^|[ /])rose2-logs [a-z]", line)
+    ]
+    # A line of the text may be broken within a command.
+    return shown + [" ".join(found.split()) for found in INLINE.findall(text)]
+
+
+SHOWN = [(page.relative_to(PROJECT).as_posix(), command) for page in PAGES for command in commands(page)]
+
+
+def test_commands_are_found():
+    """In the README, the tutorial and the how-to pages."""
+    pages = {page for page, _ in SHOWN}
+    assert {"README.md", "docs/tutorial.md", "docs/howto/own-log.md", "docs/howto/other-programs.md"} <= pages
+    assert len(SHOWN) > 40
+
+
+@pytest.mark.parametrize(("page", "command"), SHOWN)
+def test_its_options_and_arguments_are_taken(page: str, command: str):
+    """By the command line itself, which is not run."""
+    words = shlex.split(command)[1:]
+    known = typer.main.get_command(app).commands
+    assert words[0] in known
+    # Raises what is wrong with the words.
+    assert known[words[0]].make_context(words[0], words[1:])
+
+
+def test_the_page_on_formats_has_the_definition_that_is_written():
+    formats = (PROJECT / "docs" / "formats.md").read_text(encoding="utf-8")
+    shown = {tuple(line.partition("#")[0].split()) for line in formats.splitlines()}
+    for line in (ROOMS_DEFINITION + ROOM_DEFINITION).splitlines():
+        if field := tuple(line.partition("#")[0].split()):
+            assert field in shown, line
