@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import re
+
 from rose2_logs.sinks.sink import RunInfo
 from rose2_logs.tracking.hindsight import Hindsight
 from rose2_logs.tracking.lives import Moment, RoomLives
+
+_MARKUP = re.compile(r"[\\`*_{}\[\]<>()#!&~$]")
+"""What has a meaning in Markdown; after a backslash it has none."""
 
 
 def summary_text(info: RunInfo, lives: RoomLives, hindsight: Hindsight | None, maps: int) -> str:
@@ -82,5 +87,5 @@ def _duration(seconds: float) -> str:
 
 
 def _cell(value: object) -> str:
-    """Text for a cell of a table: names come from a log, and a bar would end the cell."""
-    return str(value).replace("|", "/").replace("\n", " ")
+    """Text for a cell of a table: names come from a log, and are neither markup nor the end of the cell."""
+    return _MARKUP.sub(r"\\\g<0>", " ".join(str(value).split()).replace("|", "/"))
