@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import os
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -10,6 +11,9 @@ from pathlib import Path
 from rose2_logs.errors import OutputError
 
 logger = logging.getLogger(__name__)
+
+LONGEST_NAME_BYTES = 255 - len("..journal")
+"""File systems take 255; what is hidden beside results while they are made has a dot and an ending more."""
 
 
 def part_of(path: Path) -> Path:
@@ -49,6 +53,38 @@ def replacing(path: Path) -> Iterator[Path]:
             part.replace(path)
         finally:
             part.unlink(missing_ok=True)
+
+
+def require_utf8(path: Path) -> None:
+    """Refuse a name that results could not hold: tables, recordings and pages are UTF-8.
+
+    Raises
+    ------
+    OutputError
+        If the path has bytes that are not.
+    """
+    try:
+        str(path.resolve()).encode()
+    except UnicodeEncodeError as error:
+        raise OutputError(
+            f"{path}: its name is not UTF-8, and results could not name it; rename it"
+        ) from error
+
+
+def require_short(files: Iterable[Path]) -> None:
+    """Refuse names that are too long for a file system.
+
+    Raises
+    ------
+    OutputError
+        If one is.
+    """
+    for file in files:
+        if len(os.fsencode(file.name)) > LONGEST_NAME_BYTES:
+            raise OutputError(
+                f"{file}: cannot be written: its name is longer than {LONGEST_NAME_BYTES} bytes; "
+                "give the log a shorter name"
+            )
 
 
 def refuse_existing(files: Iterable[Path], *, overwrite: bool) -> None:

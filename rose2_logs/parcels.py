@@ -114,10 +114,11 @@ def _written(arrays: Sequence[memoryview], spans: Sequence[tuple[int, int]], fol
 def unpack(parcel: Parcel) -> Any:
     """Take a value out of its parcel, once; its arrays stay in the mapped memory as long as they live."""
     if parcel.file is None:
-        return pickle.loads(parcel.pickled)
+        return pickle.loads(parcel.pickled)  # noqa: S301 (of a worker of this run)
     with Path(parcel.file).open("rb") as file:
         mapped = memoryview(mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_COPY))
     # On Windows a file that is mapped stays; it goes with its folder.
     with suppress(OSError):
         Path(parcel.file).unlink()
-    return pickle.loads(parcel.pickled, buffers=[mapped[begin:end] for begin, end in parcel.spans])
+    arrays = [mapped[begin:end] for begin, end in parcel.spans]
+    return pickle.loads(parcel.pickled, buffers=arrays)  # noqa: S301 (of a worker of this run)

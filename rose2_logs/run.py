@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from rose2_logs.errors import InvalidMapError, ParameterError
-from rose2_logs.files import refuse_existing
+from rose2_logs.files import refuse_existing, require_short, require_utf8
 from rose2_logs.journal import JournaledWorkers
 from rose2_logs.notices import Notices, gathered, muted
 from rose2_logs.output_folder import OutputFolder
@@ -49,6 +49,8 @@ logger = logging.getLogger(__name__)
 
 TABLES = ("snapshots", "rooms", "tracks", "events", "doorways")
 SUMMARY = "summary.json"
+NAMELESS = "log"
+"""What the results of a log without a name of its own are called."""
 
 
 @dataclass(frozen=True)
@@ -68,10 +70,14 @@ OnSnapshot = Callable[[TrackedSnapshot, float], None]
 
 
 def log_stem(path: Path) -> str:
-    """Name for the results of a log: its name without its format's ending; of a pattern, its folder's."""
+    """Name for the results of a log: its name without its format's ending; of a pattern, its folder's.
+
+    A name of dots alone, which would mean a folder above, becomes another.
+    """
     path = path.resolve()
     is_pattern = glob.has_magic(path.name) and not path.exists()
-    return stem_of(path.parent.name if is_pattern else path.name)
+    name = stem_of(path.parent.name if is_pattern else path.name)
+    return name if name.strip(".") else NAMELESS
 
 
 def seconds_into_log(
@@ -118,7 +124,8 @@ def analyse_log(
     LogError, InvalidMapError
         If the log cannot be read or holds no map that can be analysed.
     OutputError
-        If there are results already and they may not be replaced, or one cannot be written.
+        If there are results already and they may not be replaced, one cannot be written, or could not name
+        the log.
     StrictError
         If something is odd, where that is an error.
     AlreadyWholeError
@@ -132,7 +139,10 @@ def _analyse_log(
     path: Path, folder: Path, options: RunOptions, on_snapshot: OnSnapshot | None, warnings: Notices
 ) -> RunResult:
     start = time.perf_counter()
+    for named in (path, folder):
+        require_utf8(named)
     output = OutputFolder(folder, [file.name for file in _planned_files(folder, path, options).values()])
+    require_short((folder, *output.files))
     output.refuse_log(path)
     refuse_existing(output.files, overwrite=options.overwrite or options.resume)
     with (

@@ -15,7 +15,7 @@ from rose2_logs.errors import LogError, ParameterError
 from rose2_logs.explored import coarser_for_its_size
 from rose2_logs.exports.formats import planned_files, write_plan
 from rose2_logs.exports.geojson import plan_geojson
-from rose2_logs.files import refuse_existing
+from rose2_logs.files import refuse_existing, require_utf8
 from rose2_logs.occupancy import OccupancySnapshot
 from rose2_logs.parameters import Parameters, ReadingParameters
 from rose2_logs.pipeline import analyse
@@ -75,8 +75,10 @@ def segment_map(
     LogError, InvalidMapError, ParameterError
         If the map cannot be read, or its resolution is neither given nor written beside it.
     OutputError
-        If results exist and may not be replaced, or cannot be written.
+        If results exist and may not be replaced, cannot be written, or could not name the map.
     """
+    for named in (map_file, folder):
+        require_utf8(named)
     name = map_file.stem
     files = tuple(
         folder / f"{name}{ending}" for ending in (".labels.png", ".floor_plan.geojson", ".rooms.png")

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rose2_logs.drawing.svg import escape, quoteattr
 from rose2_logs.occupancy import BoolArray, FloatArray
 from rose2_logs.sinks.axes import Axis, axis_of
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import base64
 import io
-from xml.sax.saxutils import escape, quoteattr
+import re
+from xml.sax import saxutils
 
 import numpy as np
 import shapely
@@ -18,6 +19,9 @@ DECIMALS = 2
 FEW_COLOURS = 128
 MIDDLE_EM = 0.36
 """A text's baseline lies so far below the middle of its capitals: half their height in usual fonts."""
+
+_NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+"""Characters that no XML may hold, not even escaped; names in a log may."""
 
 
 def as_svg(drawing: Drawing, *, is_inline: bool = False) -> str:
@@ -102,6 +106,16 @@ def _path(shape: BaseGeometry) -> str:
 
 def _points(points: NDArray[np.float64]) -> str:
     return "L".join(f"{_number(x)} {_number(y)}" for x, y in points.tolist())
+
+
+def escape(text: str) -> str:
+    """Return a text as it stands between the tags of SVG; what XML cannot hold becomes U+FFFD."""
+    return saxutils.escape(_NOT_XML.sub("\ufffd", text))
+
+
+def quoteattr(text: str) -> str:
+    """Return a text as the value of an attribute, with its quotes."""
+    return saxutils.quoteattr(_NOT_XML.sub("\ufffd", text))
 
 
 def _number(value: float) -> str:

@@ -27,8 +27,8 @@ def load_yaml(path: Path) -> dict[str, Any]:
         if path.stat().st_size > LARGEST_BYTES:
             raise LogError(f"{path}: is no description of a map or a bag, it is too large", file=path)
         # In C where there is one: the one in Python takes time with the square of what is nested.
-        loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
-        described = yaml.load(path.read_text(encoding="utf-8"), loader)
+        loader = yaml.CSafeLoader if yaml.__with_libyaml__ else yaml.SafeLoader
+        described = yaml.load(path.read_text(encoding="utf-8"), loader)  # noqa: S506 (both are safe)
     except (OSError, UnicodeDecodeError) as error:
         raise LogError(f"{path}: cannot be read: {error}", file=path) from error
     # Nesting without end, and numbers and dates that Python does not take.

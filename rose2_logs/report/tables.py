@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from rose2_logs.parameters import describe_parameters
@@ -203,7 +204,7 @@ def software_table(results: RunResults) -> Table:
 def files_of(results: RunResults) -> list[tuple[str, str]]:
     """Names and sizes of the other results that are there."""
     names = [str(name) for name in results.summary["files"]] + ["summary.json"]
-    paths = [results.folder / name for name in names]
+    paths = [results.folder / Path(name).name for name in names]
     return [(path.name, size(path.stat().st_size)) for path in paths if path.is_file()]
 
 

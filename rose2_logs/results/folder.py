@@ -13,6 +13,7 @@ import numpy as np
 import shapely
 
 from rose2_logs.errors import LogError, ParameterError
+from rose2_logs.files import require_utf8
 from rose2_logs.parameters import Parameters, ReadingParameters
 from rose2_logs.readers.discovery import ANNOTATED_ENDING
 from rose2_logs.results.maps import RunMaps
@@ -65,9 +66,12 @@ class RunResults:
     ------
     LogError
         If the folder is not one of results, or its summary cannot be read.
+    OutputError
+        If its name is not UTF-8.
     """
 
     def __init__(self, folder: Path) -> None:
+        require_utf8(folder)
         self.folder = folder
         path = folder / SUMMARY
         if not path.is_file():

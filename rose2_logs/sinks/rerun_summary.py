@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 
 from rose2_logs.room_evidence import UNSURE_BELOW
 from rose2_logs.sinks.rerun_blueprint import COVERAGE_UNIT
@@ -12,6 +13,8 @@ from rose2_logs.tracking.lives import Moment, RoomLives
 
 NAMED_MOST = 6
 """Rooms named in one sentence."""
+_MARKUP = re.compile(r"[\\`*_{}\[\]<>()#!&~$]")
+"""What has a meaning in Markdown; after a backslash it has none."""
 
 
 def summary_text(info: RunInfo, lives: RoomLives, hindsight: Hindsight | None, maps: int) -> str:
@@ -113,5 +116,5 @@ def _duration(seconds: float) -> str:
 
 
 def _cell(value: object) -> str:
-    """Text for a cell of a table: names come from a log, and a bar would end the cell."""
-    return str(value).replace("|", "/").replace("\n", " ")
+    """Text for a cell of a table: names come from a log, and are neither markup nor the end of the cell."""
+    return _MARKUP.sub(r"\\\g<0>", " ".join(str(value).split()).replace("|", "/"))

@@ -6,9 +6,11 @@ Messages are packed here by hand, because no writer would write what they claim.
 from __future__ import annotations
 
 import math
+import sqlite3
 import struct
 import zlib
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -20,6 +22,8 @@ from rosbags import rosbag1, rosbag2
 from test_messages import SCHEMA, foxglove_message
 
 SECOND = 10**9
+MOST_DOUBT = 19
+"""Occupancy below which the cells of the rooms here are free."""
 GRID, PATCH, STRING = (
     "nav_msgs/msg/OccupancyGrid",
     "map_msgs/msg/OccupancyGridUpdate",
@@ -79,7 +83,7 @@ def room(seen: int, seed: int = 0) -> np.ndarray:
     cells[6:64, 6:84] = 0
     cells[40:44, 30:60] = 100
     # Grain, so that no compression makes the log so small that a cut has no place.
-    noise = np.random.default_rng(seed).integers(0, 19, cells.shape, np.int8)
+    noise = np.random.default_rng(seed).integers(0, MOST_DOUBT, cells.shape, np.int8)
     cells[cells == 0] = noise[cells == 0]
     cells[:, seen:] = -1
     return cells
@@ -225,6 +229,8 @@ def write_rosbag2(
     writer = rosbag2.Writer(path, version=9, storage_plugin=rosbag2.StoragePlugin[storage])
     writer.set_compression(rosbag2.CompressionMode[compression], rosbag2.CompressionFormat.ZSTD)
     _write_all(writer, logged, 2, "cdr", schemas, {"rihs01": "RIHS01_0"})
+    for database in path.glob("*.db3"):
+        _lay_out_anew(database)
     return path
 
 
@@ -246,6 +252,14 @@ def _write_all(
                 own = {} if text is None else {"msgdef": text.decode("latin-1"), **checksum}
                 connections[topic, kind] = writer.add_connection(topic, kind, typestore=typestore(ros), **own)
             writer.write(connections[topic, kind], time, packed(message, encoding))
+
+
+def _lay_out_anew(database: Path) -> None:
+    """Let the same pages stand at the same places whatever SQLite wrote them: newer ones add statistics."""
+    with closing(sqlite3.connect(database)) as base:
+        base.execute("DROP TABLE IF EXISTS sqlite_stat1")
+        base.commit()
+        base.execute("VACUUM")
 
 
 @dataclass(frozen=True)
@@ -448,6 +462,15 @@ def flip(path: Path, at: int) -> None:
     path.write_bytes(data)
 
 
+def _next_cell(path: Path, begin: int) -> int:
+    """Place of the next byte that is free with some doubt, where cells are bytes: no unknown one, no wall.
+
+    Writers of other versions put other lengths before the maps.
+    """
+    data = path.read_bytes()
+    return next(at for at in range(begin, len(data)) if 0 < data[at] < MOST_DOUBT)
+
+
 def blank(path: Path, begin: int, length: int) -> None:
     """Overwrite a stretch with zeros, as a lost sector reads."""
     data = bytearray(path.read_bytes())
@@ -480,7 +503,7 @@ FILE_FAULTS: dict[str, Callable[[Path], None]] = {
     "cut before the index": lambda path: cut(path, _index_begins(path)),
     "cut in the index": lambda path: cut(path, _index_begins(path) + 100),
     "cut in the last bytes": lambda path: cut(path, path.stat().st_size - 5),
-    "byte flipped at 30 %": lambda path: flip(path, path.stat().st_size * 3 // 10),
+    "byte flipped at 30 %": lambda path: flip(path, _next_cell(path, path.stat().st_size * 3 // 10)),
     "byte flipped in the index": lambda path: flip(path, _index_begins(path) + 30),
     "sector lost at 50 %": lambda path: blank(path, path.stat().st_size // 2, 4096),
     "all zeros after 40 %": lambda path: blank(path, path.stat().st_size * 4 // 10, 1 << 30),

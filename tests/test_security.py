@@ -1,0 +1,189 @@
+"""No code runs because of what a log or a file says, and nothing is offered to other machines unasked.
+
+What cannot be told from the code's own words is tried: templates escape, YAML makes no objects.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import yaml
+
+from rose2_logs.errors import InvalidMapError
+from rose2_logs.readers.descriptions import load_yaml
+from rose2_logs.report import page
+
+PACKAGE = Path(__file__).parents[1] / "rose2_logs"
+FILES = sorted(PACKAGE.rglob("*.py"))
+TEMPLATES = sorted((PACKAGE / "report" / "templates").iterdir())
+
+MODULES = (
+    *("pickle", "_pickle", "marshal", "shelve", "dill", "cloudpickle", "joblib"),
+    *("multiprocessing.managers", "xmlrpc", "socketserver", "http.server"),
+    *("xml.etree", "xml.dom", "lxml"),
+)
+"""They make objects of bytes, serve, or read XML with all its entities."""
+ALLOWED = {
+    # Between a run and its own workers, over pipes and files that only they can open: nobody else's bytes.
+    "parcels.py": ("imports pickle",),
+    # Of pictures that were drawn here, see the next tests.
+    "report/page.py": ("markupsafe.Markup",),
+}
+CALLS = (
+    *("eval", "exec", "compile", "__import__", "os.system", "os.popen"),
+    *("subprocess.getoutput", "subprocess.getstatusoutput", "asyncio.create_subprocess_shell"),
+    *("yaml.unsafe_load", "yaml.unsafe_load_all", "yaml.full_load", "yaml.full_load_all", "yaml.load_all"),
+    *("multiprocessing.connection.Listener", "multiprocessing.connection.Client"),
+    *("pandas.read_pickle", "tempfile.mktemp", "markupsafe.Markup"),
+)
+OPTIONS = {"shell": "False", "allow_pickle": "False", "autoescape": "True"}
+"""What they may be set to, if at all."""
+SAFE_LOADERS = ("SafeLoader", "CSafeLoader")
+EVERY_ADDRESS = "0.0.0.0"
+
+
+def imports(tree: ast.Module) -> dict[str, str]:
+    """Names that a file gives to what it imports, and what that is in full."""
+    found = {}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            for each in node.names:
+                found[each.asname or each.name] = each.name
+        elif isinstance(node, ast.ImportFrom):
+            found |= {each.asname or each.name: f"{node.module}.{each.name}" for each in node.names}
+    return found
+
+
+def breaches(code: str, name: str = "a.py") -> list[str]:
+    """Tell what a file does that it must not."""
+    tree = ast.parse(code)
+    known = imports(tree)
+    found = [
+        f"imports {module}"
+        for module in known.values()
+        if any(f"{module}.".startswith(f"{each}.") for each in MODULES)
+    ]
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Call):
+            found += _breaches_of_call(node, known)
+        elif isinstance(node, ast.Attribute) and known.get(ast.unparse(node.value)) == "yaml":
+            is_loader = node.attr.endswith("Loader")
+            found += [f"yaml.{node.attr}"] if is_loader and node.attr not in SAFE_LOADERS else []
+        elif isinstance(node, ast.Constant) and node.value == EVERY_ADDRESS:
+            found.append(EVERY_ADDRESS)
+    return [each for each in found if each not in ALLOWED.get(name, ())]
+
+
+def _breaches_of_call(call: ast.Call, known: dict[str, str]) -> Iterator[str]:
+    name, dot, rest = ast.unparse(call.func).partition(".")
+    called = known.get(name, name) + dot + rest
+    options = {each.arg: ast.unparse(each.value) for each in call.keywords}
+    yield from (
+        f"{name}={options[name]}" for name, only in OPTIONS.items() if options.get(name, only) != only
+    )
+    if called in CALLS:
+        yield called
+    elif called == "yaml.load" and len(call.args) + len(call.keywords) < 2:
+        yield "yaml.load without a loader"
+    elif called == "jinja2.Environment" and "autoescape" not in options:
+        yield "jinja2.Environment without autoescape"
+    elif called.endswith(".bind") and ast.unparse(call.args[0]).startswith("('',"):
+        yield "binds to every address"
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.relative_to(PACKAGE).as_posix())
+def test_no_file_does_what_it_must_not(path: Path):
+    """Neither pickle, eval, a shell, unsafe YAML nor markup of its own, and it serves this machine alone."""
+    name = path.relative_to(PACKAGE).as_posix()
+    assert breaches(path.read_text(encoding="utf-8"), name) == []
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "import pickle",
+        "from pickle import loads",
+        "import multiprocessing.managers",
+        "import xml.etree.ElementTree as ET",
+        "eval('1')",
+        "import os\nos.system('ls')",
+        "from os import system as run\nrun('ls')",
+        "import subprocess\nsubprocess.run('ls', shell=True)",
+        "import subprocess as sp\nsp.getoutput('ls')",
+        "import numpy as np\nnp.load('a', allow_pickle=True)",
+        "import yaml\nyaml.load(text)",
+        "import yaml\nyaml.load(text, yaml.Loader)",
+        "import yaml\nyaml.unsafe_load(text)",
+        "import tempfile\ntempfile.mktemp()",
+        "import jinja2\njinja2.Environment(loader=None)",
+        "from jinja2 import Environment\nEnvironment(autoescape=False)",
+        "from markupsafe import Markup\nMarkup(name)",
+        "serve(host='0.0.0.0')",
+        "sock.bind(('', 80))",
+    ],
+)
+def test_what_must_not_be_done_is_found(code: str):
+    assert breaches(code)
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "import subprocess\nsubprocess.run(['ls'])",
+        "import yaml\nyaml.load(text, yaml.SafeLoader)\nyaml.safe_load(text)\nyaml.safe_dump(1)",
+        "from jinja2 import Environment\nEnvironment(autoescape=True)",
+        "sock.bind(('127.0.0.1', 80))",
+        "import re\nre.compile('a')",
+        "from xml.sax import saxutils",
+    ],
+)
+def test_what_may_be_done_is_not(code: str):
+    assert breaches(code) == []
+
+
+def test_one_place_makes_markup():
+    """It gets what the drawing modules wrote; see the tests with hostile names for what they write."""
+    code = (PACKAGE / "report" / "page.py").read_text(encoding="utf-8")
+    assert len(re.findall(r"\bMarkup\(", code)) == 1
+
+
+@pytest.mark.parametrize("path", TEMPLATES, ids=lambda path: path.name)
+def test_templates_leave_escaping_on(path: Path):
+    """Values in attributes stand in quotes, none in a script, and scripts make no elements of texts."""
+    text = path.read_text(encoding="utf-8")
+    assert not re.search(r"\|\s*(safe|xmlattr|tojson)\b|autoescape|Markup", text)
+    assert not re.search(r"=\s*\{\{", text), "a value without quotes"
+    assert not re.search(r"\bon\w+\s*=\s*[\"'{]", text), "a program in an attribute"
+    assert not re.search(
+        r"innerHTML|outerHTML|insertAdjacentHTML|document\.write|\beval\(|new Function|https?://", text
+    )
+    for script in re.findall(r"<(?:script|style)\b.*?</(?:script|style)>", text, re.DOTALL):
+        assert "{{" not in script
+
+
+def test_templates_escape(monkeypatch, tmp_path: Path):
+    (tmp_path / "a.html.j2").write_text('<b title="{{ name }}">{{ name }}</b>')
+    monkeypatch.setattr(page, "TEMPLATES", tmp_path)
+    assert (
+        page.render("a.html.j2", name="\"'<&>")
+        == '<b title="&#34;&#39;&lt;&amp;&gt;">&#34;&#39;&lt;&amp;&gt;</b>'
+    )
+
+
+def test_pages_may_load_nothing():
+    """Were a name to become markup after all, the page's own policy lets it fetch and send nothing."""
+    text = (PACKAGE / "report" / "templates" / "base.html.j2").read_text(encoding="utf-8")
+    assert "Content-Security-Policy\" content=\"default-src 'none'; img-src data:;" in text
+
+
+@pytest.mark.parametrize("value", ["!!python/object/apply:os.getcwd []", "!!python/name:os.system"])
+def test_yaml_makes_no_objects(value: str, tmp_path: Path):
+    described = tmp_path / "map.yaml"
+    described.write_text(f"image: {value}\n")
+    with pytest.raises(InvalidMapError, match="could not determine a constructor"):
+        load_yaml(described)
+    assert yaml.unsafe_load(described.read_text())["image"] is not None
