@@ -462,12 +462,14 @@ def flip(path: Path, at: int) -> None:
     path.write_bytes(data)
 
 
-def _next_cell(path: Path, begin: int) -> int:
-    """Place of the next byte that is free with some doubt, where cells are bytes: no unknown one, no wall.
+def _inside(path: Path) -> int:
+    """Place at 30 % of a file, of MCAP the next cell there that is free with some doubt.
 
-    Writers of other versions put other lengths before the maps.
+    Its writers differ by version in the lengths of what they put before the maps.
     """
-    data = path.read_bytes()
+    begin, data = path.stat().st_size * 3 // 10, path.read_bytes()
+    if path.suffix != ".mcap":
+        return begin
     return next(at for at in range(begin, len(data)) if 0 < data[at] < MOST_DOUBT)
 
 
@@ -503,7 +505,7 @@ FILE_FAULTS: dict[str, Callable[[Path], None]] = {
     "cut before the index": lambda path: cut(path, _index_begins(path)),
     "cut in the index": lambda path: cut(path, _index_begins(path) + 100),
     "cut in the last bytes": lambda path: cut(path, path.stat().st_size - 5),
-    "byte flipped at 30 %": lambda path: flip(path, _next_cell(path, path.stat().st_size * 3 // 10)),
+    "byte flipped at 30 %": lambda path: flip(path, _inside(path)),
     "byte flipped in the index": lambda path: flip(path, _index_begins(path) + 30),
     "sector lost at 50 %": lambda path: blank(path, path.stat().st_size // 2, 4096),
     "all zeros after 40 %": lambda path: blank(path, path.stat().st_size * 4 // 10, 1 << 30),
