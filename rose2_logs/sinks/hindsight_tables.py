@@ -15,7 +15,7 @@ from rose2_logs.tracking.hindsight import Hindsight, RoomRows, look_back
 from rose2_logs.tracking.lives import Moment, RoomLife, RoomLives
 
 ROWS_AT_ONCE = 2000
-"""Rooms whose shapes are compared together."""
+"""Rooms whose shapes are compared together; read by one thread, as each keeps some megabytes of its own."""
 
 
 def write_hindsight(
@@ -64,7 +64,7 @@ def _rows(path: Path, columns: list[str] | None = None) -> Iterator[Row]:
     import pyarrow.parquet as pq
 
     with writing(path), pq.ParquetFile(path) as file:
-        for batch in file.iter_batches(ROWS_AT_ONCE, columns=columns):
+        for batch in file.iter_batches(ROWS_AT_ONCE, columns=columns, use_threads=False):
             yield from batch.to_pylist()
 
 
@@ -74,7 +74,7 @@ def _room_rows(path: Path) -> Iterator[RoomRows]:
 
     columns = ["snapshot", "track", "area_m2", "polygon_wkb"]
     with writing(path), pq.ParquetFile(path) as file:
-        for batch in file.iter_batches(ROWS_AT_ONCE, columns=columns):
+        for batch in file.iter_batches(ROWS_AT_ONCE, columns=columns, use_threads=False):
             snapshot, track, area_m2, polygons = (
                 batch[name].to_numpy(zero_copy_only=False) for name in columns
             )

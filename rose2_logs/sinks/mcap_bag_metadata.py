@@ -37,6 +37,8 @@ def write_bag_metadata(log: Path, path: Path) -> None:
     statistics = summary.statistics
     topics: dict[str, dict[str, Any]] = {}
     for number, channel in sorted(summary.channels.items()):
+        if channel.schema_id not in summary.schemas:
+            continue  # without a type there is nothing that ROS could play
         count = statistics.channel_message_counts.get(number, 0)
         if channel.topic in topics:
             topics[channel.topic]["message_count"] += count
