@@ -23,10 +23,12 @@ from rose2_logs.sinks.summary import RunTotals
 from rose2_logs.tracking.frames import TrackedSnapshot, map_motion
 from rose2_logs.tracking.layout_change import LayoutFollower
 from rose2_logs.tracking.tracker import RoomTracker
-from rose2_logs.workers import Workers
+from rose2_logs.workers import Workers, give_back_freed_memory
 
 logger = logging.getLogger(__name__)
 
+GIVE_BACK_EVERY = 20
+"""Maps after which freed memory is given back: it costs a map's page faults, and keeps a long run small."""
 SnapshotWorkers = Workers[OccupancySnapshot, Found]
 
 
@@ -71,7 +73,9 @@ def tracked_snapshots(
     layout = LayoutFollower()
     said = False
     is_same = partial(is_same_to_analysis, parameters=parameters.occupancy)
-    for snapshot, found in workers.map(reader.snapshots(), is_same):
+    for number, (snapshot, found) in enumerate(workers.map(reader.snapshots(), is_same), start=1):
+        if number % GIVE_BACK_EVERY == 0:
+            give_back_freed_memory()
         if isinstance(found, InvalidMapError):
             totals.invalid += 1
             text = f"{reader.info.path}: snapshot {snapshot.index} is left out: {found}"

@@ -226,6 +226,17 @@ def keep_freed_memory() -> None:
         mallopt(M_TRIM_THRESHOLD, KEPT_BYTES)
 
 
+def give_back_freed_memory() -> None:
+    """Give back what `keep_freed_memory` made this process keep; elsewhere this does nothing.
+
+    Over many maps, what is kept falls into pieces that fit no array, so that the process would grow.
+    """
+    import ctypes
+
+    with suppress(OSError, AttributeError):
+        ctypes.CDLL(None).malloc_trim(0)
+
+
 def _nothing() -> None:
     return
 
