@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import gc
 import os
 import platform
@@ -14,6 +13,8 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
+
+from rose2_logs.workers import give_back_freed_memory
 
 Result = TypeVar("Result")
 
@@ -63,8 +64,7 @@ def peak_memory(function: Callable[[], object]) -> int | None:
     The result of the call counts.
     """
     gc.collect()
-    with suppress(OSError, AttributeError):
-        ctypes.CDLL(None).malloc_trim(0)
+    give_back_freed_memory()
     try:
         before = _status_bytes("self", "VmRSS")
         (PROC / "self" / "clear_refs").write_text("5")  # forget the peak so far
