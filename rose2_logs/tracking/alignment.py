@@ -149,8 +149,12 @@ class MapAligner:
 
 def wall_points(snapshot: OccupancySnapshot, parameters: OccupancyParameters) -> FloatArray:
     """World centres (N, 2) of the occupied cells beside free ones: the faces of walls."""
-    free, occupied = classify(snapshot.cells, parameters)
-    return snapshot.geometry.cell_centres(*np.nonzero(occupied & _beside(free)))
+    return wall_faces(*classify(snapshot.cells, parameters), snapshot.geometry)
+
+
+def wall_faces(free: BoolArray, occupied: BoolArray, geometry: GridGeometry) -> FloatArray:
+    """Do the same for a map whose cells (H, W) are told apart already."""
+    return geometry.cell_centres(*np.nonzero(occupied & _beside(free)))
 
 
 def _beside(mask: BoolArray) -> BoolArray:

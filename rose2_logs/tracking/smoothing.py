@@ -14,10 +14,18 @@ import numpy as np
 from numpy.typing import NDArray
 from skimage.measure import label as connected
 
-from rose2_logs.occupancy import FloatArray, OccupancySnapshot, classify, known_window, label_sizes
+from rose2_logs.occupancy import (
+    BoolArray,
+    FloatArray,
+    GridGeometry,
+    OccupancySnapshot,
+    classify,
+    known_window,
+    label_sizes,
+)
 from rose2_logs.parameters import OccupancyParameters, TrackingParameters
 from rose2_logs.rooms import RoomMap
-from rose2_logs.tracking.alignment import POINTS_MIN, RigidMotion, WallFit, wall_points
+from rose2_logs.tracking.alignment import POINTS_MIN, RigidMotion, WallFit, wall_faces
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,9 +75,9 @@ class Smoother:
         self._window = known_window(rooms.labels > 0)
         self._geometry, self._count = rooms.geometry, len(rooms)
         labels = rooms.labels[self._window]
-        free, _ = classify(last.cells[self._window], self._occupancy)
-        self._nearest = np.where(free, labels, _filled(labels))
-        points = wall_points(last, self._occupancy)
+        free, occupied = classify(last.cells, self._occupancy)
+        self._nearest = np.where(free[self._window], labels, _filled(labels))
+        points = wall_faces(free, occupied, last.geometry)
         self._fit = WallFit(points, last.geometry.resolution_m) if len(points) >= POINTS_MIN else None
 
     def rooms(self, snapshot: OccupancySnapshot, motion: RigidMotion) -> SmoothedRooms:
@@ -84,13 +92,15 @@ class Smoother:
         """
         labels = np.zeros(snapshot.geometry.shape, np.int32)
         window = known_window(snapshot.cells >= 0)
-        free, _ = classify(snapshot.cells[window], self._occupancy)
+        all_free, occupied = classify(snapshot.cells, self._occupancy)
+        free = all_free[window]
         row, column = np.nonzero(free)
         if self._count == 0 or len(row) == 0:
             return SmoothedRooms(labels, np.zeros(self._count))
         corner = np.array([window[0].start, window[1].start])
         centres = snapshot.geometry.cell_centres(row + corner[0], column + corner[1])
-        cells = self._geometry.world_to_cell(self._laid_over(snapshot, motion).points(centres))
+        laid_over = self._laid_over(all_free, occupied, snapshot.geometry, motion)
+        cells = self._geometry.world_to_cell(laid_over.points(centres))
         cells -= (self._window[0].start, self._window[1].start)
         np.clip(cells, 0, np.array(self._nearest.shape) - 1, out=cells)
         part = labels[window]
@@ -99,13 +109,15 @@ class Smoother:
         _join_small_pieces(part, free, self._min_area_m2 / cell_m2)
         return SmoothedRooms(labels, label_sizes(part, self._count)[1:].astype(float) * cell_m2)
 
-    def _laid_over(self, snapshot: OccupancySnapshot, motion: RigidMotion) -> RigidMotion:
+    def _laid_over(
+        self, free: BoolArray, occupied: BoolArray, geometry: GridGeometry, motion: RigidMotion
+    ) -> RigidMotion:
         """Fit a map's walls to those of the last one, where that brings more of them together."""
-        points = wall_points(snapshot, self._occupancy)
+        points = wall_faces(free, occupied, geometry)
         fit = self._fit
         if fit is None or len(points) < POINTS_MIN:
             return motion
-        walls = WallFit(points, snapshot.geometry.resolution_m).sample()
+        walls = WallFit(points, geometry.resolution_m).sample()
         centre = walls.points.mean(axis=0)
         start = RigidMotion.moving(centre, motion.points(centre), motion.turn_rad)
         fitted = fit.settled(walls, start)
