@@ -24,15 +24,15 @@ from rose2_logs.readers.discovery import stem_of
 from rose2_logs.readers.log import LogReader
 from rose2_logs.readers.log_file import LATEST_NS
 from rose2_logs.run_options import NOT_IN_JOURNAL, RunOptions
-from rose2_logs.sinks.sink import CopyingSink, RunInfo, Sink
-from rose2_logs.sinks.smoothed_table import write_smoothed
+from rose2_logs.sinks.sink import CopyingSink, RunInfo, Sink, SmoothedSink
+from rose2_logs.sinks.smoothed_table import SmoothedTable
 from rose2_logs.sinks.summary import RunTotals, write_summary
 from rose2_logs.sinks.tables import Tables
 from rose2_logs.sinks.viewer_layouts import bag_metadata_path, foxglove_path, rviz_path
 from rose2_logs.tracked_stream import SnapshotWorkers, start_workers, tracked_snapshots
-from rose2_logs.tracking.alignment import RigidMotion
-from rose2_logs.tracking.frames import TrackedSnapshot, map_motion
+from rose2_logs.tracking.frames import TrackedSnapshot
 from rose2_logs.tracking.lives import Moment
+from rose2_logs.tracking.smoothed_run import RunSmoother
 
 __all__ = [
     "SUMMARY",
@@ -181,7 +181,7 @@ def _analyse(
     planned = _planned_files(folder, path, options)
     totals = RunTotals()
     last = reader.last()
-    motions: dict[int, RigidMotion | None] = {}
+    smoother = RunSmoother(options.parameters) if options.smooth else None
     frame: TrackedSnapshot | None = None
     first_ns: int | None = None
     way = reader.robot_path(last.geometry.frame_id) if "path" in options.shown_layers else None
@@ -193,8 +193,8 @@ def _analyse(
             for sink in sinks:
                 sink.write(frame)
             totals.add(frame)
-            if options.smooth:
-                motions[frame.snapshot.index] = map_motion(frame.events)
+            if smoother is not None:
+                smoother.add(frame)
             logger.info(
                 "snapshot %d: coverage %.1f %%, %d rooms",
                 frame.snapshot.index,
@@ -208,9 +208,13 @@ def _analyse(
         messages = dataclasses.asdict(reader.counts)
         if frame is None:
             raise InvalidMapError(f"{path}: none of its {totals.invalid} maps can be analysed")
-        if options.smooth:
-            with muted():  # what is odd was told the first time
-                write_smoothed(planned["smoothed"], reader.snapshots(), frame, motions, options.parameters)
+        if smoother is not None:
+            receiving = [sink for sink in sinks if isinstance(sink, SmoothedSink)]
+            # What is odd was told the first time.
+            with muted(), SmoothedTable(planned["smoothed"]) as table:
+                for found in smoother.smoothed(reader.snapshots()):
+                    for receiver in (table, *receiving):
+                        receiver.write_smoothed(found)
         tables.look_back()
     if options.origin is not None:
         warnings.rename(str(path), options.origin)

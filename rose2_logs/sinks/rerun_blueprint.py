@@ -10,8 +10,10 @@ import rerun.blueprint as rrb
 
 from rose2_logs.occupancy import FloatArray
 from rose2_logs.sinks.rerun_lives import FINAL_IOU, FINAL_SHARE, LIVES, SHIFTS
+from rose2_logs.sinks.rerun_smoothed import SEEN_SHARE, SMOOTHED
 from rose2_logs.sinks.rerun_world import (
     CLEAN,
+    DOORWAYS,
     FACES,
     FILLS,
     LINES,
@@ -40,7 +42,11 @@ PAPER, DARK = (236, 236, 236), (12, 12, 16)
 
 
 def make_blueprint(
-    low_m: FloatArray, high_m: FloatArray, layers: Collection[str] = RECORDING_LAYERS
+    low_m: FloatArray,
+    high_m: FloatArray,
+    layers: Collection[str] = RECORDING_LAYERS,
+    *,
+    smoothed: bool = False,
 ) -> rrb.Blueprint:
     """Map from above, a tab for each stage of the method, beside curves, lives of rooms, events, summary.
 
@@ -50,6 +56,8 @@ def make_blueprint(
         Corners of what is shown, world metres.
     layers : collection of str
         The optional layers that the recording has; tabs without any are left out.
+    smoothed : bool
+        Whether it has the smoothed rooms.
     """
     stages = (
         ("Rooms", (), ()),
@@ -60,10 +68,12 @@ def make_blueprint(
         ("Voronoi graph", ("voronoi",), (VORONOI,)),
     )
     views: list[rrb.View] = [
-        _map_view(name, low_m, high_m, shown)
+        _map_view(name, low_m, high_m, shown, (SMOOTHED,) if smoothed else ())
         for name, needed, shown in stages
         if not needed or set(needed) & set(layers)
     ]
+    if smoothed:
+        views.insert(1, _map_view("Smoothed rooms", low_m, high_m, (SMOOTHED,)))
     if "spectrum" in layers:
         eye = _eye(np.array([-1.0, -1.0]), np.array([1.0, 1.0]))
         views.append(
@@ -81,6 +91,7 @@ def make_blueprint(
                 rrb.Tabs(
                     _lives(),
                     _curves("Area, m²", ("/run/area/**",), legend=False),
+                    *([_curves("Seen share", (f"{SEEN_SHARE}/**",), legend=False)] if smoothed else []),
                     _curves("Count", ("/run/rooms",)),
                     _curves("Change", ("/run/variation_bits",)),
                     active_tab=0,
@@ -107,10 +118,14 @@ def make_blueprint(
     )
 
 
-def _map_view(name: str, low_m: FloatArray, high_m: FloatArray, shown: Collection[str]) -> rrb.Spatial3DView:
+def _map_view(
+    name: str, low_m: FloatArray, high_m: FloatArray, shown: Collection[str], off: Collection[str] = ()
+) -> rrb.Spatial3DView:
     """View of the map with some of the switched layers on; rooms step back where others are looked at."""
-    hidden = [path for path in SWITCHED if path not in shown]
-    if shown:
+    hidden = [*(path for path in SWITCHED if path not in shown), *off]
+    if SMOOTHED in shown:
+        hidden += [FILLS, ROOMS, PREDICTED, DOORWAYS]
+    elif shown:
         hidden += [PREDICTED, PATH, ROBOT]
     if set(shown) & {CLEAN, SCORE, SEGMENTS, LINES, VORONOI}:
         hidden += [FILLS, ROOMS]

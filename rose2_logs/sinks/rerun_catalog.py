@@ -100,7 +100,8 @@ def _is_hidden(path: Path) -> bool:
 def _set_layout(server: Server, name: str, recordings: Sequence[Path], scratch: Path) -> None:
     """Open every run in our layout: the one in each file counts only where it is opened alone."""
     layout = scratch / "layout.rbl"
-    make_blueprint(*_corners_m(recordings)).save("rose2_logs", str(layout))
+    smoothed = any(path.with_name("smoothed.parquet").is_file() for path in recordings)
+    make_blueprint(*_corners_m(recordings), smoothed=smoothed).save("rose2_logs", str(layout))
     try:
         server.client().get_dataset(name).register_blueprint(layout.as_uri())
     except ImportError:

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import cv2
 import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from rose2_logs.occupancy import FloatArray, known_window
+from rose2_logs.occupancy import FloatArray, OccupancySnapshot, known_window
 from rose2_logs.sinks.palette import track_colour
 from rose2_logs.sinks.rerun_columns import Picture
-from rose2_logs.tracking.frames import TrackedSnapshot
 
 FILL_OPACITY = 0.6
 """Share of a room's colour in its cells: the map shows through."""
@@ -34,27 +33,25 @@ class MapPictures:
         World corners of the known part.
     """
 
-    def __init__(self, frame: TrackedSnapshot) -> None:
-        self._frame = frame
-        rows, columns = known_window(frame.snapshot.cells >= 0)
+    def __init__(self, snapshot: OccupancySnapshot) -> None:
+        rows, columns = known_window(snapshot.cells >= 0)
         # A picture begins at its top, a grid at its origin.
         self._part = (slice(rows.stop - 1, rows.start - 1 if rows.start else None, -1), columns)
         # As an unsigned byte unknown is 255, which is what the RViz colours expect.
-        self._cells = np.ascontiguousarray(frame.snapshot.cells[self._part]).view(np.uint8)
-        self._place = frame.analysis.geometry.part((rows, columns))
+        self._cells = np.ascontiguousarray(snapshot.cells[self._part]).view(np.uint8)
+        self._place = snapshot.geometry.part((rows, columns))
         self.corners_m = self._place.corners_m()
 
     def map(self, height_m: float) -> Picture:
         """Draw the map as RViz does, at a height in the world."""
         return self._picture(self._cells, height_m, rr.components.Colormap.RvizMap)
 
-    def rooms(self, height_m: float) -> Picture:
-        """Draw the map with each room in the colour of its track."""
+    def rooms(self, labels: NDArray[np.int32], track_ids: Sequence[int], height_m: float) -> Picture:
+        """Draw the map with each room of a label image (H, W) in the colour of its track."""
         shades = _shades()
-        colours = np.array([track_colour(track) for track in self._frame.track_ids], float).reshape(-1, 1, 3)
+        colours = np.array([track_colour(track) for track in track_ids], float).reshape(-1, 1, 3)
         painted = FILL_OPACITY * colours + (1 - FILL_OPACITY) * shades
-        labels = self._frame.analysis.rooms.labels[self._part]
-        return self._picture(self._painted(labels, [shades, *painted]), height_m)
+        return self._picture(self._painted(labels[self._part], [shades, *painted]), height_m)
 
     def clean_map(self, clean: NDArray[np.bool_], height_m: float) -> Picture:
         """Draw the clean map (H, W): structure black, what was left out of it light grey."""

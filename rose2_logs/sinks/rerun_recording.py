@@ -21,12 +21,14 @@ from rose2_logs.sinks.rerun_columns import Entry, Scalar
 from rose2_logs.sinks.rerun_faults import abandon, require_space
 from rose2_logs.sinks.rerun_layers import CHUNK_BYTES, Layers
 from rose2_logs.sinks.rerun_lives import FINAL_IOU, FINAL_SHARE, SHIFTS, Lives
+from rose2_logs.sinks.rerun_smoothed import SmoothedWorld
 from rose2_logs.sinks.rerun_summary import summary_text
 from rose2_logs.sinks.rerun_world import World
 from rose2_logs.sinks.sink import RECORDING_LAYERS, RunInfo
 from rose2_logs.sinks.tables import Tables
 from rose2_logs.tracking.frames import RoomEvent, TrackedSnapshot, map_motion
 from rose2_logs.tracking.lives import RoomLives
+from rose2_logs.tracking.smoothed_run import SmoothedSnapshot
 
 logger = logging.getLogger(__name__)
 
@@ -49,7 +51,7 @@ class RerunRecording:
     and ``coverage``, the greatest so far, in steps of 1e-4. Rooms stand under ``/world/rooms/TRACK``, their
     areas under ``/run/area/TRACK``; they are cleared when their track is lost. What has not changed since the
     snapshot before is not logged again. What only the last map tells, lanes of the rooms' lives and how right
-    the layout was, follows at the end.
+    the layout was, follows at the end; before that the smoothed rooms, in a second pass, if there is one.
 
     Parameters
     ----------
@@ -89,6 +91,7 @@ class RerunRecording:
         self._is_lost = False
         self._shown: set[int] = set()
         self._known: set[int] = set()
+        self._smoothed: SmoothedWorld | None = None
         self._extent = Extent()
         self._frames = 0
         self._lives = RoomLives() if tables is None else tables.lives
@@ -101,8 +104,7 @@ class RerunRecording:
             recording_id=f"{self._info.log_path.stem}-{fingerprint[:16]}",
             send_properties=True,
         )
-        # A live viewer shows each snapshot at once.
-        self._layers = Layers(self._recording, 0 if self._live else CHUNK_BYTES)
+        self._layers = self._new_layers()
         sinks: list[rr.FileSink | rr.GrpcSink] = []
         if self._part is not None:
             with writing(self._part.parent):
@@ -126,7 +128,7 @@ class RerunRecording:
     def write(self, frame: TrackedSnapshot) -> None:
         """Log one snapshot at all its times."""
         snapshot = frame.snapshot
-        coverage = round(frame.coverage / COVERAGE_UNIT)
+        coverage = _steps(frame.coverage)
         self._layers.begin(snapshot.log_time_ns, snapshot.stamp_ns, snapshot.index, coverage)
         self._world.log(frame)
         self._extent.add(frame)
@@ -144,12 +146,22 @@ class RerunRecording:
         self._frames += 1
         self._flush()
 
+    def write_smoothed(self, found: SmoothedSnapshot) -> None:
+        """Log what one map shows of the last map's rooms, after all maps, in their order again."""
+        if self._smoothed is None:
+            self._layers.flush()
+            self._smoothed = SmoothedWorld(self._new_layers(), self._recording)
+        self._smoothed.log(found, _steps(found.coverage))
+        self._flush()
+
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
         try:
             if kind is None:
                 self._layers.flush()
+                if self._smoothed is not None:
+                    self._smoothed.flush()
                 hindsight = None if self._tables is None else self._tables.hindsight
                 self._lanes.log(hindsight)
                 text = summary_text(self._info, self._lives, hindsight, self._frames)
@@ -168,8 +180,14 @@ class RerunRecording:
             if self._part is not None:
                 self._part.unlink(missing_ok=True)
 
+    def _new_layers(self) -> Layers:
+        # A live viewer shows each snapshot at once.
+        return Layers(self._recording, 0 if self._live else CHUNK_BYTES)
+
     def _send_blueprint(self) -> None:
-        blueprint = make_blueprint(self._extent.low_m, self._extent.high_m, self._wanted)
+        blueprint = make_blueprint(
+            self._extent.low_m, self._extent.high_m, self._wanted, smoothed=self._smoothed is not None
+        )
         self._recording.send_blueprint(blueprint)
 
     def _flush(self) -> None:
@@ -204,6 +222,11 @@ class RerunRecording:
                 name = rr.SeriesLines(colors=[track_colour(track)], names=f"room {track}")
                 self._recording.log(f"/run/area/{track}", name, static=True)
             self._layers.add(f"/run/area/{track}", Scalar(area))
+
+
+def _steps(coverage: float) -> int:
+    """Place on the coverage timeline."""
+    return round(coverage / COVERAGE_UNIT)
 
 
 def _event_level(event: RoomEvent) -> str:

@@ -96,9 +96,11 @@ class World:
             self._log_path(frame.path)
 
     def _log_pictures(self, frame: TrackedSnapshot) -> None:
-        pictures = MapPictures(frame)
+        pictures = MapPictures(frame.snapshot)
         self._layers.show(MAP, pictures.map(_height_m(MAP)))
-        self._layers.show(FILLS, pictures.rooms(_height_m(FILLS)))
+        self._layers.show(
+            FILLS, pictures.rooms(frame.analysis.rooms.labels, frame.track_ids, _height_m(FILLS))
+        )
         structure = frame.analysis.structure
         if structure is None:
             return
@@ -188,17 +190,24 @@ class World:
         self._layers.show(path, Strips(points, np.full(len(ends_m), 2, np.int32), colours))
 
     def _style_lines(self, path: str, width: float, colour: Colour | None) -> None:
-        """Log the width in points of the screen of all lines of a path, and their colour if it is one."""
-        style = rr.LineStrips3D.from_fields(
-            radii=rr.components.Radius.ui_points(width), colors=None if colour is None else [colour]
-        )
-        self._recording.log(path, style, static=True)
+        self._recording.log(path, line_style(width, colour), static=True)
 
     def _style_label(self, path: str) -> None:
-        label = rr.Points3D.from_fields(
-            colors=[(255, 255, 255)], radii=rr.components.Radius.ui_points(0.5), show_labels=True
-        )
-        self._recording.log(path, label, static=True)
+        self._recording.log(path, label_style(), static=True)
+
+
+def line_style(width: float, colour: Colour | None) -> rr.LineStrips3D:
+    """Width in points of the screen that all lines of a path have, and their colour if it is one."""
+    return rr.LineStrips3D.from_fields(
+        radii=rr.components.Radius.ui_points(width), colors=None if colour is None else [colour]
+    )
+
+
+def label_style() -> rr.Points3D:
+    """How names are shown."""
+    return rr.Points3D.from_fields(
+        colors=[(255, 255, 255)], radii=rr.components.Radius.ui_points(0.5), show_labels=True
+    )
 
 
 def _height_m(path: str) -> float:

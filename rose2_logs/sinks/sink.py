@@ -9,6 +9,7 @@ from typing import Any, Protocol, Self, runtime_checkable
 
 from rose2_logs.parameters import Parameters
 from rose2_logs.tracking.frames import TrackedSnapshot
+from rose2_logs.tracking.smoothed_run import SmoothedSnapshot
 
 RECORDING_LAYERS = (
     "predicted",
@@ -71,6 +72,15 @@ class Sink(Protocol):
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None: ...
+
+
+@runtime_checkable
+class SmoothedSink(Protocol):
+    """Also receives, after the last snapshot, all of them again by the layout of the last."""
+
+    def write_smoothed(self, found: SmoothedSnapshot) -> None:
+        """Take one snapshot of the second pass."""
+        ...
 
 
 @runtime_checkable

@@ -2,67 +2,62 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
 from pathlib import Path
+from types import TracebackType
+from typing import Self
 
-from rose2_logs.occupancy import OccupancySnapshot
-from rose2_logs.parameters import Parameters
 from rose2_logs.sinks.parquet_table import ParquetTable
-from rose2_logs.tracking.alignment import RigidMotion
-from rose2_logs.tracking.frames import TrackedSnapshot
-from rose2_logs.tracking.smoothing import Smoother, motions_to_last
+from rose2_logs.tracking.smoothed_run import SmoothedSnapshot
 
 
-def write_smoothed(
-    path: Path,
-    snapshots: Iterable[OccupancySnapshot],
-    last: TrackedSnapshot,
-    motions: Mapping[int, RigidMotion | None],
-    parameters: Parameters,
-) -> None:
-    """Go through the maps of a run once more, now that its last layout is known.
+class SmoothedTable:
+    """Writes ``smoothed.parquet`` in the second pass over a run.
+
+    Leaving the context without an exception makes the table whole.
 
     Parameters
     ----------
     path : path
         The table.
-    snapshots : iterable of OccupancySnapshot
-        The maps of the run.
-    last : TrackedSnapshot
-        The last one with its rooms.
-    motions : mapping
-        By index, in the order of the run, how the whole map moved since the one before. Maps that are not
-        among them are left out.
-    parameters : Parameters
-        Of the run.
 
     Raises
     ------
     OutputError
         If the file cannot be written.
     """
-    from rose2_logs.sinks import table_schemas
 
-    rooms = last.analysis.rooms
-    smoother = Smoother(last.snapshot, rooms, parameters.tracking, parameters.occupancy)
-    to_last = dict(zip(motions, motions_to_last(list(motions.values())), strict=True))
-    with ParquetTable(path, table_schemas.SMOOTHED) as table:
-        for snapshot in snapshots:
-            if snapshot.index not in to_last:
-                continue
-            areas_m2 = smoother.rooms(snapshot, to_last[snapshot.index]).areas_m2
-            table.add(
-                [
-                    {
-                        "snapshot": snapshot.index,
-                        "log_time_ns": snapshot.log_time_ns,
-                        "track": last.track_ids[room],
-                        "area_m2": areas_m2[room],
-                        "last_area_share": areas_m2[room] / rooms.areas_m2[room],
-                    }
-                    for room in range(len(rooms))
-                    if areas_m2[room] > 0
-                ]
-            )
-        table.close()
-        table.publish()
+    def __init__(self, path: Path) -> None:
+        from rose2_logs.sinks import table_schemas
+
+        self._table = ParquetTable(path, table_schemas.SMOOTHED)
+
+    def __enter__(self) -> Self:
+        self._table.__enter__()
+        return self
+
+    def write_smoothed(self, found: SmoothedSnapshot) -> None:
+        """Take one map: a row for each room that it shows some of."""
+        areas_m2, last_m2 = found.rooms.areas_m2, found.last_rooms.areas_m2
+        self._table.add(
+            [
+                {
+                    "snapshot": found.snapshot.index,
+                    "log_time_ns": found.snapshot.log_time_ns,
+                    "track": track,
+                    "area_m2": areas_m2[room],
+                    "last_area_share": areas_m2[room] / last_m2[room],
+                }
+                for room, track in enumerate(found.track_ids)
+                if areas_m2[room] > 0
+            ]
+        )
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        try:
+            if kind is None:
+                self._table.close()
+                self._table.publish()
+        finally:
+            self._table.__exit__(kind, error, traceback)
