@@ -72,7 +72,7 @@ class Smoother:
     ) -> None:
         self._min_area_m2 = tracking.smoothed_min_area_m2
         self._occupancy = occupancy or OccupancyParameters()
-        self._window = known_window(rooms.labels > 0)
+        self._window = known_window(last.cells >= 0)
         self._geometry, self._count = rooms.geometry, len(rooms)
         labels = rooms.labels[self._window]
         free, occupied = classify(last.cells, self._occupancy)

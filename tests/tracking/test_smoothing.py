@@ -60,6 +60,17 @@ def test_free_cells_where_no_room_is_in_the_end_take_the_nearest():
     assert smoothed(seen)[5] in ("1" * 12 + "2" * 13, "1" * 13 + "2" * 12)
 
 
+def test_what_is_outside_in_the_end_is_no_room_before_either():
+    """Rays went out through a window: free in the last map too, and in none of its rooms."""
+    last = [
+        row.replace("#", ".", 1) + ".." if 3 <= number < 6 else row + "??" for number, row in enumerate(LAST)
+    ]
+    last = ["...." + row if 3 <= number < 6 else "????" + row for number, row in enumerate(last)]
+    smoother = Smoother(drawn(last), rooms_of(last), PARAMETERS)
+    found = smoother.rooms(drawn(last), RigidMotion.none()).labels[::-1]
+    assert np.array_equal(found, rooms_of(last).labels[::-1])
+
+
 def test_a_glimpse_is_the_room_it_was_seen_from():
     """Through the door 2 columns of the second room: 0.22 square metres are no room yet."""
     seen = [row[:15] + "?" * 10 for row in LAST]
