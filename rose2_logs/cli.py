@@ -29,6 +29,7 @@ from rose2_logs.cli_options import (
     NoRecording,
     Resume,
     Settings,
+    Smooth,
     Start,
     Strict,
     Topic,
@@ -150,14 +151,7 @@ def analyze(
     no_mcap: NoAnnotatedLog = False,
     strict: Strict = False,
     layers: Layers = "all",
-    smooth: Annotated[
-        bool,
-        typer.Option(
-            "--smooth",
-            help="Read the maps once more in the end and write smoothed.parquet: how much of each of the "
-            "last map's rooms every map shows.",
-        ),
-    ] = False,
+    smooth: Smooth = False,
     bag: Bag = False,
     debug: Debug = False,
 ) -> None:

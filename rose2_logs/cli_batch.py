@@ -21,6 +21,7 @@ from rose2_logs.cli_options import (
     NoAnnotatedLog,
     NoRecording,
     Settings,
+    Smooth,
     Start,
     Strict,
     Topic,
@@ -103,6 +104,7 @@ def batch(
     no_mcap: NoAnnotatedLog = False,
     strict: Strict = False,
     layers: Layers = "all",
+    smooth: Smooth = False,
     bag: Bag = False,
     debug: Debug = False,
 ) -> None:
@@ -123,6 +125,7 @@ def batch(
         recording=not no_rrd,
         annotated_log=not no_mcap,
         layers=chosen_layers(layers),
+        smooth=smooth,
         bag=wanted_bag(bag, no_mcap),
         strict=strict,
     )

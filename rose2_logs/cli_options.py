@@ -84,6 +84,14 @@ Strict = Annotated[
         help="Take the first warning about the log as an error; by default what is whole is analyzed.",
     ),
 ]
+Smooth = Annotated[
+    bool,
+    typer.Option(
+        "--smooth",
+        help="Read the maps once more in the end and tell how much of each of the last map's rooms every "
+        "map shows: smoothed.parquet, a tab in the recording, a section in the report.",
+    ),
+]
 Config = Annotated[
     Path | None,
     typer.Option(

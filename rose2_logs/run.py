@@ -35,6 +35,7 @@ from rose2_logs.tracking.lives import Moment
 from rose2_logs.tracking.smoothed_run import RunSmoother
 
 __all__ = [
+    "SMOOTHED",
     "SUMMARY",
     "TABLES",
     "OnSnapshot",
@@ -48,6 +49,8 @@ __all__ = [
 logger = logging.getLogger(__name__)
 
 TABLES = ("snapshots", "rooms", "tracks", "events", "doorways")
+SMOOTHED = "smoothed"
+"""Name of the table that a run has only where it was asked to smooth."""
 SUMMARY = "summary.json"
 NAMELESS = "log"
 """What the results of a log without a name of its own are called."""
@@ -211,7 +214,7 @@ def _analyse(
         if smoother is not None:
             receiving = [sink for sink in sinks if isinstance(sink, SmoothedSink)]
             # What is odd was told the first time.
-            with muted(), SmoothedTable(planned["smoothed"]) as table:
+            with muted(), SmoothedTable(planned[SMOOTHED]) as table:
                 for found in smoother.smoothed(reader.snapshots()):
                     for receiver in (table, *receiving):
                         receiver.write_smoothed(found)
@@ -270,7 +273,7 @@ def _planned_files(folder: Path, log: Path, options: RunOptions) -> dict[str, Pa
         files |= {"annotated_log": log, "foxglove": foxglove_path(log), "rviz": rviz_path(log)}
         if options.bag:
             files["bag"] = bag_metadata_path(log)
-    tables = (*TABLES, "smoothed") if options.smooth else TABLES
+    tables = (*TABLES, SMOOTHED) if options.smooth else TABLES
     files |= {name: folder / f"{name}.parquet" for name in tables}
     return files | {"summary": folder / SUMMARY}
 

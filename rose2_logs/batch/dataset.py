@@ -15,7 +15,7 @@ import pyarrow as pa
 
 from rose2_logs.batch.folders import LOGS_FOLDER
 from rose2_logs.files import part_of, replacing, writing
-from rose2_logs.run import SUMMARY, TABLES
+from rose2_logs.run import SMOOTHED, SUMMARY, TABLES
 
 TABLES_FOLDER = "tables"
 PARTITION = "log"
@@ -52,17 +52,21 @@ Row = dict[str, Any]
 def publish_tables(out: Path, name: str) -> None:
     """Make the tables of a finished log part of the data set: ``tables/TABLE/log=NAME/TABLE.parquet``.
 
-    They share the bytes on the disk with those in the log's folder where the file system can.
+    They share the bytes on the disk with those in the log's folder where the file system can. Of a log that
+    was not smoothed there is no such table.
 
     Raises
     ------
     OutputError
         If they cannot be written.
     """
-    for table in TABLES:
+    for table in (*TABLES, SMOOTHED):
         source = out / LOGS_FOLDER / name / f"{table}.parquet"
         target = out / TABLES_FOLDER / table / f"{PARTITION}={name}" / f"{table}.parquet"
         with writing(target):
+            if table == SMOOTHED and not source.exists():
+                shutil.rmtree(target.parent, ignore_errors=True)
+                continue
             if _is_same(source, target):
                 continue
             target.parent.mkdir(parents=True, exist_ok=True)

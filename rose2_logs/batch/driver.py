@@ -23,7 +23,7 @@ from rose2_logs.batch.record import BatchSettings, Record, Signature, local_sign
 from rose2_logs.batch.task import LogOutcome, LogTask, Progress
 from rose2_logs.errors import LogError, OutputError, ParameterError
 from rose2_logs.readers.discovery import BAG_DESCRIPTION
-from rose2_logs.run import SUMMARY, TABLES
+from rose2_logs.run import SMOOTHED, SUMMARY, TABLES
 
 logger = logging.getLogger(__name__)
 
@@ -273,6 +273,7 @@ class _Batch:
             return False
         wanted += ["*.rrd"] if asked.recording else []
         wanted += ["*.rose2.mcap"] if asked.annotated_log else []
+        wanted += [f"{SMOOTHED}.parquet"] if asked.smooth else []
         wanted += [BAG_DESCRIPTION] if asked.bag else []
         folder = self._out / LOGS_FOLDER / name
         return all(next(folder.glob(each), None) for each in wanted)

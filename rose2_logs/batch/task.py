@@ -240,6 +240,7 @@ def _analyse_local(task: LogTask, path: Path, signature: Signature, report: Repo
             recording=asked.recording,
             layers=asked.layers,
             annotated_log=asked.annotated_log,
+            smooth=asked.smooth,
             bag=asked.bag,
             strict=asked.strict,
             journal=False,  # a log that was stopped is begun anew, in another folder

@@ -173,6 +173,23 @@ def test_each_folder_becomes_a_bag(batches):
             assert "/rose2/rooms" in bag.topics
 
 
+def test_what_is_to_be_smoothed_joins_the_data_set(batches):
+    """Of results that stand without it, too; it stays until a log is analysed without it."""
+    partition = batches.out / "tables" / "smoothed" / "log=one_run"
+    smoothed = BatchSettings(recording=False, annotated_log=False, smooth=True)
+    plain = dataclasses.replace(smoothed, smooth=False)
+    assert not partition.exists()
+    assert batches.run("one", settings=smoothed) == {"one_run": "done"}
+    assert batches.run("one", settings=smoothed) == {"one_run": "up to date"}
+    kept = (batches.out / "logs" / "one_run" / "smoothed.parquet").read_bytes()
+    assert (partition / "smoothed.parquet").read_bytes() == kept
+    assert [each.name for each in partition.parent.iterdir()] == ["log=one_run"]
+    assert batches.run("one", settings=plain) == {"one_run": "up to date"}
+    assert partition.exists()
+    assert batches.run("one", settings=plain, rerun=True) == {"one_run": "done"}
+    assert not partition.exists()
+
+
 def test_strict_makes_a_warning_about_a_log_its_failure(batches):
     """The other logs are analysed."""
     described = batches.logs / "two" / "run" / "map1.yaml"
