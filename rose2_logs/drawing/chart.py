@@ -23,6 +23,12 @@ DOTS_MAX = 60
 """Curves of more points are drawn without dots."""
 LANE = 9.0
 """Height of a room's lane."""
+SHARE_LANE = 15.0
+"""Height of a lane in which a share rises."""
+LAST_WIDTH = 4.0
+"""The last share, which nothing follows, is drawn so wide."""
+TINT_OPACITY = 0.18
+"""How strongly the rest of such a lane is tinted: what is still to come."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +56,27 @@ class Mark:
     x: float
     text: str
     kind: str
+
+
+@dataclass(frozen=True, eq=False)
+class ShareLane:
+    """One lane of shares.
+
+    Attributes
+    ----------
+    name : str
+    shares : (N,) float
+        In [0, 1].
+    colour : str
+        As CSS has it.
+    reached : int, optional
+        Index of the value that is marked by a line across the lane.
+    """
+
+    name: str
+    shares: FloatArray
+    colour: str
+    reached: int | None = None
 
 
 def line_chart(
@@ -147,6 +174,58 @@ def lane_chart(
                 f"<title>{escape(name)}</title></rect>"
             )
     return _svg(title, height, parts)
+
+
+def share_lanes(
+    x: FloatArray,
+    lanes: Sequence[ShareLane],
+    *,
+    title: str,
+    x_label: str,
+    x_range: tuple[float, float] | None = None,
+) -> str:
+    """Draw how shares rise from nothing to the whole, a lane each, one below the other.
+
+    Parameters
+    ----------
+    x : (N,) float
+        Common to all lanes, ascending; at least one. A share holds until the next.
+    lanes : sequence of ShareLane
+    title, x_label, x_range
+        As of `line_chart`.
+    """
+    x_axis = axis_of(x, False) if x_range is None else Axis(*x_range, is_log=False)
+    height = TOP + BOTTOM + SHARE_LANE * len(lanes)
+    parts = _frame(x_axis, None, (), x_label, height)
+    columns = np.array([_column(value, x_axis) for value in x.tolist()])
+    for number, lane in enumerate(lanes):
+        bottom = TOP + SHARE_LANE * (number + 1) - 1
+        parts += _share_lane(columns, lane, bottom - SHARE_LANE + 2, bottom)
+    return _svg(title, height, parts)
+
+
+def _share_lane(columns: FloatArray, lane: ShareLane, top: float, bottom: float) -> list[str]:
+    """Name, tint from the first share on, the shares as steps, and the line across."""
+    name, fill = escape(lane.name), escape(lane.colour)
+    parts = [f'<text x="{LEFT - 5:.0f}" y="{bottom - 2:.1f}" text-anchor="end">{name}</text>']
+    seen = np.flatnonzero(lane.shares > 0)
+    if len(seen):
+        left, right = float(columns[seen[0]]), float(columns[-1]) + LAST_WIDTH
+        parts.append(
+            f'<rect x="{left:.1f}" y="{top:.1f}" width="{right - left:.1f}" '
+            f'height="{bottom - top:.1f}" fill="{fill}" fill-opacity="{TINT_OPACITY:g}"/>'
+        )
+        # Where the share stays the same nothing needs to be drawn.
+        steps = seen[0] + np.flatnonzero(np.diff(lane.shares[seen[0] :], prepend=0.0))
+        rows = bottom - lane.shares[steps] * (bottom - top)
+        path = "".join(f"H{x:.1f}V{y:.1f}" for x, y in zip(columns[steps], rows, strict=True))
+        parts.append(
+            f'<path fill="{fill}" d="M{left:.1f} {bottom:.1f}{path}H{right:.1f}V{bottom:.1f}Z">'
+            f"<title>{name}</title></path>"
+        )
+    if lane.reached is not None:
+        parts.append(f'<path class="axis" d="M{columns[lane.reached]:.1f} {top:.1f}V{bottom:.1f}"/>')
+    return parts
 
 
 def _svg(title: str, height: float, parts: Sequence[str]) -> str:

@@ -43,8 +43,8 @@ class Chart:
 
 
 @dataclass(frozen=True, eq=False)
-class _Axis:
-    """One of the two horizontal axes: its values at the maps, ascending, its name, its ends, its marks."""
+class RunAxis:
+    """A horizontal axis along the run: its values at the maps, ascending, its name, its ends, its marks."""
 
     x: FloatArray
     label: str
@@ -55,7 +55,7 @@ class _Axis:
 def run_charts(results: RunResults) -> list[Chart]:
     """Draw everything that changes along a run."""
     snapshots = results.snapshots
-    axes = _axes(results)
+    axes = run_axes(results)
     numbers, present, areas = _rooms(results)
 
     def chart(
@@ -127,7 +127,7 @@ def run_charts(results: RunResults) -> list[Chart]:
     return [each for each in charts if each is not None] + _lanes(axes, numbers, present)
 
 
-def _coverage_chart(axis: _Axis, coverage: FloatArray) -> Chart:
+def _coverage_chart(axis: RunAxis, coverage: FloatArray) -> Chart:
     """Coverage, which stands over time in any case."""
     title = "Coverage over time, %"
     series = Series("coverage", coverage, GREEN)
@@ -143,7 +143,7 @@ def _coverage_chart(axis: _Axis, coverage: FloatArray) -> Chart:
     return Chart(title, "Known free area over that of the last map.", (), drawn, drawn)
 
 
-def _axes(results: RunResults) -> tuple[_Axis, _Axis]:
+def run_axes(results: RunResults) -> tuple[RunAxis, RunAxis]:
     """Coverage in percent, and time in minutes or seconds."""
     snapshots = results.snapshots
     time_s = snapshots["time_s"].astype(float)
@@ -164,8 +164,8 @@ def _axes(results: RunResults) -> tuple[_Axis, _Axis]:
     places = {int(number): place for place, number in enumerate(snapshots["snapshot"])}
     marks = [mark for mark in marks if mark[0] in places]
 
-    def axis(x: FloatArray, label: str, ends: tuple[float, float] | None) -> _Axis:
-        return _Axis(x, label, ends, [Mark(float(x[places[at]]), text, kind) for at, text, kind in marks])
+    def axis(x: FloatArray, label: str, ends: tuple[float, float] | None) -> RunAxis:
+        return RunAxis(x, label, ends, [Mark(float(x[places[at]]), text, kind) for at, text, kind in marks])
 
     lowest = min(float(np.floor(coverage[0] / 10) * 10), 90.0)
     ends = (0.0, float(time[-1])) if time[-1] > 0 else None
@@ -186,14 +186,14 @@ def _rooms(results: RunResults) -> tuple[np.ndarray, BoolArray, FloatArray]:
     return numbers, np.isfinite(areas), areas
 
 
-def _lanes(axes: Sequence[_Axis], numbers: np.ndarray, present: BoolArray) -> list[Chart]:
+def _lanes(axes: Sequence[RunAxis], numbers: np.ndarray, present: BoolArray) -> list[Chart]:
     shown = np.sort(np.argsort(-present.sum(1), kind="stable")[:LANES_MOST])
     if not len(shown):
         return []
     title = "When each room was there"
     names = [str(number) for number in numbers[shown]]
     colours = [css_colour(int(number)) for number in numbers[shown]]
-    draw: Callable[[_Axis], str] = lambda axis: lane_chart(  # noqa: E731
+    draw: Callable[[RunAxis], str] = lambda axis: lane_chart(  # noqa: E731
         axis.x,
         present[shown],
         names,

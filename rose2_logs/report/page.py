@@ -15,6 +15,7 @@ from rose2_logs.drawing.svg import as_svg
 from rose2_logs.files import refuse_existing, replacing
 from rose2_logs.report import PANELS, facts, tables
 from rose2_logs.report.charts import run_charts
+from rose2_logs.report.seen import seen_rooms
 from rose2_logs.report.words import duration
 from rose2_logs.results.folder import RunResults
 from rose2_logs.results.maps import RunMaps
@@ -112,6 +113,7 @@ def _content(results: RunResults, panels: int, *, is_beside: bool) -> dict[str, 
         ]
     is_run = len(results.snapshots["snapshot"]) > 1
     parameters = tables.parameter_table(results)
+    seen = seen_rooms(results)
     return {
         "name": results.name,
         "subtitle": facts.subtitle(results),
@@ -124,6 +126,8 @@ def _content(results: RunResults, panels: int, *, is_beside: bool) -> dict[str, 
             (chart, _drawn(chart.over_coverage), _drawn(chart.over_time))
             for chart in (run_charts(results) if is_run else ())
         ],
+        "seen": seen,
+        "seen_lanes": None if seen is None else _drawn(seen.lanes),
         "rooms": tables.room_table(results, plan),
         "doorways": tables.doorway_table(results, plan),
         "events": tables.event_table(results),

@@ -19,7 +19,7 @@ from rose2_logs.readers.discovery import ANNOTATED_ENDING
 from rose2_logs.results.maps import RunMaps
 from rose2_logs.room_plan import PlanRoom, RoomPlan
 from rose2_logs.rooms import Doorway
-from rose2_logs.run import SUMMARY, TABLES
+from rose2_logs.run import SMOOTHED, SUMMARY, TABLES
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -109,14 +109,27 @@ class RunResults:
         import pyarrow as pa
         import pyarrow.parquet as pq
 
-        if name not in TABLES:
-            raise ValueError(f"no table {name!r}; there are {', '.join(TABLES)}")
+        if name not in (*TABLES, SMOOTHED):
+            raise ValueError(f"no table {name!r}; there are {', '.join((*TABLES, SMOOTHED))}")
         path = self.folder / f"{name}.parquet"
         rows = None if snapshot is None else [("snapshot", "=", snapshot)]
         try:
             return pq.read_table(path, columns=columns, filters=rows, partitioning=None)
         except (OSError, pa.ArrowException) as error:
             raise LogError(f"{path}: cannot be read: {error}; analyze the log again") from error
+
+    def smoothed(self) -> pa.Table | None:
+        """Read how much of the last map's rooms each map shows; None if the run was not smoothed.
+
+        Raises
+        ------
+        LogError
+            If the table cannot be read.
+        """
+        name = f"{SMOOTHED}.parquet"
+        # One that the summary does not name is of an earlier run.
+        is_there = name in self.summary["files"] and (self.folder / name).is_file()
+        return self.table(SMOOTHED) if is_there else None
 
     @cached_property
     def snapshots(self) -> dict[str, np.ndarray[Any, Any]]:
