@@ -64,7 +64,8 @@ class ShareLane:
 
     Attributes
     ----------
-    name : str
+    name, text : str
+        What stands beside it, and what it says when pointed at.
     shares : (N,) float
         In [0, 1].
     colour : str
@@ -74,6 +75,7 @@ class ShareLane:
     """
 
     name: str
+    text: str
     shares: FloatArray
     colour: str
     reached: int | None = None
@@ -206,8 +208,8 @@ def share_lanes(
 
 def _share_lane(columns: FloatArray, lane: ShareLane, top: float, bottom: float) -> list[str]:
     """Name, tint from the first share on, the shares as steps, and the line across."""
-    name, fill = escape(lane.name), escape(lane.colour)
-    parts = [f'<text x="{LEFT - 5:.0f}" y="{bottom - 2:.1f}" text-anchor="end">{name}</text>']
+    fill = escape(lane.colour)
+    parts = [f'<text x="{LEFT - 5:.0f}" y="{bottom - 2:.1f}" text-anchor="end">{escape(lane.name)}</text>']
     seen = np.flatnonzero(lane.shares > 0)
     if len(seen):
         left, right = float(columns[seen[0]]), float(columns[-1]) + LAST_WIDTH
@@ -221,7 +223,7 @@ def _share_lane(columns: FloatArray, lane: ShareLane, top: float, bottom: float)
         path = "".join(f"H{x:.1f}V{y:.1f}" for x, y in zip(columns[steps], rows, strict=True))
         parts.append(
             f'<path fill="{fill}" d="M{left:.1f} {bottom:.1f}{path}H{right:.1f}V{bottom:.1f}Z">'
-            f"<title>{name}</title></path>"
+            f"<title>{escape(lane.text)}</title></path>"
         )
     if lane.reached is not None:
         parts.append(f'<path class="axis" d="M{columns[lane.reached]:.1f} {top:.1f}V{bottom:.1f}"/>')

@@ -32,18 +32,29 @@ def seen_rooms(results: RunResults) -> SeenRooms | None:
     if not len(tracks) or shares.shape[1] < 2:
         return None
     first, mostly = _first_at_least(shares, np.finfo(float).tiny), _first_at_least(shares, MOSTLY)
-    order = np.lexsort((tracks, mostly, first))
+    order = np.lexsort((tracks, mostly, first)).tolist()
+    coverage, time_s = (results.snapshots[name].astype(float).tolist() for name in ("coverage", "time_s"))
+    rows = {
+        each: (
+            room(int(tracks[each])),
+            number(float(areas_m2[each])),
+            *_moment(int(first[each]), coverage, time_s),
+            *_moment(int(mostly[each]), coverage, time_s),
+        )
+        for each in order
+    }
     largest = set(np.argsort(-areas_m2, kind="stable")[:LANES_MOST].tolist())
-    shown = [each for each in order.tolist() if each in largest]
     axis, _ = run_axes(results)
     lanes = [
         ShareLane(
             str(tracks[each]),
+            f"{row[0].text}: first seen at {row[2].text}, {MOSTLY:.0%} of it at {row[4].text} coverage",
             np.minimum(shares[each], 1.0),
             css_colour(int(tracks[each])),
             int(mostly[each]) if mostly[each] < len(axis.x) else None,
         )
-        for each in shown
+        for each, row in rows.items()
+        if each in largest
     ]
     drawn = share_lanes(
         axis.x,
@@ -52,16 +63,6 @@ def seen_rooms(results: RunResults) -> SeenRooms | None:
         x_label=axis.label,
         x_range=axis.ends,
     )
-    coverage, time_s = (results.snapshots[name].astype(float).tolist() for name in ("coverage", "time_s"))
-    rows = [
-        (
-            room(int(tracks[each])),
-            number(float(areas_m2[each])),
-            *_moment(int(first[each]), coverage, time_s),
-            *_moment(int(mostly[each]), coverage, time_s),
-        )
-        for each in order.tolist()
-    ]
     columns = (
         Column("room", "its number over the run", is_number=False),
         Column("area, m²", "in the last map"),
@@ -70,9 +71,8 @@ def seen_rooms(results: RunResults) -> SeenRooms | None:
         Column(f"{MOSTLY:.0%} seen", f"coverage when {MOSTLY:.0%} of it were seen"),
         Column("at time", f"time into the run when {MOSTLY:.0%} of it were seen"),
     )
-    left_out = len(tracks) - len(shown)
-    note = f"The {len(shown)} largest rooms are drawn; the table has all." if left_out else ""
-    return SeenRooms(drawn, Table("When each room was seen", columns, tuple(rows)), note)
+    note = f"The {len(lanes)} largest rooms are drawn; the table has all." if len(lanes) < len(rows) else ""
+    return SeenRooms(drawn, Table("When each room was seen", columns, tuple(rows.values())), note)
 
 
 def _shares(results: RunResults) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:

@@ -11,12 +11,15 @@ from rose2_logs.drawing.chart import (
     HEIGHT,
     LEFT,
     RIGHT,
+    SHARE_LANE,
     TOP,
     WIDTH,
     Mark,
     Series,
+    ShareLane,
     lane_chart,
     line_chart,
+    share_lanes,
 )
 
 
@@ -85,3 +88,33 @@ def test_lanes_show_when_rooms_were_there():
         pytest.approx((LEFT + 2 * quarter, 2 * quarter), abs=0.1),
     ]
     assert len(bars) == 3
+
+
+def test_a_share_rises_in_steps_within_its_lane():
+    """In the second lane: nothing before the second value, half of the lane from there on, then all of it."""
+    first = ShareLane("1", "one", np.ones(4), "#111111", reached=0)
+    second = ShareLane("2 & <3>", "two", np.array([0.0, 0.5, 0.5, 1.0]), "#222222", reached=3)
+    root = ET.fromstring(
+        share_lanes(
+            np.array([0.0, 25.0, 50.0, 100.0]), [first, second], title="t", x_label="x", x_range=(0.0, 100.0)
+        )
+    )
+    (path,) = (each.get("d") for each in root.iter("path") if each.get("fill") == "#222222")
+    across = [float(value) for value in re.findall(r"[MH]([0-9.]+)", path)]
+    down = [float(value) for value in re.findall(r"V([0-9.]+)", path)]
+    bottom, height = TOP + 2 * SHARE_LANE - 1, SHARE_LANE - 2
+    width = WIDTH - LEFT - RIGHT
+    assert across == pytest.approx([LEFT + width / 4, LEFT + width / 4, LEFT + width, LEFT + width + 4])
+    assert down == pytest.approx([bottom - height / 2, bottom - height, bottom])
+    lines = [each.get("d") for each in root.iter("path") if each.get("class") == "axis"]
+    assert len(lines) == 3  # the axes, and a line across each lane
+    assert "2 & <3>" in [each.text for each in root.iter("text")]
+
+
+def test_a_share_that_is_never_there_is_an_empty_lane():
+    root = ET.fromstring(
+        share_lanes(
+            np.array([0.0, 1.0]), [ShareLane("1", "one", np.zeros(2), "#111111")], title="t", x_label="x"
+        )
+    )
+    assert not list(root.iter("rect"))

@@ -22,7 +22,7 @@ def report(tmp_path_factory) -> Path:
     """A report whose log and topic are named like programs."""
     folder = tmp_path_factory.mktemp("browser")
     log = renamed_topic(SAMPLE_LOGS / "office.mcap", TOPIC, folder / "<i>office.mcap")
-    return write_report(run_of(log, folder / "out", 4, topic=TOPIC))
+    return write_report(run_of(log, folder / "out", 4, topic=TOPIC, smooth=True))
 
 
 @pytest.fixture(scope="module")
@@ -65,6 +65,9 @@ def test_everything_is_there(page):
     assert page.locator(".plan svg").get_by_text("Room 1", exact=True).count() == 1
     assert page.locator(".panels figure").count() == 4
     assert page.locator(".charts .over-coverage svg").first.is_visible()
+    assert page.locator("#seen svg").is_visible()
+    told = page.locator("#seen svg path title").all_text_contents()
+    assert [text.partition(":")[0] for text in told] == column(page, "seen-table", 1)
     boxes = [each.bounding_box() for each in page.locator(".panels svg").all()]
     assert all(box["width"] > 100 and box["height"] > 40 for box in boxes)
     assert len(column(page, "rooms-table", 1)) > 5

@@ -10,6 +10,7 @@ from html.parser import HTMLParser
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 from finished_runs import SAMPLE_LOGS, renamed_topic, run_of
@@ -79,6 +80,26 @@ def test_it_says_what_the_tables_say(office_results: Path, tmp_path: Path):
     assert "All parameters have their defaults" in text
     parameters = {row[0]: row[1] for row in told.rows("parameters-table")}
     assert parameters["floor_plan.room_min_area_m2"] == "3"
+
+
+def test_it_says_when_each_room_was_seen_where_the_run_was_smoothed(office_results: Path, tmp_path: Path):
+    """First, and 90 % of it, in that order; without smoothing there is no such section."""
+    assert "seen-table" not in Reader(write_report(office_results, tmp_path / "plain.html")).tables
+    folder = run_of(SAMPLE_LOGS / "office.mcap", tmp_path / "out", annotated_log=False, smooth=True)
+    told = Reader(write_report(folder)).rows("seen-table")
+    smoothed = pd.read_parquet(folder / "smoothed.parquet")
+    coverage = pd.read_parquet(folder / "snapshots.parquet").set_index("snapshot").coverage
+    assert {row[0] for row in told} == {f"Room {track}" for track in smoothed.track.unique()}
+    for row in told:
+        of_room = smoothed[smoothed.track == int(row[0].removeprefix("Room "))].sort_values("snapshot")
+        mostly = of_room[of_room.last_area_share >= 0.9]
+        assert row[2] == f"{coverage[of_room.snapshot.iloc[0]]:.0%}"
+        assert row[4] == (f"{coverage[mostly.snapshot.iloc[0]]:.0%}" if len(mostly) else "–")
+    first = [int(row[2].removesuffix("%")) for row in told]
+    assert first == sorted(first)
+    assert len(set(first)) > 2
+    (folder / "smoothed.parquet").unlink()
+    assert "seen-table" not in Reader(write_report(folder, overwrite=True)).tables
 
 
 def test_it_stands_alone(office_results: Path, tmp_path: Path):
