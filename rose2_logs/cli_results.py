@@ -69,6 +69,12 @@ def figure(
     snapshot: Snapshot = None,
     coverage: Coverage = None,
     last: Last = False,
+    smoothed: Annotated[
+        bool,
+        typer.Option(
+            "--smoothed", help="The rooms of the last map as far as this one shows them, not its own."
+        ),
+    ] = False,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -90,7 +96,8 @@ def figure(
     from rose2_logs.results.figure import write_figure
 
     choice = _choice(snapshot, coverage, last)
-    reporting.print_file(write_figure(folder, out, *choice, width_px=width, overwrite=overwrite))
+    picture = write_figure(folder, out, *choice, smoothed=smoothed, width_px=width, overwrite=overwrite)
+    reporting.print_file(picture)
 
 
 def export(

@@ -13,6 +13,7 @@ from rose2_logs.exports.formats import planned_files, write_plan
 from rose2_logs.files import refuse_existing, replacing
 from rose2_logs.results import FIGURE_WIDTH_PX
 from rose2_logs.results.folder import RunResults
+from rose2_logs.results.smoothed_plan import smoothed_plan
 from rose2_logs.sinks.label_image import write_image
 
 PICTURE_ENDINGS = (".png", ".svg")
@@ -24,6 +25,7 @@ def write_figure(
     snapshot: int | None = None,
     coverage: float | None = None,
     *,
+    smoothed: bool = False,
     width_px: int = FIGURE_WIDTH_PX,
     overwrite: bool = False,
 ) -> Path:
@@ -35,9 +37,11 @@ def write_figure(
         Results of a log.
     out : path, optional
         The picture, ``.png`` or ``.svg``; by default ``<name>.figure.png`` in the folder, with the number of
-        the map in its name if it is not the last.
+        the map in its name if it is not the last, and ``smoothed`` if it is.
     snapshot, coverage : int, float, optional
         Which map, see `RunResults.choose`.
+    smoothed : bool
+        Draw the rooms of the last map as far as this one shows them, instead of its own.
     width_px : int
         Width of a PNG.
     overwrite : bool
@@ -59,13 +63,15 @@ def write_figure(
     """
     results = RunResults(folder)
     number = results.choose(snapshot, coverage)
-    out = folder / f"{_stem(results, number)}.figure.png" if out is None else out
+    stem = f"{_stem(results, number)}.smoothed" if smoothed else _stem(results, number)
+    out = folder / f"{stem}.figure.png" if out is None else out
     kind = out.suffix.lower()
     if kind not in PICTURE_ENDINGS:
         raise ParameterError(f"{out}: a figure is {' or '.join(PICTURE_ENDINGS)}; let its name end so")
     refuse_existing([out], overwrite=overwrite)
     with results.open_maps() as maps:
-        drawing = draw_plan(results.plan(number, maps))
+        plan = smoothed_plan(results, number, maps) if smoothed else results.plan(number, maps)
+        drawing = draw_plan(plan)
     if kind == ".png":
         write_image(out, as_pixels(drawing, width_px))
     else:

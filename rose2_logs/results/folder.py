@@ -14,7 +14,7 @@ import shapely
 
 from rose2_logs.errors import LogError, ParameterError
 from rose2_logs.files import require_utf8
-from rose2_logs.parameters import Parameters, ReadingParameters
+from rose2_logs.parameters import Parameters
 from rose2_logs.readers.discovery import ANNOTATED_ENDING
 from rose2_logs.results.maps import RunMaps
 from rose2_logs.room_plan import PlanRoom, RoomPlan
@@ -167,17 +167,25 @@ class RunResults:
     def open_maps(self) -> RunMaps | nullcontext[None]:
         """Open the maps of the run, as far as the annotated MCAP is there; a context manager."""
         path = self.annotated_log
-        return nullcontext() if path is None else RunMaps(path, str(self.summary["topic"]), self._limits)
+        return (
+            nullcontext()
+            if path is None
+            else RunMaps(path, str(self.summary["topic"]), self.parameters("reading").reading)
+        )
 
-    @property
-    def _limits(self) -> ReadingParameters:
-        """Those that the log was read with; of results of another version as far as they are known."""
-        known = {each.name for each in dataclasses.fields(ReadingParameters)}
-        used = self.summary.get("parameters", {}).get("reading", {})
+    def parameters(self, *blocks: str) -> Parameters:
+        """Return those of some blocks that the run had; of another version's results as far as known."""
+        used, defaults = self.summary.get("parameters", {}), Parameters()
         try:
-            return Parameters().replaced({"reading": {k: v for k, v in used.items() if k in known}}).reading
+            wanted = {block: self._known(used.get(block, {}), getattr(defaults, block)) for block in blocks}
+            return defaults.replaced(wanted)
         except (ParameterError, AttributeError):
-            return ReadingParameters()
+            return defaults
+
+    @staticmethod
+    def _known(used: dict[str, Any], block: Any) -> dict[str, Any]:
+        names = {each.name for each in dataclasses.fields(block)}
+        return {name: value for name, value in used.items() if name in names}
 
     def plan(self, snapshot: int, maps: RunMaps | None, *, with_walls: bool = False) -> RoomPlan:
         """Return the floor plan of a snapshot, whose rooms go by their tracks.
