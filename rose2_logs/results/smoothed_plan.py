@@ -36,7 +36,7 @@ def smoothed_plan(results: RunResults, snapshot: int, maps: RunMaps | None) -> R
     last, then = results.plan(last_number, maps), results.plan(snapshot, maps)
     if last.map is None or then.map is None:
         raise LogError(
-            f"{results.folder}: smoothing needs the maps, and the annotated MCAP, which has them, is not there; "
+            f"{results.folder}: smoothing needs the maps, and the annotated MCAP with them is not there; "
             "analyze the log again without --no-mcap"
         )
     tracks = np.array([room.number for room in last.rooms], np.int32)
