@@ -26,8 +26,8 @@ PROJECT = Path(__file__).parents[2]
 GOLDEN = Path(__file__).with_name("golden")
 BIN = Path(sys.executable).parent
 COVERAGES = (0.3, 0.6, 1.0)
-TABS = ("Clean map", "Structure score", "Walls", "Faces", "Voronoi graph", "Spectrum")
-PANELS = ("Lives of rooms", "Area, m²", "Count", "Change")
+TABS = ("Smoothed rooms", "Clean map", "Structure score", "Walls", "Faces", "Voronoi graph", "Spectrum")
+PANELS = ("Lives of rooms", "Area, m²", "Seen share", "Count", "Change")
 TEXTS = ("Events", "Summary")
 FIRST_MAP_S = 1_700_000_020.0
 """Log time of the sample's first map."""
@@ -51,7 +51,7 @@ FROM_OUTSIDE = ("Failed to load resource", "Failed to fetch")
 
 
 def record(folder: Path) -> Path:
-    options = RunOptions(selection=Selection(max_snapshots=8), annotated_log=False)
+    options = RunOptions(selection=Selection(max_snapshots=8), annotated_log=False, smooth=True)
     log = PROJECT / "sample_logs" / "office.mcap"
     return analyse_log(log, folder, options).folder / "office.rrd"
 
