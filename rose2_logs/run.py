@@ -212,6 +212,7 @@ def _analyse(
         if frame is None:
             raise InvalidMapError(f"{path}: none of its {totals.invalid} maps can be analysed")
         if smoother is not None:
+            logger.info("the maps are read once more, to be smoothed")
             receiving = [sink for sink in sinks if isinstance(sink, SmoothedSink)]
             # What is odd was told the first time.
             with muted(), SmoothedTable(planned[SMOOTHED]) as table:
