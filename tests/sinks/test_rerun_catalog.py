@@ -24,12 +24,13 @@ BIN = Path(sys.executable).parent
 
 @pytest.fixture(scope="module")
 def results(tmp_path_factory) -> Path:
-    """Two runs below a folder, as a batch writes them."""
+    """Two runs below a folder, as a batch writes them; one is smoothed."""
     folder = tmp_path_factory.mktemp("runs")
     for name, seen in (("first", (115, 240)), ("second", (150, 240))):
         save_run(folder / "logs" / name, seen)
         results = folder / "results" / "logs" / name
-        analyse_log(folder / "logs" / name, results, RunOptions(annotated_log=False))
+        options = RunOptions(annotated_log=False, smooth=name == "first")
+        analyse_log(folder / "logs" / name, results, options)
     return folder / "results"
 
 
@@ -139,7 +140,9 @@ def test_the_viewer_opens_a_run_of_the_catalog_in_our_layout(results, tmp_path, 
         (dataset,) = CatalogClient(url).datasets()
         viewer.open(dataset.segment_url(dataset.segment_ids()[0]))
         end = time.monotonic() + 60
-        while not {"Rooms", "Lives of rooms"} <= {view.name for view in viewer.get_state().views}:
+        while not {"Rooms", "Smoothed rooms", "Lives of rooms"} <= {
+            view.name for view in viewer.get_state().views
+        }:
             assert time.monotonic() < end
             time.sleep(0.2)
         assert not [report for view in viewer.get_state().views for report in view.reports]
