@@ -112,13 +112,15 @@ def info(
         str, typer.Argument(metavar="LOG", help="MCAP, ROS 1 bag, ROS 2 bag, saved map or folder of such.")
     ],
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON for scripts.")] = False,
+    config: Config = None,
+    settings: Settings = None,
     debug: Debug = False,
 ) -> None:
     """Show what a log holds: topics, map sizes, resolution, duration, coverage."""
     from rose2_logs import reporting
     from rose2_logs.log_facts import describe_log
 
-    facts = describe_log(log)
+    facts = describe_log(log, resolve_parameters(config, settings))
     if as_json:
         reporting.print_json(facts.as_json())
     else:

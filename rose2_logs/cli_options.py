@@ -136,7 +136,7 @@ def chosen_layers(names: str) -> tuple[str, ...]:
     return tuple(name for name in RECORDING_LAYERS if name in asked)
 
 
-def resolve_parameters(config: Path | None, settings: list[str] | None, method: str) -> Parameters:
+def resolve_parameters(config: Path | None, settings: list[str] | None, method: str = "rose2") -> Parameters:
     """Read the parameters and check the method that were asked for.
 
     Raises

@@ -249,3 +249,17 @@ def test_evaluate_along_a_run(cli, cases: Path, tmp_path: Path):
     assert 0.6 < along[0]["coverage"] < 0.9
     assert along[1]["coverage"] == 1.0
     assert (tmp_path / "drawn.along.png").exists()
+
+
+def test_info_takes_the_parameters_that_its_messages_name(cli, tmp_path: Path):
+    """A map that is larger than the limit is told with it; the limit can be set as for the other commands."""
+    tight = ["--set", "reading.map_max_cells=100000"]
+    code, out, _ = cli("info", SAMPLE_LOGS / "office.mcap", *tight)
+    assert (code, "--set reading.map_max_cells" in out) == (0, True)
+    config = tmp_path / "limits.toml"
+    config.write_text("[reading]\nmap_max_cells = 100000\n")
+    assert cli("info", SAMPLE_LOGS / "office.mcap", "--config", config)[1] == out
+    code, out, _ = cli(
+        "info", SAMPLE_LOGS / "office.mcap", "--config", config, "--set", "reading.map_max_cells=1000000"
+    )
+    assert (code, "704 x 512 cells" in out) == (0, True)
