@@ -12,7 +12,7 @@ from shapely.geometry.base import BaseGeometry
 from rose2_logs.floor_plan.rooms import outline
 from rose2_logs.occupancy import UNKNOWN, BoolArray, FloatArray, GridGeometry, OccupancySnapshot, known_window
 from rose2_logs.pipeline import SnapshotAnalysis
-from rose2_logs.room_evidence import RoomEvidence
+from rose2_logs.room_evidence import RoomEvidence, is_unsure
 from rose2_logs.rooms import Doorway
 
 PREDICTED_MIN_WIDTH_M = 0.3
@@ -55,6 +55,11 @@ class PlanRoom:
     def name(self) -> str:
         """What it is called."""
         return f"Room {self.number}"
+
+    @property
+    def is_unsure(self) -> bool:
+        """Whether few walls back its outline."""
+        return is_unsure(self.confidence)
 
     @property
     def predicted_area_m2(self) -> float:

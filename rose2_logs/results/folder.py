@@ -22,6 +22,7 @@ from rose2_logs.results.maps import RunMaps
 from rose2_logs.room_plan import PlanRoom, RoomPlan
 from rose2_logs.rooms import Doorway
 from rose2_logs.run import SUMMARY, TABLES
+from rose2_logs.sinks.shares import percent
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -213,7 +214,7 @@ class RunResults:
         doorways = tuple(_doorway(each) for each in self.table("doorways", snapshot=snapshot).to_pylist())
         time_ns = int(row["log_time_ns"])
         return RoomPlan(
-            f"{self.name}, snapshot {snapshot}, coverage {row['coverage']:.0%}",
+            f"{self.name}, snapshot {snapshot}, coverage {percent(float(row['coverage']))}",
             str(row["frame_id"]),
             tuple(sorted(rooms, key=lambda room: room.number)),
             doorways,

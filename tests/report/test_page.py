@@ -81,6 +81,19 @@ def test_it_says_what_the_tables_say(office_results: Path, tmp_path: Path):
     assert parameters["floor_plan.room_min_area_m2"] == "3"
 
 
+def test_lanes_tell_when_each_room_was_right(office_results: Path, tmp_path: Path):
+    """A room of the last map has settled by then; one that was right later than it came formed before."""
+    text = write_report(office_results, tmp_path / "report.html").read_text(encoding="utf-8")
+    tracks = pq.read_table(office_results / "tracks.parquet").to_pylist()
+    signs = {row["track"]: "?" if row["outline_wall_share"] < 0.7 else "" for row in tracks}
+    for row in tracks:
+        name = f"{row['track']}{signs[row['track']]}"
+        if row["in_last_map"]:
+            assert f"<title>{name}: settled</title>" in text
+        right = min(row["shape_right_snapshot"], row["area_settled_snapshot"])
+        assert (f"<title>{name}: forming</title>" in text) == (right > row["first_snapshot"])
+
+
 def test_it_stands_alone(office_results: Path, tmp_path: Path):
     """Nothing is fetched: addresses are data, places in the page, or files beside it."""
     page = write_report(office_results, tmp_path / "page.html")
@@ -205,6 +218,14 @@ def test_panels_stand_evenly_along_coverage(most: int):
         assert places[0] == 0
         # A step of the maps themselves is 0.05 at most.
         assert np.diff(coverage[places]).max() <= 0.9 / (most - 1) + 0.05
+
+
+def test_the_last_panel_is_the_only_one_of_full_coverage_that_is_needed():
+    """Where some maps before the last cover as much, the first map is not given up for one of them."""
+    coverage = np.concatenate([np.linspace(0.1, 1.0, 40), np.ones(10)])
+    places = along_coverage(coverage, 10)
+    assert (places[0], len(places)) == (0, 10)
+    assert (coverage[places] == 1.0).sum() == 1
 
 
 def test_maps_that_cover_the_same_are_spread():
