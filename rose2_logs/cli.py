@@ -42,7 +42,10 @@ from rose2_logs.errors import AlreadyWholeError, ParameterError, Rose2LogsError
 
 app = App(
     name="rose2-logs",
-    help="Rooms and structure of buildings from the maps in robot logs.",
+    help="Rooms and structure of buildings from the maps in robot logs.\n\n"
+    "Begin with [bold]rose2-logs analyze run.mcap -o results[/bold]; then "
+    "[bold]rose2-logs view results/run[/bold] shows what was found, and "
+    "[bold]rose2-logs report results/run[/bold] makes a page of it.",
     epilog=EXIT_CODES,
     no_args_is_help=True,
     add_completion=False,
@@ -98,7 +101,10 @@ def _show_version(value: bool) -> None:
 def _everything(
     debug: Debug = False,
     version: Annotated[
-        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version.")
+        bool,
+        typer.Option(
+            "--version", callback=_show_version, is_eager=True, metavar="", help="Show the version."
+        ),
     ] = False,
 ) -> None:
     from rose2_logs.reporting_messages import show_messages

@@ -97,7 +97,8 @@ Settings = Annotated[
     typer.Option(
         "--set",
         metavar="STAGE.NAME=VALUE",
-        help="Change one parameter, as in floor_plan.room_min_area_m2=2; may be repeated.",
+        help="Change one parameter, as in walls.extension_m=6; may be repeated. The summary.json of a run "
+        "lists all.",
         show_default=False,
     ),
 ]

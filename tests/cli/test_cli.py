@@ -263,3 +263,11 @@ def test_info_takes_the_parameters_that_its_messages_name(cli, tmp_path: Path):
         "info", SAMPLE_LOGS / "office.mcap", "--config", config, "--set", "reading.map_max_cells=1000000"
     )
     assert (code, "704 x 512 cells" in out) == (0, True)
+
+
+@pytest.mark.parametrize("command", ["info", "analyze", "batch", "report", "compare", "evaluate"])
+def test_help_shows_flags_as_flags_and_cuts_nothing(cli, command: str):
+    """No type stands behind a flag, as if it took a value; no example is cut off."""
+    code, out, _ = cli(command, "--help")
+    lines = [line for line in out.splitlines() if "<bool>" in line and "--help" not in line]
+    assert (code, lines, "…" in out) == (0, [], False)
