@@ -133,6 +133,8 @@ def draw_plan(plan: RoomPlan, style: PlanStyle = FIGURE, bounds_m: Bounds | None
             name_on = seen[room.number] if seen[room.number].area else shapes[room.number]
             drawing.add(*_label(room, name_on, style))
     if style.has_legend:
+        # Rays may go on beyond the plan.
+        drawing.add(Area(shapely.box(0, height, style.width, height + strip), drawing.paper))
         drawing.add(*_legend(plan, style, scale, height, has_predicted=bool(predicted)))
     return drawing
 

@@ -113,6 +113,19 @@ def test_the_legend_fits_into_the_page(height_m: float):
     assert all(end < start for (_, end), (start, _) in pairwise(ends))
 
 
+def test_a_ray_beyond_the_plan_does_not_reach_into_the_legend():
+    """It leaves the rooms downwards and ends at the rim of the plan."""
+    plan = two_rooms_plan()
+    cells = plan.map.cells.copy()
+    cells[:10, 20:22] = 100
+    plan = dataclasses.replace(plan, map=dataclasses.replace(plan.map, cells=cells))
+    drawing = draw_plan(plan, FIGURE)
+    image = as_pixels(drawing, int(FIGURE.width))
+    strip = image[int(drawing.height - 3 * FIGURE.font) + 2 : -1]
+    assert (strip[:4] == 255).all()
+    assert (strip[-4:] == 255).all()
+
+
 def test_several_plans_share_a_part_of_the_world():
     """With the same bounds a room stands at the same place of the page."""
     plan = two_rooms_plan()
