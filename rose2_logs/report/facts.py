@@ -82,9 +82,14 @@ def tiles(results: RunResults, plan: RoomPlan) -> list[Tile]:
     ]
 
 
+def is_last(final: dict[str, Any], last: int) -> bool:
+    """Whether a layout was final in the last map only, of several: so it may change again."""
+    return bool(final["snapshot"] == last > 0)
+
+
 def _final(final: dict[str, Any] | None, last: int) -> tuple[str, str]:
     """Say from what map on the layout was final; if that is the last, it never was for sure."""
-    if final is None or final["snapshot"] == last > 0:
+    if final is None or is_last(final, last):
         return NOT_FINAL, "it changed up to the last map"
     moment = f"map {final['snapshot']}, {duration(final['time_s'])} into the run"
     return f"{percent(final['coverage'])} coverage", moment

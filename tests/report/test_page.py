@@ -199,6 +199,22 @@ def test_many_logs_have_a_page_that_lists_them(office_results: Path, tmp_path: P
     ]
 
 
+def test_the_page_of_a_batch_names_the_logs_that_failed(office_results: Path, tmp_path: Path):
+    """As text, with the reason; a layout that was final in the last map only is not told as final."""
+    shutil.copytree(office_results, tmp_path / "logs" / "a")
+    summary = json.loads((office_results / "summary.json").read_text())
+    rows = pq.read_table(office_results / "snapshots.parquet").to_pylist()
+    summary["layout"]["final_since"] = {"snapshot": rows[-1]["snapshot"], "time_s": 1.0, "coverage": 1.0}
+    (tmp_path / "logs" / "a" / "summary.json").write_text(json.dumps(summary))
+    table = "log,status,reason\na,done,\nbad,failed,<b>no</b> map\n"
+    (tmp_path / "summary.csv").write_text(table, encoding="utf-8")
+    told = Reader(write_reports(tmp_path, panels=1).pages[-1])
+    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "<strong>bad</strong>: &lt;b&gt;no&lt;/b&gt; map" in text
+    (row,) = told.rows("logs-table")
+    assert row[7] == "–"
+
+
 def test_a_folder_without_results_is_named(tmp_path: Path):
     with pytest.raises(LogError, match=r"holds no summary\.json"):
         write_reports(tmp_path)
