@@ -43,7 +43,10 @@ from rose2_logs.errors import AlreadyWholeError, ParameterError, Rose2LogsError
 
 app = App(
     name="rose2-logs",
-    help="Rooms and structure of buildings from the maps in robot logs.",
+    help="Rooms and structure of buildings from the maps in robot logs.\n\n"
+    "Begin with [bold]rose2-logs analyze run.mcap -o results[/bold]; then "
+    "[bold]rose2-logs view results/run[/bold] shows what was found, and "
+    "[bold]rose2-logs report results/run[/bold] makes a page of it.",
     epilog=EXIT_CODES,
     no_args_is_help=True,
     add_completion=False,
@@ -99,7 +102,10 @@ def _show_version(value: bool) -> None:
 def _everything(
     debug: Debug = False,
     version: Annotated[
-        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version.")
+        bool,
+        typer.Option(
+            "--version", callback=_show_version, is_eager=True, metavar="", help="Show the version."
+        ),
     ] = False,
 ) -> None:
     from rose2_logs.reporting_messages import show_messages
@@ -113,13 +119,15 @@ def info(
         str, typer.Argument(metavar="LOG", help="MCAP, ROS 1 bag, ROS 2 bag, saved map or folder of such.")
     ],
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON for scripts.")] = False,
+    config: Config = None,
+    settings: Settings = None,
     debug: Debug = False,
 ) -> None:
     """Show what a log holds: topics, map sizes, resolution, duration, coverage."""
     from rose2_logs import reporting
     from rose2_logs.log_facts import describe_log
 
-    facts = describe_log(log)
+    facts = describe_log(log, resolve_parameters(config, settings))
     if as_json:
         reporting.print_json(facts.as_json())
     else:

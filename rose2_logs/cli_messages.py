@@ -5,11 +5,15 @@ from __future__ import annotations
 import functools
 import inspect
 from collections.abc import Callable
-from typing import Annotated, Any
+from pathlib import Path
+from typing import Annotated, Any, get_args
 
 import typer
+from typer.models import OptionInfo
 
 PANEL = "Messages on stderr"
+VALUES = {bool: "", int: "N", str: "NAME", Path: "PATH"}
+"""What stands in a command's help for the value of an option of this type that has no name of its own."""
 
 Quiet = Annotated[
     bool,
@@ -56,8 +60,19 @@ def _with_options(command: Callable[..., Any]) -> Callable[..., Any]:
         for name, kind in OPTIONS.items()
     ]
     kinds = {name: each.annotation for name, each in signature.parameters.items()}
+    for kind in (*kinds.values(), *OPTIONS.values()):
+        _name_value(kind)
     with_messages.__annotations__ = kinds | OPTIONS
     with_messages.__signature__ = signature.replace(  # type: ignore[attr-defined]
         parameters=[*signature.parameters.values(), *more]
     )
     return with_messages
+
+
+def _name_value(kind: Any) -> None:
+    """Name what an option takes as people do; behind a flag nothing, as if it took a value."""
+    base, *about = get_args(kind) or (kind,)
+    base = next((each for each in get_args(base) if each is not type(None)), base)
+    for each in about:
+        if isinstance(each, OptionInfo) and each.metavar is None:
+            each.metavar = VALUES.get(base)

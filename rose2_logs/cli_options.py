@@ -105,7 +105,8 @@ Settings = Annotated[
     typer.Option(
         "--set",
         metavar="STAGE.NAME=VALUE",
-        help="Change one parameter, as in floor_plan.room_min_area_m2=2; may be repeated.",
+        help="Change one parameter, as in walls.extension_m=6; may be repeated. The summary.json of a run "
+        "lists all.",
         show_default=False,
     ),
 ]
@@ -144,7 +145,7 @@ def chosen_layers(names: str) -> tuple[str, ...]:
     return tuple(name for name in RECORDING_LAYERS if name in asked)
 
 
-def resolve_parameters(config: Path | None, settings: list[str] | None, method: str) -> Parameters:
+def resolve_parameters(config: Path | None, settings: list[str] | None, method: str = "rose2") -> Parameters:
     """Read the parameters and check the method that were asked for.
 
     Raises

@@ -135,15 +135,17 @@ def read_final_layout(folder: Path, name: str | None = None) -> FinalLayout:
 
 
 def _last_map(results: RunResults, last_ns: int, limits: ReadingParameters) -> OccupancySnapshot:
-    topic, log, annotated = str(results.summary["topic"]), str(results.summary["log"]), results.annotated_log
+    topic, annotated = str(results.summary["topic"]), results.annotated_log
     selection = Selection(last_ns, last_ns)
     try:
-        with open_log(annotated or log, topic=topic, selection=selection, limits=limits) as reader:
+        with open_log(
+            annotated or results.find_log(), topic=topic, selection=selection, limits=limits
+        ) as reader:
             return reader.last()
     except LogError as error:
         if annotated is not None:
             raise
         raise LogError(
             f"{results.folder}: holds no annotated MCAP, and the last map cannot be read from the log "
-            f"({error}); analyze it again without --no-mcap"
+            f"({error}); put the log back, or analyze it again without --no-mcap"
         ) from error

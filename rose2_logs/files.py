@@ -55,6 +55,11 @@ def replacing(path: Path) -> Iterator[Path]:
             part.unlink(missing_ok=True)
 
 
+def readable(path: Path | str) -> str:
+    """Return a path as text that any file can hold: bytes that are not UTF-8 are written as in Python."""
+    return os.fsencode(path).decode(errors="backslashreplace")
+
+
 def require_utf8(path: Path) -> None:
     """Refuse a name that results could not hold: tables, recordings and pages are UTF-8.
 
@@ -67,7 +72,7 @@ def require_utf8(path: Path) -> None:
         str(path.resolve()).encode()
     except UnicodeEncodeError as error:
         raise OutputError(
-            f"{path}: its name is not UTF-8, and results could not name it; rename it"
+            f"{readable(path)}: its name is not UTF-8, and results could not name it; rename it"
         ) from error
 
 

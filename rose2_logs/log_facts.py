@@ -9,7 +9,7 @@ from typing import Any
 
 from rose2_logs.errors import LogError
 from rose2_logs.occupancy import OccupancySnapshot, classify
-from rose2_logs.parameters import OccupancyParameters
+from rose2_logs.parameters import OccupancyParameters, Parameters
 from rose2_logs.readers import LogReader, Selection, open_source
 from rose2_logs.readers.source import LogInfo, MessageSource
 
@@ -73,8 +73,15 @@ class LogFacts:
         return info | {"maps": maps}
 
 
-def describe_log(log: str) -> LogFacts:
+def describe_log(log: str, parameters: Parameters | None = None) -> LogFacts:
     """Look at a log without reading all of it.
+
+    Parameters
+    ----------
+    log : str
+        Its path.
+    parameters : Parameters, optional
+        What may be read at most, and which cells are free.
 
     Raises
     ------
@@ -82,21 +89,23 @@ def describe_log(log: str) -> LogFacts:
         If the log cannot be opened. A map topic that cannot be read is told as such.
     """
     # Opened once: the index of a large log is megabytes.
-    with closing(open_source(log)) as source:
+    used = parameters or Parameters()
+    with closing(open_source(log, used.reading)) as source:
         topics = [topic for topic in source.info.topics if topic.is_map and topic.message_count != 0]
-        return LogFacts(source.info, tuple(_topic_facts(source, topic.name) for topic in topics))
+        return LogFacts(source.info, tuple(_topic_facts(source, topic.name, used) for topic in topics))
 
 
-def _topic_facts(source: MessageSource, topic: str) -> TopicFacts:
+def _topic_facts(source: MessageSource, topic: str, parameters: Parameters) -> TopicFacts:
     try:
         reader = LogReader(source, topic, Selection())
-        return TopicFacts(topic, _map_facts(reader.first()), _map_facts(reader.last()))
+        first, last = (_map_facts(each, parameters.occupancy) for each in (reader.first(), reader.last()))
+        return TopicFacts(topic, first, last)
     except LogError as error:
         return TopicFacts(topic, None, None, str(error))
 
 
-def _map_facts(snapshot: OccupancySnapshot) -> MapFacts:
-    free, _ = classify(snapshot.cells, OccupancyParameters())
+def _map_facts(snapshot: OccupancySnapshot, parameters: OccupancyParameters) -> MapFacts:
+    free, _ = classify(snapshot.cells, parameters)
     geometry = snapshot.geometry
     free_m2 = float(free.sum()) * geometry.cell_area_m2
     return MapFacts(snapshot.log_time_ns, geometry.shape, geometry.resolution_m, geometry.frame_id, free_m2)

@@ -13,6 +13,7 @@ from rose2_logs.parameters import OccupancyParameters
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.int_]
 Scalar = TypeVar("Scalar", bound=np.generic)
 UNKNOWN = -1
 SMALLEST_CELL_M, LARGEST_CELL_M = 1e-4, 100.0

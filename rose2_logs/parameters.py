@@ -7,6 +7,7 @@ A configuration file is TOML with one table per block; ``resolved`` gives the sa
 from __future__ import annotations
 
 import dataclasses
+import difflib
 import math
 import tomllib
 from collections.abc import Iterable, Mapping
@@ -273,7 +274,14 @@ class Parameters:
         blocks = {block.name: getattr(self, block.name) for block in dataclasses.fields(self)}
         for block_name, values in changes.items():
             if block_name not in blocks:
-                raise ParameterError(f"no parameter block {block_name!r}; there are: {', '.join(blocks)}")
+                meant = _meant(
+                    block_name
+                    if not isinstance(values, Mapping)
+                    else f"{block_name}.{next(iter(values), '')}"
+                )
+                raise ParameterError(
+                    f"no parameter block {block_name!r}{meant}; there are: {', '.join(blocks)}"
+                )
             if not isinstance(values, Mapping):
                 raise ParameterError(f"{block_name!r} must be a table of parameters, not {values!r}")
             blocks[block_name] = _replaced_block(block_name, blocks[block_name], values)
@@ -285,9 +293,23 @@ def _replaced_block(block_name: str, block: Any, values: Mapping[str, Any]) -> A
     checked = {}
     for name, value in values.items():
         if name not in declared:
-            raise ParameterError(f"no parameter {block_name}.{name}; there are: {', '.join(declared)}")
+            full_name = f"{block_name}.{name}"
+            raise ParameterError(
+                f"no parameter {full_name}{_meant(full_name)}; there are: {', '.join(declared)}"
+            )
         checked[name] = _checked(f"{block_name}.{name}", declared[name], value)
     return dataclasses.replace(block, **checked)
+
+
+def _meant(name: str) -> str:
+    """Ask for the parameter, in the named block or else in any, whose name is next to one there is not."""
+    block, _, own = name.rpartition(".")
+    rows = describe_parameters()
+    for among in ([row for row in rows if row["block"] == block], rows):
+        if near := difflib.get_close_matches(own, [row["name"] for row in among], 1):
+            found = next(row for row in among if row["name"] == near[0])
+            return f"; did you mean {found['block']}.{found['name']}?"
+    return ""
 
 
 def _checked(name: str, declared: dataclasses.Field[Any], value: Any) -> Any:
@@ -333,7 +355,8 @@ def load_parameters(config: Path | None = None, settings: Iterable[str] = ()) ->
         except tomllib.TOMLDecodeError as error:
             raise ParameterError(f"--set {setting!r}: write it as block.name=value") from error
         if not all(isinstance(values, Mapping) for values in parsed.values()):
-            raise ParameterError(f"--set {setting!r}: write it as block.name=value")
+            meant = _meant(next(iter(parsed)))
+            raise ParameterError(f"--set {setting!r}: write it as block.name=value{meant}")
         parameters = parameters.replaced(parsed)
     return parameters
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import glob
 import hashlib
+import os
 import platform
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -11,6 +12,7 @@ from typing import Any
 
 from rose2_logs import __version__
 from rose2_logs.errors import LogError
+from rose2_logs.files import readable
 from rose2_logs.readers.descriptions import load_yaml
 from rose2_logs.readers.discovery import MAP_ENDINGS
 
@@ -62,6 +64,29 @@ def _image_of(file: Path) -> tuple[Path, ...]:
     return tuple(each for each in found if each.is_file())
 
 
+def log_place(log: Path, folder: Path) -> dict[str, str | None]:
+    """Tell where a log lies, so that it is found again from anywhere, also after a move with its results.
+
+    Parameters
+    ----------
+    log : path
+        The log, or a pattern.
+    folder : path
+        Of its results.
+
+    Returns
+    -------
+    dict
+        The path as ``absolute``, and as ``from_results``: as seen from the folder, None on another drive.
+    """
+    absolute = log.resolve()
+    try:
+        seen = Path(os.path.relpath(absolute, folder.resolve())).as_posix()
+    except ValueError:
+        return {"absolute": str(absolute), "from_results": None}
+    return {"absolute": str(absolute), "from_results": seen}
+
+
 def fingerprint(path: Path) -> dict[str, Any]:
     """Size and SHA-256 of a log.
 
@@ -84,7 +109,7 @@ def fingerprint(path: Path) -> dict[str, Any]:
                 digest = hashlib.file_digest(stream, "sha256").hexdigest()
         except OSError as error:
             raise LogError(f"{file}: cannot be read: {error.strerror}") from error
-        name = file.relative_to(base).as_posix() if file.is_relative_to(base) else str(file)
+        name = readable(file.relative_to(base).as_posix() if file.is_relative_to(base) else file)
         files.append({"name": name, "size_bytes": file.stat().st_size, "sha256": digest})
     files.sort(key=lambda entry: str(entry["name"]))
     listing = "".join(f"{entry['sha256']}  {entry['name']}\n" for entry in files)

@@ -17,8 +17,15 @@ OUTLINE_STEP_M = 0.1
 """Outlines are looked at every so many metres: two cells of usual maps."""
 UNSURE_BELOW = 0.7
 """Rooms whose outline walls back less are unsure: doorways alone take an ordinary room to about 0.9."""
+UNSURE_SIGN = "?"
+"""Behind the number of an unsure room, wherever its name is drawn."""
 WALL_REACH_M = 0.2
 """An outline is backed by occupied cells this near: it runs in the middle of walls of usual thickness."""
+
+
+def is_unsure(outline_wall_share: float | None) -> bool:
+    """Whether little of a room's outline is known to be wall; of what was not measured nothing is said."""
+    return outline_wall_share is not None and outline_wall_share < UNSURE_BELOW
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,11 +12,13 @@ from shapely.geometry.base import BaseGeometry
 from rose2_logs.floor_plan.rooms import outline
 from rose2_logs.occupancy import UNKNOWN, BoolArray, FloatArray, GridGeometry, OccupancySnapshot, known_window
 from rose2_logs.pipeline import SnapshotAnalysis
-from rose2_logs.room_evidence import RoomEvidence
+from rose2_logs.room_evidence import RoomEvidence, is_unsure
 from rose2_logs.rooms import Doorway
 
 PREDICTED_MIN_WIDTH_M = 0.3
 """Unseen parts of rooms are told from this width on: narrower ones are walls, whose inside is never seen."""
+RAY_WIDTH_M = 0.5
+"""What is known and narrower is a ray that left through a gap: a robot would not fit in."""
 ROUNDING_CELLS = 0.25
 """Half of what a corner may lie from the cell that it is rounded to."""
 
@@ -57,6 +59,11 @@ class PlanRoom:
         return f"Room {self.number}"
 
     @property
+    def is_unsure(self) -> bool:
+        """Whether few walls back its outline."""
+        return is_unsure(self.confidence)
+
+    @property
     def predicted_area_m2(self) -> float:
         """Area of its shape, the predicted part included."""
         return float(self.shape.area)
@@ -84,6 +91,17 @@ class PlanMap:
         """Return the smallest part that holds all known cells and all rooms."""
         window = known_window((self.cells != UNKNOWN) | (self.labels > 0))
         return PlanMap(self.geometry.part(window), self.cells[window], self.labels[window])
+
+    def corners_m(self) -> FloatArray:
+        """Corners (4, 2) of the smallest part that holds all rooms and all that is known but for rays."""
+        import cv2
+
+        known = (self.cells != UNKNOWN).astype(np.uint8)
+        side = max(1, round(RAY_WIDTH_M / self.geometry.resolution_m))
+        broad = cv2.morphologyEx(known, cv2.MORPH_OPEN, np.ones((side, side), np.uint8)) > 0
+        shown = broad | (self.labels > 0)
+        window = known_window(shown if shown.any() else known > 0)
+        return self.geometry.part(window).corners_m()
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,11 +133,14 @@ class RoomPlan:
 
     @property
     def bounds_m(self) -> tuple[float, float, float, float]:
-        """Least and greatest x and y that the plan takes up, as x0, y0, x1, y1; a square metre if none."""
+        """Least and greatest x and y that the plan takes up, as x0, y0, x1, y1; a square metre if none.
+
+        Rays that leave through windows and doors do not count.
+        """
         points = [shapely.get_coordinates([room.shape for room in self.rooms])]
         points += [door.ends_m for door in self.doorways]
         if self.map is not None and (self.map.cells != UNKNOWN).any():
-            points.append(self.map.cropped().geometry.corners_m())
+            points.append(self.map.corners_m())
         corners = np.concatenate(points)
         if not len(corners):
             return 0.0, 0.0, 1.0, 1.0

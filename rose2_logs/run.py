@@ -18,7 +18,7 @@ from rose2_logs.journal import JournaledWorkers
 from rose2_logs.notices import Notices, gathered, muted
 from rose2_logs.output_folder import OutputFolder
 from rose2_logs.parameters import ReadingParameters
-from rose2_logs.provenance import fingerprint, software_versions
+from rose2_logs.provenance import fingerprint, log_place, software_versions
 from rose2_logs.readers import inspect_log, open_log
 from rose2_logs.readers.discovery import stem_of
 from rose2_logs.readers.log import LogReader
@@ -161,7 +161,7 @@ def _analyse_log(
             len(reader.source.log_times(reader.topic)),
             reader.topic,
         )
-        info = _run_info(path, reader, options)
+        info = _run_info(path, folder, reader, options)
         made = output.made(_facts(info, options), overwrite=options.overwrite, resume=options.resume)
         with made as (work, journal):
             workers = JournaledWorkers(processes, journal) if options.journal else processes
@@ -243,11 +243,17 @@ def _analyse(
     return RunResult(folder, written, totals, seconds, layout_final, warnings)
 
 
-def _run_info(path: Path, reader: LogReader, options: RunOptions) -> RunInfo:
-    provenance = {"format": reader.info.format, **fingerprint(path)}
-    versions = software_versions()
+def _run_info(path: Path, folder: Path, reader: LogReader, options: RunOptions) -> RunInfo:
+    is_copy = options.origin is not None and "://" in options.origin
     return RunInfo(
-        path, reader.topic, options.method, options.parameters, versions, provenance, options.origin
+        path,
+        reader.topic,
+        options.method,
+        options.parameters,
+        software_versions(),
+        {"format": reader.info.format, **fingerprint(path)},
+        options.origin,
+        None if is_copy else log_place(path, options.home or folder),
     )
 
 

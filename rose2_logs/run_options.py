@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from rose2_logs.parameters import Parameters
 from rose2_logs.readers import Selection
@@ -10,7 +11,7 @@ from rose2_logs.sinks.sink import RECORDING_LAYERS
 
 NOT_IN_JOURNAL = (
     *("topic", "selection", "parameters", "workers", "recording", "layers", "annotated_log", "bag"),
-    *("live", "smooth", "origin", "overwrite", "resume", "journal", "strict"),
+    *("live", "smooth", "origin", "home", "overwrite", "resume", "journal", "strict"),
 )
 """Options that the analysis does not depend on, or that a journal names otherwise."""
 
@@ -51,6 +52,8 @@ class RunOptions:
         Whether to keep what is found on the way beside the folder, so that a run that is stopped can go on.
     origin : str, optional
         What the summary names as the log; by default its path. For a log that was copied to be read.
+    home : path, optional
+        The folder in which the results will stand, if they are moved there afterwards.
     strict : bool
         Whether the first warning about the log is an error.
     """
@@ -70,6 +73,7 @@ class RunOptions:
     resume: bool = False
     journal: bool = True
     origin: str | None = None
+    home: Path | None = None
     strict: bool = False
 
     @property

@@ -110,7 +110,8 @@ def read_static_map(
         If it cannot be read, is a log, or its resolution is neither given nor written beside it.
     """
     if not map_file.is_file():
-        raise LogError(f"{map_file}: there is no such file")
+        what = "is a folder: name the map in it" if map_file.is_dir() else "there is no such file"
+        raise LogError(f"{map_file}: {what}")
     is_bare = map_file.suffix.lower() in IMAGE_ENDINGS and not map_file.with_suffix(".yaml").exists()
     if is_bare and resolution_m is None:
         raise ParameterError(f"{map_file}: no .yaml lies beside it; pass --resolution METRES_PER_CELL")

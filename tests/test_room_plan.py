@@ -48,3 +48,16 @@ def test_shapes_may_reach_beyond_the_canvas():
 def test_bounds_hold_shapes_and_known_cells():
     x0, y0, x1, y1 = two_rooms_plan().bounds_m
     assert np.allclose([x0, y0, x1, y1], [-1.1, 1.9, 7.0, 5.1])
+
+
+def test_bounds_leave_out_rays_and_keep_what_a_robot_fits_in():
+    """A strip of a few cells that leaves the rooms, against one of half a metre that belongs to no room."""
+    plan = two_rooms_plan()
+    cells = plan.map.cells.copy()
+    cells[20:22, 70:100] = 0
+    ray = dataclasses.replace(plan, map=dataclasses.replace(plan.map, cells=cells))
+    assert ray.bounds_m == plan.bounds_m
+    cells = cells.copy()
+    cells[20:25, 70:100] = 0
+    corridor = dataclasses.replace(plan, map=dataclasses.replace(plan.map, cells=cells))
+    assert corridor.bounds_m[2] == pytest.approx(8.0)

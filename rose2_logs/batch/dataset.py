@@ -126,7 +126,9 @@ def summary_row(out: Path, name: str) -> Row:
 
 def failed_row(name: str, source: str, reason: str) -> Row:
     """Sum up a log that failed."""
-    known = {"log": name, "status": "failed", "source": source, "reason": " ".join(reason.split())}
+    # A name that is not UTF-8 may stand in it.
+    told = " ".join(reason.split()).encode(errors="backslashreplace").decode()
+    known = {"log": name, "status": "failed", "source": source, "reason": told}
     return dict.fromkeys(SUMMARY_COLUMNS) | known
 
 

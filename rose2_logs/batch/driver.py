@@ -22,6 +22,7 @@ from rose2_logs.batch.names import assign_names
 from rose2_logs.batch.record import BatchSettings, Record, Signature, local_signature, read_record
 from rose2_logs.batch.task import LogOutcome, LogTask, Progress
 from rose2_logs.errors import LogError, OutputError, ParameterError
+from rose2_logs.files import require_utf8
 from rose2_logs.readers.discovery import BAG_DESCRIPTION
 from rose2_logs.run import SMOOTHED, SUMMARY, TABLES
 
@@ -163,6 +164,7 @@ def run_batch(arguments: Sequence[str], out: Path, options: BatchOptions, listen
             "--workers is for this machine; a cluster has the workers that joined its scheduler"
         )
     out = Path(os.path.abspath(out))  # noqa: PTH100 (as in find_logs)
+    require_utf8(out)
     logs = find_logs(arguments, out)
     with locked(out), work_folder(out) as work:
         batch = _Batch(out, work, options, listener)
@@ -201,7 +203,10 @@ class _Batch:
             known = self._standing(known_name)
             task = LogTask(log, name, self._work, self._options.settings, known, known_name)
             task = dataclasses.replace(
-                task, is_whole=self._is_whole(known_name), may_replace=self._may_replace
+                task,
+                is_whole=self._is_whole(known_name),
+                may_replace=self._may_replace,
+                home=self._out / LOGS_FOLDER / name,
             )
             if task.stands_by(look):
                 self.states.append(LogState(name, "up to date", dataset.summary_row(self._out, name)))

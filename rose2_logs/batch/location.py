@@ -13,7 +13,7 @@ from urllib.parse import parse_qsl, unquote, urlsplit
 from urllib.request import url2pathname
 
 from rose2_logs.errors import LogError
-from rose2_logs.files import require_utf8
+from rose2_logs.files import readable
 from rose2_logs.readers.discovery import MAP_ENDINGS, STORAGE_ENDINGS, is_bag, is_storage, logs_among
 
 _WEB = ("http://", "https://")
@@ -41,7 +41,9 @@ class Location:
     @property
     def address(self) -> str:
         """The path or URL without passwords and signatures: what a log is known by, and what may be shown."""
-        if not self.is_remote or "::" in self.target:
+        if not self.is_remote:
+            return readable(self.target)
+        if "::" in self.target:
             return self.target
         url = urlsplit(self.target)
         signed = any(_SIGNED.search(name) for name, _ in parse_qsl(url.query, keep_blank_values=True))
@@ -83,8 +85,6 @@ def find_logs(arguments: Sequence[str], out: Path) -> list[Location]:
     LogError
         If a folder or a pattern has no logs, or a URL cannot be listed. A single log that is not there is
         returned: opening it tells why.
-    OutputError
-        If a log's name is not UTF-8: the summary of all could not name it.
     """
     found: dict[str, Location] = {}
     # Many arguments lie in one folder: it is looked at once.
@@ -99,8 +99,6 @@ def find_logs(arguments: Sequence[str], out: Path) -> list[Location]:
             )
         for log in logs:
             each = Location(log)
-            if not each.is_remote:
-                require_utf8(Path(log))
             found.setdefault(each.address, each)
     return list(found.values())
 

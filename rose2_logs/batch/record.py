@@ -12,6 +12,7 @@ from typing import Any
 from rose2_logs import __version__
 from rose2_logs.batch.location import Location
 from rose2_logs.errors import LogError
+from rose2_logs.files import readable
 from rose2_logs.parameters import Parameters
 from rose2_logs.provenance import log_files
 from rose2_logs.sinks.sink import RECORDING_LAYERS
@@ -123,7 +124,7 @@ def local_signature(log: Path) -> Signature:
     try:
         for file in log_files(log):
             about = file.stat()
-            name = file.relative_to(base).as_posix() if file.is_relative_to(base) else str(file)
+            name = readable(file.relative_to(base).as_posix() if file.is_relative_to(base) else file)
             files.append((name, about.st_size, (str(about.st_mtime_ns), str(about.st_ctime_ns))))
             newest_ns = max(newest_ns, about.st_mtime_ns, about.st_ctime_ns)
     except OSError as error:

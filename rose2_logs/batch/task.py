@@ -77,6 +77,8 @@ class LogTask:
         Whether those results have all the files that are wanted now.
     may_replace : bool
         Whether results that stand may be replaced if the log is not the same any more.
+    home : path, optional
+        The folder in which the results will stand.
     attempt : int
         Number of the try, from 1.
     version : str
@@ -91,6 +93,7 @@ class LogTask:
     known_name: str = ""
     is_whole: bool = False
     may_replace: bool = False
+    home: Path | None = None
     attempt: int = 1
     version: str = __version__
 
@@ -245,6 +248,7 @@ def _analyse_local(task: LogTask, path: Path, signature: Signature, report: Repo
             strict=asked.strict,
             journal=False,  # a log that was stopped is begun anew, in another folder
             origin=task.log.address,
+            home=task.home,
         )
         reported = 0.0
 

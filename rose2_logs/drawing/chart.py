@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rose2_logs.drawing.svg import escape, quoteattr
-from rose2_logs.occupancy import BoolArray, FloatArray
+from rose2_logs.occupancy import FloatArray, IntArray
 from rose2_logs.sinks.axes import Axis, axis_of
 
 WIDTH, HEIGHT = 420.0, 210.0
@@ -135,25 +136,28 @@ def line_chart(
 
 def lane_chart(
     x: FloatArray,
-    present: BoolArray,
+    states: IntArray,
     names: Sequence[str],
-    colours: Sequence[str],
+    colours: Sequence[Mapping[str, str]],
     *,
     title: str,
     x_label: str,
     marks: Sequence[Mark] = (),
     x_range: tuple[float, float] | None = None,
 ) -> str:
-    """Draw when each room was there, a lane each.
+    """Draw when each room was there and in which state, a lane each.
 
     Parameters
     ----------
     x : (N,) float
         Where the maps stand, ascending.
-    present : (R, N) bool
-        Which rooms each map shows; a room is there until the next map.
-    names, colours : sequence of R str
+    states : (R, N) int
+        State of each room at each map, which lasts until the next map: its place in `colours`, from 1 on; 0
+        where the room is not there.
+    names : sequence of R str
         Of the rooms.
+    colours : sequence of R mappings
+        For each room, the colour of each state by the state's name.
     title, x_label, marks, x_range
         As of `line_chart`.
     """
@@ -167,13 +171,16 @@ def lane_chart(
             f'<text class="lane" x="{LEFT - 5:.0f}" y="{y + 0.8 * LANE:.1f}" text-anchor="end">'
             f"{escape(name)}</text>"
         )
-        edges = np.flatnonzero(np.diff(np.concatenate([[False], present[lane], [False]]).astype(np.int8)))
-        for first, stop in edges.reshape(-1, 2).tolist():
+        edges = np.flatnonzero(np.diff(states[lane], prepend=0, append=0)).tolist()
+        for first, stop in pairwise(edges):
+            if not states[lane, first]:
+                continue
+            state, tint = list(colour.items())[states[lane, first] - 1]
             left, right = (_column(value, x_axis) for value in (x[first], ends[stop - 1]))
             parts.append(
                 f'<rect x="{left:.1f}" y="{y + 1:.1f}" width="{max(right - left, 1.5):.1f}" '
-                f'height="{LANE - 2:.1f}" rx="1.5" fill="{escape(colour)}">'
-                f"<title>{escape(name)}</title></rect>"
+                f'height="{LANE - 2:.1f}" rx="1.5" fill="{escape(tint)}">'
+                f"<title>{escape(name)}: {escape(state)}</title></rect>"
             )
     return _svg(title, height, parts)
 

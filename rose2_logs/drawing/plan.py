@@ -11,8 +11,10 @@ from shapely.geometry.base import BaseGeometry
 
 from rose2_logs.drawing.shapes import Area, Colour, Drawing, Lines, Picture, Text, hatching
 from rose2_logs.occupancy import distinct_labels
+from rose2_logs.room_evidence import UNSURE_SIGN
 from rose2_logs.room_plan import PlanMap, PlanRoom, RoomPlan, predicted_parts
 from rose2_logs.sinks.palette import track_colour
+from rose2_logs.sinks.shares import percent
 
 UNKNOWN_GREY, FREE_GREY, OCCUPIED_GREY = 232, 255, 25
 SEEN_OPACITY, PREDICTED_OPACITY, SHAPE_OPACITY = 0.55, 0.22, 0.5
@@ -131,7 +133,9 @@ def draw_plan(plan: RoomPlan, style: PlanStyle = FIGURE, bounds_m: Bounds | None
             name_on = seen[room.number] if seen[room.number].area else shapes[room.number]
             drawing.add(*_label(room, name_on, style))
     if style.has_legend:
-        drawing.add(*_legend(plan, style, scale, left, height, has_predicted=bool(predicted)))
+        # Rays may go on beyond the plan.
+        drawing.add(Area(shapely.box(0, height, style.width, height + strip), drawing.paper))
+        drawing.add(*_legend(plan, style, scale, height, has_predicted=bool(predicted)))
     return drawing
 
 
@@ -148,7 +152,7 @@ def _simpler(shape: BaseGeometry, detail: float) -> BaseGeometry:
 
 
 def _told(room: PlanRoom) -> str:
-    sure = "" if room.confidence is None else f", {room.confidence:.0%} of its outline backed by walls"
+    sure = "" if room.confidence is None else f", {percent(room.confidence)} of its outline backed by walls"
     return f"{room.name}: {room.area_m2:.1f} m² seen of {room.predicted_area_m2:.1f} m²{sure}"
 
 
@@ -189,16 +193,18 @@ def _label(room: PlanRoom, shape: BaseGeometry, style: PlanStyle) -> list[Text]:
     (x, y), radius = shapely.get_coordinates(circle)[0].tolist(), float(shapely.length(circle))
     area = f"{room.area_m2:.0f} m²" if room.area_m2 >= 10 else f"{room.area_m2:.1f} m²"
     font, rim = style.font, 0.14 * style.font
+    sign = UNSURE_SIGN if room.is_unsure else ""
+    number, name = f"{room.number}{sign}", f"{room.name}{sign}"
     if not style.has_names:
-        return [Text(str(room.number), x, y, font, is_bold=True, rim=rim)]
-    name = room.name if _fits(room.name, font, radius, lines=2) else str(room.number)
+        return [Text(number, x, y, font, is_bold=True, rim=rim)]
+    name = name if _fits(name, font, radius, lines=2) else number
     small = 0.8 * font
     if _fits(area, small, radius, lines=2):
         return [
             Text(name, x, y - 0.5 * font, font, is_bold=True, rim=rim),
             Text(area, x, y + 0.6 * font, small, rim=rim),
         ]
-    return [Text(str(room.number), x, y, font, is_bold=True, rim=rim)]
+    return [Text(number, x, y, font, is_bold=True, rim=rim)]
 
 
 def _fits(text: str, font: float, radius: float, lines: int) -> bool:
@@ -206,15 +212,15 @@ def _fits(text: str, font: float, radius: float, lines: int) -> bool:
 
 
 def _legend(
-    plan: RoomPlan, style: PlanStyle, scale: float, left: float, top: float, *, has_predicted: bool
+    plan: RoomPlan, style: PlanStyle, scale: float, top: float, *, has_predicted: bool
 ) -> list[Area | Lines | Text]:
     """Scale bar, and what the signs mean, in the strip below the plan."""
     font, line = 0.85 * style.font, style.line
     y = top + 1.7 * style.font
     shapes: list[Area | Lines | Text] = []
-    longest = SCALE_BAR_SHARE * (style.width - 2 * left) / scale
+    longest = SCALE_BAR_SHARE * style.width / scale
     length_m = max((length for length in ROUND_LENGTHS_M if length <= longest), default=ROUND_LENGTHS_M[0])
-    x, x1 = left + font, left + font + length_m * scale
+    x, x1 = font, font + length_m * scale
     tick = 0.35 * font
     bar = [[(x, y), (x1, y)], [(x, y - tick), (x, y + tick)], [(x1, y - tick), (x1, y + tick)]]
     shapes.append(Lines(shapely.MultiLineString(bar), LABEL_GREY, 1.3 * line))
@@ -225,12 +231,15 @@ def _legend(
     signs: list[tuple[str, str]] = [("room", "room, seen" if plan.map is not None else "room")]
     signs += [("predicted", "predicted, unseen")] if has_predicted else []
     signs += [("doorway", "doorway")] if plan.doorways else []
+    signs += [("unsure", "unsure, little wall around")] if any(room.is_unsure for room in plan.rooms) else []
     for sign, text in signs:
         box = shapely.box(x, y - 0.5 * font, x + 1.8 * font, y + 0.5 * font)
         if sign == "doorway":
             shapes.append(
                 Lines(shapely.LineString([(x, y), (x + 1.8 * font, y)]), DOORWAY_COLOUR, 2.4 * line)
             )
+        elif sign == "unsure":
+            shapes.append(Text(f"7{UNSURE_SIGN}", x + 0.9 * font, y, font, is_bold=True))
         elif sign == "predicted":
             shapes += [
                 Area(box, colour, PREDICTED_OPACITY),

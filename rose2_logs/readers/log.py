@@ -198,9 +198,11 @@ class LogReader:
             raise LogError(f"{self.info.path}: there is no message on {self.topic}; choose another topic")
         in_range = self._selection.in_range(times)
         if not len(in_range):
+            begin_ns = times[0] if self.info.start_ns is None else self.info.start_ns
+            first_s, last_s = ((int(each) - int(begin_ns)) / 1e9 for each in (times[0], times[-1]))
             raise LogError(
                 f"{self.info.path}: no message on {self.topic} lies in the time range; "
-                f"they were logged from {times[0]} to {times[-1]} ns"
+                f"they lie from {first_s:.1f} to {last_s:.1f} s into the log"
             )
         return in_range
 

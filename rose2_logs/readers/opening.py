@@ -290,7 +290,9 @@ def _open_directory(log: Path, limits: ReadingParameters) -> MessageSource:
     if maps := [each for each in described if each.stem in images or is_map_file(each)]:
         return _open_files(log, _in_natural_order(maps), limits)
     raise LogError(
-        f"{log}: holds neither a bag ({BAG_DESCRIPTION}) nor saved maps; give {_FORMATS}", file=log
+        f"{log}: holds neither a bag ({BAG_DESCRIPTION}) nor saved maps; give {_FORMATS}; "
+        "rose2-logs batch takes folders of many logs",
+        file=log,
     )
 
 

@@ -4,17 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from rose2_logs.drawing.chart import Mark, Series, lane_chart, line_chart
-from rose2_logs.occupancy import BoolArray, FloatArray
-from rose2_logs.report.words import css_colour, duration
+from rose2_logs.occupancy import BoolArray, FloatArray, IntArray
+from rose2_logs.report.words import css, css_colour, duration
 from rose2_logs.results.folder import RunResults
+from rose2_logs.room_evidence import UNSURE_SIGN, is_unsure
+from rose2_logs.sinks.palette import state_colours
 
 BLUE, ORANGE, GREEN, VIOLET = "#2f7ed8", "#e07b1a", "#2a9d5c", "#8a5fd0"
 AREAS_MOST = 8
 """Rooms whose area is drawn: the largest of the last map."""
+TRACK_COLUMNS = ["track", "shape_right_snapshot", "area_settled_snapshot", "outline_wall_share"]
 LANES_MOST = 80
 """Rooms whose presence is drawn: those that were there in most maps."""
 
@@ -124,7 +128,7 @@ def run_charts(results: RunResults) -> list[Chart]:
         if len(largest)
         else None,
     ]
-    return [each for each in charts if each is not None] + _lanes(axes, numbers, present)
+    return [each for each in charts if each is not None] + _lanes(results, axes, numbers, present)
 
 
 def _coverage_chart(axis: RunAxis, coverage: FloatArray) -> Chart:
@@ -143,14 +147,8 @@ def _coverage_chart(axis: RunAxis, coverage: FloatArray) -> Chart:
     return Chart(title, "Known free area over that of the last map.", (), drawn, drawn)
 
 
-def run_axes(results: RunResults) -> tuple[RunAxis, RunAxis]:
-    """Coverage in percent, and time in minutes or seconds."""
-    snapshots = results.snapshots
-    time_s = snapshots["time_s"].astype(float)
-    in_minutes = time_s[-1] >= 300
-    time = time_s / 60 if in_minutes else time_s
-    # A map that covers less than one before it, as after a loop closure, does not draw the curve back.
-    coverage = 100 * np.maximum.accumulate(snapshots["coverage"].astype(float))
+def run_marks(results: RunResults) -> list[tuple[int, str, str]]:
+    """What the curves mark: at which map, in words, and its kind, ``final`` or ``shifted``."""
     final = results.summary.get("layout", {}).get("final_since")
     marks: list[tuple[int, str, str]] = []
     if final is not None:
@@ -161,8 +159,19 @@ def run_axes(results: RunResults) -> tuple[RunAxis, RunAxis]:
         for event in events
         if event["kind"] == "shifted"
     ]
+    return [mark for mark in marks if mark[0] in results.snapshots["snapshot"]]
+
+
+def run_axes(results: RunResults) -> tuple[RunAxis, RunAxis]:
+    """Coverage in percent, and time in minutes or seconds."""
+    snapshots = results.snapshots
+    time_s = snapshots["time_s"].astype(float)
+    in_minutes = time_s[-1] >= 300
+    time = time_s / 60 if in_minutes else time_s
+    # A map that covers less than one before it, as after a loop closure, does not draw the curve back.
+    coverage = 100 * np.maximum.accumulate(snapshots["coverage"].astype(float))
+    marks = run_marks(results)
     places = {int(number): place for place, number in enumerate(snapshots["snapshot"])}
-    marks = [mark for mark in marks if mark[0] in places]
 
     def axis(x: FloatArray, label: str, ends: tuple[float, float] | None) -> RunAxis:
         return RunAxis(x, label, ends, [Mark(float(x[places[at]]), text, kind) for at, text, kind in marks])
@@ -186,16 +195,21 @@ def _rooms(results: RunResults) -> tuple[np.ndarray, BoolArray, FloatArray]:
     return numbers, np.isfinite(areas), areas
 
 
-def _lanes(axes: Sequence[RunAxis], numbers: np.ndarray, present: BoolArray) -> list[Chart]:
+def _lanes(
+    results: RunResults, axes: Sequence[RunAxis], numbers: np.ndarray, present: BoolArray
+) -> list[Chart]:
     shown = np.sort(np.argsort(-present.sum(1), kind="stable")[:LANES_MOST])
     if not len(shown):
         return []
-    title = "When each room was there"
-    names = [str(number) for number in numbers[shown]]
-    colours = [css_colour(int(number)) for number in numbers[shown]]
+    lives = {row["track"]: row for row in results.table("tracks", TRACK_COLUMNS).to_pylist()}
+    rows = [lives[int(number)] for number in numbers[shown]]
+    title = "When each room was there, and when it was right"
+    names = [f"{row['track']}{UNSURE_SIGN if is_unsure(row['outline_wall_share']) else ''}" for row in rows]
+    colours = [{state: css(colour) for state, colour in state_colours(row["track"]).items()} for row in rows]
+    states = _states(results.snapshots["snapshot"], rows, present[shown])
     draw: Callable[[RunAxis], str] = lambda axis: lane_chart(  # noqa: E731
         axis.x,
-        present[shown],
+        states,
         names,
         colours,
         title=title,
@@ -204,7 +218,20 @@ def _lanes(axes: Sequence[RunAxis], numbers: np.ndarray, present: BoolArray) -> 
         x_range=axis.ends,
     )
     left_out = len(numbers) - len(shown)
-    meaning = "A lane for each room, by its number" + (
-        f"; {left_out} that were there only shortly are left out." if left_out else "."
+    meaning = (
+        "A lane for each room, by its number: pale while it forms, stronger once its shape was right, full "
+        f"once its area has settled. {UNSURE_SIGN}: few walls back its last outline."
+    ) + (f" {left_out} rooms that were there only shortly are left out." if left_out else "")
+    legend = tuple(colours[0].items())
+    return [Chart(title, meaning, legend, draw(axes[0]), draw(axes[1]), is_wide=True)]
+
+
+def _states(snapshots: np.ndarray, rows: Sequence[dict[str, Any]], present: BoolArray) -> IntArray:
+    """State (R, N) of each room at each map: 1 forming, 2 shape right, 3 settled, 0 where it is not."""
+    never = np.inf
+    shaped, settled = (
+        np.array([never if row[name] is None else row[name] for row in rows], float)[:, None]
+        for name in ("shape_right_snapshot", "area_settled_snapshot")
     )
-    return [Chart(title, meaning, (), draw(axes[0]), draw(axes[1]), is_wide=True)]
+    states = np.where(snapshots >= settled, 3, np.where(snapshots >= shaped, 2, 1))
+    return np.where(present, states, 0)

@@ -9,8 +9,8 @@ import numpy as np
 
 from rose2_logs.report.words import MISSING, date_of, duration, size
 from rose2_logs.results.folder import RunResults
-from rose2_logs.room_evidence import UNSURE_BELOW
 from rose2_logs.room_plan import RoomPlan
+from rose2_logs.sinks.shares import percent
 
 LATE_COVERAGE = 0.95
 """A layout that became final only beyond would likely have changed if the run had gone on."""
@@ -68,7 +68,7 @@ def tiles(results: RunResults, plan: RoomPlan) -> list[Tile]:
         Tile(
             "Maps",
             str(found["snapshots"]),
-            f"{_percent(found['coverage_first'])} to {_percent(found['coverage_last'])} coverage",
+            f"{percent(found['coverage_first'])} to {percent(found['coverage_last'])} coverage",
         ),
         Tile("Rooms at the end", str(found["rooms_last"]), f"{found['tracks']} followed over the run"),
         Tile("Floor in rooms", f"{seen:.0f} m²", f"{shapes:.0f} m² with predicted parts"),
@@ -76,18 +76,23 @@ def tiles(results: RunResults, plan: RoomPlan) -> list[Tile]:
         Tile("Layout final from", *_final(final, results.choose())),
         Tile(
             "Outlines backed by walls",
-            MISSING if sure is None else _percent(sure),
+            MISSING if sure is None else percent(sure),
             "median of the last map's rooms",
         ),
     ]
 
 
+def is_last(final: dict[str, Any], last: int) -> bool:
+    """Whether a layout was final in the last map only, of several: so it may change again."""
+    return bool(final["snapshot"] == last > 0)
+
+
 def _final(final: dict[str, Any] | None, last: int) -> tuple[str, str]:
     """Say from what map on the layout was final; if that is the last, it never was for sure."""
-    if final is None or final["snapshot"] == last > 0:
+    if final is None or is_last(final, last):
         return NOT_FINAL, "it changed up to the last map"
     moment = f"map {final['snapshot']}, {duration(final['time_s'])} into the run"
-    return f"{_percent(final['coverage'])} coverage", moment
+    return f"{percent(final['coverage'])} coverage", moment
 
 
 def notes(results: RunResults, plan: RoomPlan) -> list[Note]:
@@ -129,7 +134,7 @@ def _layout_notes(layout: dict[str, Any], last: int) -> list[Note]:
         return [Note("The layout still changed up to the last map: take the rooms as preliminary.")]
     if final is not None and final["coverage"] > LATE_COVERAGE:
         late = (
-            f"The layout became final only at {_percent(final['coverage'])} coverage: "
+            f"The layout became final only at {percent(final['coverage'])} coverage: "
             "with more exploration it might change again."
         )
         return [Note(late)]
@@ -139,13 +144,11 @@ def _layout_notes(layout: dict[str, Any], last: int) -> list[Note]:
 def _room_notes(plan: RoomPlan) -> list[Note]:
     told = []
     unsure = sorted(
-        (room.confidence, room.name)
-        for room in plan.rooms
-        if room.confidence is not None and room.confidence < UNSURE_BELOW
+        (room.confidence, room.name) for room in plan.rooms if room.confidence is not None and room.is_unsure
     )
     if unsure:
-        names = _listed([f"{name} ({_percent(sure)})" for sure, name in unsure])
-        told.append(Note(f"Rooms with little wall around them, so unsure: {names}."))
+        names = _listed([f"{name} ({percent(sure)})" for sure, name in unsure])
+        told.append(Note(f"Rooms with little wall around them, so unsure (?): {names}."))
     open_ends = sorted(
         (
             (room.frontier_m, room.name)
@@ -166,7 +169,7 @@ def _room_notes(plan: RoomPlan) -> list[Note]:
         reverse=True,
     )
     if unseen:
-        names = _listed([f"{name} ({_percent(part)})" for part, name in unseen])
+        names = _listed([f"{name} ({percent(part)})" for part, name in unseen])
         told.append(
             Note(
                 f"Rooms of which a good part was not seen: predicted, or furniture: {names}.",
@@ -193,7 +196,3 @@ def _shift_notes(results: RunResults) -> list[Note]:
 def _listed(names: list[str]) -> str:
     more = len(names) - NAMED_MOST
     return ", ".join(names[:NAMED_MOST]) + (f" and {more} more" if more > 0 else "")
-
-
-def _percent(part: float) -> str:
-    return f"{part:.0%}"

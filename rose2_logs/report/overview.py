@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +14,7 @@ from rose2_logs.drawing.svg import png_uri
 from rose2_logs.errors import LogError
 from rose2_logs.files import refuse_existing
 from rose2_logs.report import PANELS
+from rose2_logs.report.facts import is_last
 from rose2_logs.report.page import REPORT_NAME, render, write_page, write_report
 from rose2_logs.report.words import MISSING, Cell, Column, Table, count, date_of, duration, number, share
 from rose2_logs.results.folder import RunResults, find_results
@@ -23,6 +25,8 @@ PICTURE_PX = 320
 PICTURE = dataclasses.replace(PANEL, font=0.0)
 BATCH_FOLDER = "logs/"
 """Where a batch has the results of its logs; their names are told without it."""
+BATCH_SUMMARY = "summary.csv"
+"""Where a batch tells what became of each log."""
 
 
 @dataclass(frozen=True)
@@ -92,9 +96,23 @@ def write_reports(
     if written:
         title = f"Rooms of {len(written)} logs"
         table = _table([each.row for each in written])
-        write_page(listing, render("overview.html.j2", title=title, table=table, logs=written))
+        failures = _failures(folder)
+        write_page(
+            listing, render("overview.html.j2", title=title, table=table, logs=written, failures=failures)
+        )
         return ReportsWritten((*(each.page for each in written), listing), tuple(failed))
     return ReportsWritten((), tuple(failed))
+
+
+def _failures(folder: Path) -> list[tuple[str, str]]:
+    """Names of the logs that a batch could not analyse, and why."""
+    try:
+        with (folder / BATCH_SUMMARY).open(encoding="utf-8", newline="") as file:
+            rows = list(csv.DictReader(file))
+        return [(row["log"], row["reason"]) for row in rows if row["status"] == "failed"]
+    except (OSError, ValueError, KeyError, csv.Error):
+        # The page tells of results; without a batch there are no others.
+        return []
 
 
 def _picture(results: RunResults) -> str:
@@ -113,7 +131,9 @@ def _table(rows: list[tuple[Cell, ...]]) -> Table:
         Column("first coverage", "coverage of the first map"),
         Column("rooms", "in the last map"),
         Column("tracks", "rooms over the run"),
-        Column("final from", "coverage from which on the layout was that of the last map"),
+        Column(
+            "final from", "coverage from which on the layout was as in the end; none if only the last map was"
+        ),
         Column("splits"),
         Column("merges"),
         Column("shifts", "of the whole map"),
@@ -136,7 +156,7 @@ def _row(results: RunResults, name: str) -> tuple[Cell, ...]:
         share(found["coverage_first"]),
         count(found["rooms_last"]),
         count(found["tracks"]),
-        share(None if final is None else final["coverage"]),
+        share(None if final is None or is_last(final, results.choose()) else final["coverage"]),
         count(events.get("split", 0)),
         count(events.get("merged", 0)),
         count(events.get("shifted", 0)),

@@ -14,12 +14,13 @@ from rose2_logs.drawing.plan import FIGURE, PANEL, Bounds, draw_plan
 from rose2_logs.drawing.svg import as_svg
 from rose2_logs.files import refuse_existing, replacing
 from rose2_logs.report import PANELS, facts, tables
-from rose2_logs.report.charts import run_charts
+from rose2_logs.report.charts import run_charts, run_marks
 from rose2_logs.report.seen import seen_rooms
 from rose2_logs.report.words import duration
 from rose2_logs.results.folder import RunResults
 from rose2_logs.results.maps import RunMaps
 from rose2_logs.room_plan import RoomPlan
+from rose2_logs.sinks.shares import percent
 
 REPORT_NAME = "report.html"
 TEMPLATES = Path(__file__).parent / "templates"
@@ -128,6 +129,7 @@ def _content(results: RunResults, panels: int, *, is_beside: bool) -> dict[str, 
         ],
         "seen": seen,
         "seen_lanes": None if seen is None else _drawn(seen.lanes),
+        "marks": {kind for _, _, kind in run_marks(results)},
         "rooms": tables.room_table(results, plan),
         "doorways": tables.doorway_table(results, plan),
         "events": tables.event_table(results),
@@ -173,7 +175,8 @@ def along_coverage(coverage: np.ndarray[Any, Any], most: int) -> list[int]:
     if most <= 1:
         return [len(coverage) - 1]
     reached = np.maximum.accumulate(coverage)
-    targets = np.linspace(reached[0], reached[-1], most)
+    # The last target is the last map, and not one before it that covers as much.
+    targets = np.linspace(reached[0], reached[-1], most)[1:-1]
     places = np.minimum(np.searchsorted(reached, targets - 1e-12), len(coverage) - 1)
     chosen = {0, len(coverage) - 1, *places.tolist()}
     while len(chosen) < most:
@@ -181,15 +184,15 @@ def along_coverage(coverage: np.ndarray[Any, Any], most: int) -> list[int]:
         gaps = np.diff(ordered)
         widest = int(np.argmax(gaps))
         chosen.add(ordered[widest] + int(gaps[widest]) // 2)
-    return sorted(chosen)[-most:] if len(chosen) > most else sorted(chosen)
+    return sorted(chosen)
 
 
 def _caption(results: RunResults, plan: RoomPlan, place: int) -> tuple[str, str]:
     values = results.snapshots
     final = values["final_share"][place]
-    right = "" if np.isnan(float(final)) else f", {final:.0%} as in the end"
+    right = "" if np.isnan(float(final)) else f", {percent(float(final))} as in the end"
     return (
-        f"{values['coverage'][place]:.0%} coverage",
+        f"{percent(float(values['coverage'][place]))} coverage",
         f"map {values['snapshot'][place]}, {duration(values['time_s'][place])}, "
         f"{len(plan.rooms)} rooms{right}",
     )

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 
 from rose2_logs.sinks.palette import track_colour
+from rose2_logs.sinks.shares import percent
 
 CLOCK_FROM_NS = 10**18
 """Log times before September 2001 come from a simulator's clock or none at all; they are no dates."""
@@ -68,9 +69,11 @@ def number(value: float | None, decimals: int = 1, unit: str = "") -> Cell:
     return Cell(f"{value:.{decimals}f}{unit}", value)
 
 
-def share(value: float | None, decimals: int = 0) -> Cell:
+def share(value: float | None) -> Cell:
     """Cell of a share, in percent."""
-    return number(None if value is None else 100 * value, decimals, "%")
+    if value is None or not math.isfinite(value):
+        return Cell(MISSING)
+    return Cell(percent(value), 100 * value)
 
 
 def count(value: int) -> Cell:
@@ -92,7 +95,12 @@ def room(track: int) -> Cell:
 
 def css_colour(track: int) -> str:
     """Colour of a track as CSS has it."""
-    return "#{:02x}{:02x}{:02x}".format(*track_colour(track))
+    return css(track_colour(track))
+
+
+def css(colour: tuple[int, int, int]) -> str:
+    """Colour, its red, green and blue in 0..255, as CSS has it."""
+    return "#{:02x}{:02x}{:02x}".format(*colour)
 
 
 def duration(seconds: float) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import os
 from contextlib import nullcontext
 from functools import cached_property
 from pathlib import Path
@@ -15,11 +16,13 @@ import shapely
 from rose2_logs.errors import LogError, ParameterError
 from rose2_logs.files import require_utf8
 from rose2_logs.parameters import Parameters
+from rose2_logs.provenance import log_files
 from rose2_logs.readers.discovery import ANNOTATED_ENDING
 from rose2_logs.results.maps import RunMaps
 from rose2_logs.room_plan import PlanRoom, RoomPlan
 from rose2_logs.rooms import Doorway
 from rose2_logs.run import SMOOTHED, SUMMARY, TABLES
+from rose2_logs.sinks.shares import percent
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -97,6 +100,29 @@ class RunResults:
         names = [name for name in self.summary["files"] if str(name).endswith(ANNOTATED_ENDING)]
         paths = [self.folder / Path(name).name for name in names]
         return next((path for path in paths if path.is_file()), None)
+
+    def find_log(self) -> str:
+        """Find the log of the results: where it was, or where it lay as seen from them, or as it was given.
+
+        Raises
+        ------
+        LogError
+            If there is none of its size.
+        """
+        given, place = str(self.summary["log"]), self.summary.get("log_place") or {}
+        beside = place.get("from_results")
+        found = [place.get("absolute"), beside and os.path.normpath(self.folder.resolve() / beside), given]
+        candidates = list(dict.fromkeys(str(each) for each in found if each))
+        size = self.summary.get("input", {}).get("size_bytes")
+        held = {each: sum(file.stat().st_size for file in log_files(Path(each))) for each in candidates}
+        of_its_size = [each for each in candidates if held[each] and held[each] == size]
+        if of_its_size:
+            return of_its_size[0]
+        if others := [each for each in candidates if held[each]]:
+            raise LogError(
+                f"{others[0]} is not the log that the results are of: {held[others[0]]} bytes, not {size}"
+            )
+        raise LogError(f"there is no log at {' or '.join(candidates)}")
 
     def table(self, name: str, columns: list[str] | None = None, snapshot: int | None = None) -> pa.Table:
         """Read a table, or some of its columns, or its rows of one snapshot.
@@ -209,7 +235,7 @@ class RunResults:
         doorways = tuple(_doorway(each) for each in self.table("doorways", snapshot=snapshot).to_pylist())
         time_ns = int(row["log_time_ns"])
         return RoomPlan(
-            f"{self.name}, snapshot {snapshot}, coverage {row['coverage']:.0%}",
+            f"{self.name}, snapshot {snapshot}, coverage {percent(float(row['coverage']))}",
             str(row["frame_id"]),
             tuple(sorted(rooms, key=lambda room: room.number)),
             doorways,

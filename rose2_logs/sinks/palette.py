@@ -10,6 +10,23 @@ FIRST_HUE = 0.58
 SATURATIONS = (0.62, 0.45, 0.75)
 VALUES = (0.90, 0.98, 0.78)
 
+FORMING, SHAPED, SETTLED = "forming", "shape right", "settled"
+STATE_TINTS = {FORMING: 0.3, SHAPED: 0.65, SETTLED: 1.0}
+"""States of a room's life, and the share of its colour, on white, that each is shown with."""
+
+
+def state_colours(track: int) -> dict[str, tuple[int, int, int]]:
+    """Colours of a track while its room forms, once its shape was right, and once its area has settled."""
+    red, green, blue = track_colour(track)
+    return {
+        state: (
+            round(255 - (255 - red) * tint),
+            round(255 - (255 - green) * tint),
+            round(255 - (255 - blue) * tint),
+        )
+        for state, tint in STATE_TINTS.items()
+    }
+
 
 def track_colour(track: int) -> tuple[int, int, int]:
     """Red, green, blue in 0..255 of a track; it depends on the track's number alone."""

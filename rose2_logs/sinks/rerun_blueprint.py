@@ -150,10 +150,15 @@ def _up_to_now() -> rrb.VisibleTimeRanges:
     return rrb.VisibleTimeRanges([rrb.VisibleTimeRange(name, start=before, end=now) for name in TIMELINES])
 
 
+def view_side_m(low_m: FloatArray, high_m: FloatArray) -> float:
+    """Height of the part of the world that the view shows so that a rectangle fits in."""
+    size = high_m - low_m
+    return float(max(size[0] / MAP_ASPECT, size[1], 1e-3))
+
+
 def _eye(low: FloatArray, high: FloatArray) -> rrb.EyeControls3D:
     """Look from above so that a rectangle fills the view."""
-    centre, size = (low + high) / 2, high - low
-    height = EYE_HEIGHT * float(max(size[0] / MAP_ASPECT, size[1], 1e-3))
+    centre, height = (low + high) / 2, EYE_HEIGHT * view_side_m(low, high)
     return rrb.EyeControls3D(
         kind=rrb.Eye3DKind.Orbital,
         position=[centre[0], centre[1] - 1e-3 * height, height],

@@ -7,7 +7,7 @@ from array import array
 import numpy as np
 import rerun as rr
 
-from rose2_logs.sinks.palette import track_colour
+from rose2_logs.sinks.palette import FORMING, SETTLED, SHAPED, state_colours
 from rose2_logs.sinks.rerun_layers import Instant, time_columns
 from rose2_logs.tracking.hindsight import Hindsight
 from rose2_logs.tracking.lives import Moment
@@ -15,9 +15,6 @@ from rose2_logs.tracking.lives import Moment
 LIVES, FINAL_SHARE, FINAL_IOU = "/room", "/run/final_share", "/run/final_iou"
 SHIFTS = "/run/map_shifted"
 """Marks upon the curve of coverage where the whole map shifted."""
-FORMING, SHAPED, SETTLED = "forming", "shape right", "settled"
-STATE_TINTS = {FORMING: 0.3, SHAPED: 0.65, SETTLED: 1.0}
-"""States of a room, and the share of its colour that each is shown with."""
 LOST = ""
 """Ends a state: a gap in the lane."""
 
@@ -56,13 +53,10 @@ class Lives:
         for track, turns in sorted(self._turns.items()):
             changes = self._changes(track, turns, number, hindsight)
             path = f"{LIVES}/{track:03d}"
-            colour = np.array(track_colour(track))
-            tints = [255 - (255 - colour) * tint for tint in STATE_TINTS.values()]
+            tints = state_colours(track)
             self._recording.log(
                 path,
-                rr.StateConfiguration(
-                    values=list(STATE_TINTS), colors=[tuple(int(v) for v in tint) for tint in tints]
-                ),
+                rr.StateConfiguration(values=list(tints), colors=list(tints.values())),
                 static=True,
             )
             times = time_columns([instants[index] for index in changes])

@@ -16,7 +16,7 @@ from rose2_logs.sinks import rerun_viewer
 from rose2_logs.sinks.event_text import event_text
 from rose2_logs.sinks.extent import Extent
 from rose2_logs.sinks.palette import track_colour
-from rose2_logs.sinks.rerun_blueprint import COVERAGE_UNIT, make_blueprint
+from rose2_logs.sinks.rerun_blueprint import COVERAGE_UNIT, make_blueprint, view_side_m
 from rose2_logs.sinks.rerun_columns import Entry, Scalar
 from rose2_logs.sinks.rerun_faults import abandon, require_space
 from rose2_logs.sinks.rerun_layers import CHUNK_BYTES, Layers
@@ -24,6 +24,7 @@ from rose2_logs.sinks.rerun_lives import FINAL_IOU, FINAL_SHARE, SHIFTS, Lives
 from rose2_logs.sinks.rerun_smoothed import SmoothedWorld
 from rose2_logs.sinks.rerun_summary import summary_text
 from rose2_logs.sinks.rerun_world import World
+from rose2_logs.sinks.shares import percent
 from rose2_logs.sinks.sink import RECORDING_LAYERS, RunInfo
 from rose2_logs.sinks.tables import Tables
 from rose2_logs.tracking.frames import RoomEvent, TrackedSnapshot, map_motion
@@ -130,13 +131,13 @@ class RerunRecording:
         snapshot = frame.snapshot
         coverage = _steps(frame.coverage)
         self._layers.begin(snapshot.log_time_ns, snapshot.stamp_ns, snapshot.index, coverage)
-        self._world.log(frame)
         self._extent.add(frame)
+        self._world.log(frame, view_side_m(self._extent.low_m, self._extent.high_m))
         self._lanes.add(self._layers.now, frame.track_ids)
         self._log_curves(frame)
         for event in frame.events:
             if event.kind != "continued":
-                text = f"{100 * frame.coverage:.0f} %: {event_text(event)}"
+                text = f"{percent(frame.coverage, ' %')}: {event_text(event)}"
                 self._layers.add("/events", Entry(text, _event_level(event)))
         if self._tables is None:
             self._lives.add(frame)

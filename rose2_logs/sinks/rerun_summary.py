@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 import re
 
-from rose2_logs.room_evidence import UNSURE_BELOW
+from rose2_logs.room_evidence import UNSURE_SIGN, is_unsure
 from rose2_logs.sinks.rerun_blueprint import COVERAGE_UNIT
+from rose2_logs.sinks.shares import percent
 from rose2_logs.sinks.sink import RunInfo
 from rose2_logs.tracking.hindsight import Hindsight
 from rose2_logs.tracking.lives import Moment, RoomLives
@@ -86,9 +87,9 @@ def _worth_a_look(lives: RoomLives) -> list[str]:
     """Tell which rooms are unsure, and where the whole map shifted."""
     told = []
     shares = [(lives.lives[track].outline_wall_share, track) for track in lives.in_last_map]
-    unsure = sorted((share, track) for share, track in shares if share is not None and share < UNSURE_BELOW)
+    unsure = sorted((share, track) for share, track in shares if share is not None and is_unsure(share))
     if unsure:
-        named = ", ".join(f"{track} ({_percent(share)})" for share, track in unsure[:NAMED_MOST])
+        named = ", ".join(f"{track}{UNSURE_SIGN} ({_percent(share)})" for share, track in unsure[:NAMED_MOST])
         more = f" and {len(unsure) - NAMED_MOST} more" if len(unsure) > NAMED_MOST else ""
         told.append(f"**Unsure**, with little wall around: room {named}{more}.")
     if lives.largest_shift is not None:
@@ -103,7 +104,7 @@ def _worth_a_look(lives: RoomLives) -> list[str]:
 
 
 def _percent(share: float) -> str:
-    return f"{100 * share:.0f} %"
+    return percent(share, " %")
 
 
 def _moment(moment: Moment | None) -> str:

@@ -77,9 +77,12 @@ def find_recording(path: Path) -> Path:
     if not path.is_dir():
         raise LogError(f"{path}: there is no such file; rose2-logs analyze writes recordings")
     found = sorted(path.glob("*.rrd"))
-    if len(found) != 1:
-        what = "several recordings: name one, or show all with rose2-logs serve" if found else "no recording"
-        raise LogError(f"{path}: holds {what}")
+    if not found:
+        below = min(path.rglob("*.rrd"), default=None)
+        hint = f"; did you mean {below.parent}? rose2-logs serve shows all" if below else ""
+        raise LogError(f"{path}: holds no recording{hint}")
+    if len(found) > 1:
+        raise LogError(f"{path}: holds several recordings: name one, or show all with rose2-logs serve")
     return found[0]
 
 

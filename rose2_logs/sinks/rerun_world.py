@@ -9,7 +9,7 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from rose2_logs.occupancy import FloatArray
-from rose2_logs.room_evidence import UNSURE_BELOW
+from rose2_logs.room_evidence import UNSURE_SIGN, is_unsure
 from rose2_logs.sinks.hatching import hatch_unseen
 from rose2_logs.sinks.palette import track_colour
 from rose2_logs.sinks.rerun_columns import Label, Strips
@@ -36,6 +36,9 @@ ROBOT_LENGTH_M, ROBOT_WIDTH_M = 0.7, 0.45
 MARKS = (0.8, 0.98)
 """Where the marks of the directions begin and end, from the centre of the spectrum's picture to its rim."""
 DIRECTION_NAME = "walls at {angle:.1f}°"
+NAMED_SHARE = 0.004
+"""Rooms with less of the area of a square view get a number only: number and area are about 65 of the usual
+1000 points wide, the side of a room of this share."""
 MAP, ROOMS, DOORWAYS = "/world/map", "/world/rooms", "/world/doorways"
 FILLS, CLEAN, SCORE = "/world/room_fills", "/world/clean_map", "/world/structure_score"
 PREDICTED, PATH, ROBOT = "/world/predicted", "/world/path", "/world/robot"
@@ -81,10 +84,10 @@ class World:
         ):
             self._style_lines(path, width, colour)
 
-    def log(self, frame: TrackedSnapshot) -> None:
-        """Log one map, after the layers have begun its snapshot."""
+    def log(self, frame: TrackedSnapshot, view_side_m: float) -> None:
+        """Log one map, after the layers have begun its snapshot; the view is so high, at first."""
         self._log_pictures(frame)
-        self._log_rooms(frame)
+        self._log_rooms(frame, view_side_m)
         doors = np.array([door.ends_m for door in frame.analysis.rooms.doorways]).reshape(-1, 4)
         self._log_lines(DOORWAYS, doors)
         if "predicted" in self._wanted:
@@ -132,7 +135,7 @@ class World:
         for number in range(len(directions_rad), self._layers.count_below(f"{SPECTRUM}/names")):
             self._layers.clear(f"{SPECTRUM}/names/{number}")
 
-    def _log_rooms(self, frame: TrackedSnapshot) -> None:
+    def _log_rooms(self, frame: TrackedSnapshot, view_side_m: float) -> None:
         rooms = frame.analysis.rooms
         for track in sorted(self._shown - set(frame.track_ids)):
             self._layers.clear(f"{ROOMS}/{track}")
@@ -145,8 +148,7 @@ class World:
             self._layers.show(f"{ROOMS}/{track}", _rings(rooms.outer_rings_m[number]))
             x, y, z = points[number]
             wall_share, _ = evidence_of(frame, number)
-            unsure = "" if wall_share is None or wall_share >= UNSURE_BELOW else ", unsure"
-            text = f"Room {track}, {rooms.areas_m2[number]:.0f} m²{unsure}"
+            text = room_label(track, float(rooms.areas_m2[number]), is_unsure(wall_share), view_side_m)
             self._layers.show(f"{ROOMS}/{track}/label", Label((x, y, z), text))
 
     def _begin_track(self, track: int) -> None:
@@ -208,6 +210,17 @@ def label_style() -> rr.Points3D:
     return rr.Points3D.from_fields(
         colors=[(255, 255, 255)], radii=rr.components.Radius.ui_points(0.5), show_labels=True
     )
+
+
+def room_label(track: int, area_m2: float, unsure: bool, view_side_m: float) -> str:
+    """Name a room: number and area in one line, the number alone if these would cover its neighbours.
+
+    The viewer cuts labels of several lines down to the first one where there are many.
+    """
+    number = f"{track}{UNSURE_SIGN if unsure else ''}"
+    if area_m2 < NAMED_SHARE * view_side_m**2:
+        return number
+    return f"{number}: {area_m2:.0f} m²"
 
 
 def _height_m(path: str) -> float:

@@ -13,9 +13,11 @@ from numpy.typing import NDArray
 
 from rose2_logs.occupancy import UNKNOWN, FloatArray, classify
 from rose2_logs.parameters import OccupancyParameters
+from rose2_logs.room_evidence import UNSURE_SIGN, is_unsure
 from rose2_logs.sinks.cdr import CdrWriter
 from rose2_logs.sinks.palette import track_colour
 from rose2_logs.tracking.frames import TrackedSnapshot
+from rose2_logs.tracking.lives import evidence_of
 
 if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore
@@ -171,10 +173,10 @@ class MessageMaker:
         points = np.nan_to_num(rooms.label_points_m).tolist()
         corners = self._triangles.corners_of(rooms.polygons)
         for track, number in sorted(zip(frame.track_ids, range(len(rooms)), strict=True)):
-            shape = rooms.polygons[number]
             red, green, blue = (value / 255 for value in track_colour(track))
             fill, line = (red, green, blue, FILL_OPACITY), (red * 0.7, green * 0.7, blue * 0.7, 1.0)
             x, y = points[number]
+            sign = UNSURE_SIGN if is_unsure(evidence_of(frame, number)[0]) else ""
             made += [
                 Marker("rooms", track, TRIANGLES, corners[number], fill),
                 Marker(
@@ -191,7 +193,7 @@ class MessageMaker:
                     TEXT,
                     colour=(0.0, 0.0, 0.0, 1.0),
                     width_m=LABEL_HEIGHT_M,
-                    text=f"{track}\n{shape.area:.0f} m2",
+                    text=f"{track}{sign}\n{rooms.areas_m2[number]:.0f} m2",
                     position_m=(x, y),
                 ),
             ]

@@ -45,6 +45,8 @@ class RunInfo:
         What is known of the input: format, size in bytes, SHA-256 fingerprint; JSON values only.
     origin : str, optional
         Where the log comes from if `log_path` is but a copy.
+    place : dict, optional
+        Where the log lies on this machine, see `provenance.log_place`; none of a copy.
     """
 
     log_path: Path
@@ -54,6 +56,7 @@ class RunInfo:
     versions: dict[str, str]
     provenance: dict[str, Any]
     origin: str | None = None
+    place: dict[str, str | None] | None = None
 
 
 class Sink(Protocol):

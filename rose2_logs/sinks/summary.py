@@ -153,6 +153,7 @@ def write_summary(
     """
     summary = {
         "log": info.origin or str(info.log_path),
+        "log_place": info.place,
         "topic": info.topic,
         "method": info.method,
         "input": info.provenance,

@@ -249,3 +249,53 @@ def test_evaluate_along_a_run(cli, cases: Path, tmp_path: Path):
     assert 0.6 < along[0]["coverage"] < 0.9
     assert along[1]["coverage"] == 1.0
     assert (tmp_path / "drawn.along.png").exists()
+
+
+def test_info_takes_the_parameters_that_its_messages_name(cli, tmp_path: Path):
+    """A map that is larger than the limit is told with it; the limit can be set as for the other commands."""
+    tight = ["--set", "reading.map_max_cells=100000"]
+    code, out, _ = cli("info", SAMPLE_LOGS / "office.mcap", *tight)
+    assert (code, "--set reading.map_max_cells" in out) == (0, True)
+    config = tmp_path / "limits.toml"
+    config.write_text("[reading]\nmap_max_cells = 100000\n")
+    assert cli("info", SAMPLE_LOGS / "office.mcap", "--config", config)[1] == out
+    code, out, _ = cli(
+        "info", SAMPLE_LOGS / "office.mcap", "--config", config, "--set", "reading.map_max_cells=1000000"
+    )
+    assert (code, "704 x 512 cells" in out) == (0, True)
+
+
+@pytest.mark.parametrize("command", ["info", "analyze", "batch", "report", "compare", "evaluate"])
+def test_help_shows_flags_as_flags_and_cuts_nothing(cli, command: str):
+    """No type stands behind a flag, as if it took a value; no example is cut off."""
+    code, out, _ = cli(command, "--help")
+    lines = [line for line in out.splitlines() if "<bool>" in line and "--help" not in line]
+    assert (code, lines, "…" in out) == (0, [], False)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["--set", "room_min_area=2"], "did you mean floor_plan.room_min_area_m2?"),
+        (["--set", "floor_plan.room_area_m2=2"], "did you mean floor_plan.room_min_area_m2?"),
+        (["--set", "rooms.room_min_area_m2=2"], "did you mean floor_plan.room_min_area_m2?"),
+        (["--set", "colour=2"], "write it as block.name=value"),
+        (["--start", "9000"], "they lie from 20.0 to 596.7 s into the log"),
+    ],
+)
+def test_a_slip_is_told_with_what_may_have_been_meant(cli, tmp_path: Path, arguments: list[str], told: str):
+    """Of parameters the next name, of times those that the log has, as they are given."""
+    code, _, err = cli("analyze", SAMPLE_LOGS / "office.mcap", "-o", tmp_path, *arguments)
+    assert (code, told in err, len(err.splitlines())) == (2, True, 1)
+
+
+def test_a_folder_above_is_told_with_the_one_that_may_have_been_meant(cli, tmp_path: Path):
+    """For a recording the folder that has one; for a log the command that takes folders; for a map a file."""
+    (tmp_path / "results" / "run").mkdir(parents=True)
+    (tmp_path / "results" / "run" / "run.rrd").write_bytes(b"")
+    _, _, err = cli("view", tmp_path / "results")
+    assert f"did you mean {tmp_path / 'results' / 'run'}?" in err
+    _, _, err = cli("analyze", tmp_path / "results", "-o", tmp_path / "out")
+    assert "rose2-logs batch takes folders of many logs" in err
+    _, _, err = cli("segment", tmp_path / "results", "-o", tmp_path / "out")
+    assert "is a folder: name the map in it" in err

@@ -90,7 +90,7 @@ def test_without_the_annotated_log_the_map_comes_from_the_log(cli, results, tmp_
     assert cli("compare", *results, "-o", tmp_path / "out", "--no-rrd")[0] == 0
     save_map(tmp_path / "maps", "before", three_rooms()[:, :150])
     code, _, err = cli("compare", *results, "-o", tmp_path / "other", "--no-rrd")
-    assert (code, "does not hold the map" in err) == (2, True)
+    assert (code, "is not the log that the results are of" in err) == (2, True)
     (tmp_path / "maps" / "before.yaml").unlink()
     code, _, err = cli("compare", *results, "-o", tmp_path / "other", "--no-rrd")
     assert (code, "--no-mcap" in err, len(err.splitlines())) == (2, True, 1)
@@ -117,3 +117,27 @@ def test_a_comparison_that_replaces_one_leaves_nothing_of_it(cli, results, tmp_p
     code, said, _ = cli("compare", *results[::-1], "-o", out, "--no-rrd", "--overwrite")
     assert (code, "comparison.rrd" in said) == (0, False)
     assert sorted(file.name for file in out.iterdir()) == sorted(FILES[:-1])
+
+
+def test_the_log_is_found_from_anywhere_and_after_moves(cli, tmp_path: Path, monkeypatch):
+    """Given by a relative path; then from another folder, moved together with the results, or these alone."""
+    project = tmp_path / "project"
+    save_map(project / "maps", "plan", three_rooms())
+    monkeypatch.chdir(project)
+    assert cli("analyze", "maps/plan.yaml", "-o", "results", "--no-rrd", "--no-mcap")[0] == 0
+    monkeypatch.chdir(tmp_path)
+
+    def compared(results: Path, name: str) -> tuple[int, str]:
+        code, _, err = cli("compare", results, results, "-o", tmp_path / name, "--no-rrd")
+        return code, err
+
+    assert compared(project / "results" / "plan", "elsewhere") == (0, "")
+    (project / "results" / "plan").rename(tmp_path / "alone")
+    assert compared(tmp_path / "alone", "results_moved") == (0, "")
+    (tmp_path / "alone").rename(project / "results" / "plan")
+    moved = project.rename(tmp_path / "archive")
+    assert compared(moved / "results" / "plan", "both_moved") == (0, "")
+    image = moved / "maps" / "plan.png"
+    image.write_bytes(image.read_bytes() + b" ")
+    code, err = compared(moved / "results" / "plan", "other_log")
+    assert (code, "is not the log that the results are of" in err) == (2, True)

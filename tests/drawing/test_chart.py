@@ -74,20 +74,19 @@ def test_long_curves_are_thinned():
     assert len(points) == 800
 
 
-def test_lanes_show_when_rooms_were_there():
-    """A room that went and came back has two bars; a bar reaches to the next map."""
+def test_lanes_show_when_rooms_were_there_and_in_which_state():
+    """A room that went and came back has two bars; a bar reaches to the next map, or to the next state."""
     x = np.array([0.0, 10.0, 20.0, 30.0, 40.0])
-    present = np.array([[True, False, True, True, False], [False, False, False, False, True]])
+    states = np.array([[1, 0, 1, 2, 0], [0, 0, 0, 0, 2]])
+    colours = [{"forming": "#100", "settled": "#200"}, {"forming": "#300", "settled": "#400"}]
     root = ET.fromstring(
-        lane_chart(x, present, ["1", "2"], ["#000", "#fff"], title="t", x_label="x", x_range=(0.0, 40.0))
+        lane_chart(x, states, ["1", "2"], colours, title="t", x_label="x", x_range=(0.0, 40.0))
     )
     bars = [(float(each.get("x")), float(each.get("width"))) for each in root.iter("rect")]
     quarter = (WIDTH - LEFT - RIGHT) / 4
-    assert bars[:2] == [
-        pytest.approx((LEFT, quarter), abs=0.1),
-        pytest.approx((LEFT + 2 * quarter, 2 * quarter), abs=0.1),
-    ]
-    assert len(bars) == 3
+    assert bars[:3] == [pytest.approx((LEFT + at * quarter, quarter), abs=0.1) for at in (0, 2, 3)]
+    assert [each.get("fill") for each in root.iter("rect")] == ["#100", "#100", "#200", "#400"]
+    assert [each.find("title").text for each in root.iter("rect")][2:] == ["1: settled", "2: settled"]
 
 
 def test_a_share_rises_in_steps_within_its_lane():

@@ -6,6 +6,7 @@ import base64
 import dataclasses
 import io
 import xml.etree.ElementTree as ET
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -14,9 +15,20 @@ from drawn_plans import LEFT, RIGHT, two_rooms_plan
 from PIL import Image
 
 from rose2_logs.drawing.pixels import as_pixels
-from rose2_logs.drawing.plan import FREE_GREY, MARGIN_M, PANEL, SEEN_OPACITY, UNKNOWN_GREY, draw_plan
+from rose2_logs.drawing.plan import (
+    FIGURE,
+    FREE_GREY,
+    LETTER_EM,
+    MARGIN_M,
+    PANEL,
+    SEEN_OPACITY,
+    UNKNOWN_GREY,
+    draw_plan,
+)
 from rose2_logs.drawing.shapes import Area, Drawing, Lines, Text, hatching
 from rose2_logs.drawing.svg import as_svg
+from rose2_logs.room_plan import PlanRoom, RoomPlan
+from rose2_logs.rooms import Doorway
 from rose2_logs.sinks.palette import track_colour
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -63,6 +75,55 @@ def test_svg_is_xml_with_the_same_picture_and_shapes():
     told = [element.text for element in root.iter(f"{SVG}title")]
     assert "Room 3: 12.0 m² seen of 12.0 m², 75% of its outline backed by walls" in told
     assert as_svg(draw_plan(two_rooms_plan())) == text
+
+
+def test_unsure_rooms_are_marked_and_the_legend_says_so():
+    """A sign behind the number of a room that few walls back, also in small pictures; none without such."""
+    plan = two_rooms_plan()
+    unsure, sure = (
+        dataclasses.replace(
+            plan, rooms=tuple(dataclasses.replace(room, confidence=share) for room in plan.rooms)
+        )
+        for share in (0.69, 0.7)
+    )
+
+    def texts(plan, style):
+        return [each.text for each in draw_plan(plan, style).shapes if isinstance(each, Text)]
+
+    assert {f"{LEFT}?", f"{RIGHT}?"} <= set(texts(unsure, PANEL))
+    assert {f"Room {LEFT}?", "unsure, little wall around"} <= set(texts(unsure, FIGURE))
+    assert not any("?" in text or "unsure" in text for text in texts(sure, PANEL) + texts(sure, FIGURE))
+
+
+@pytest.mark.parametrize("height_m", [4.0, 400.0])
+def test_the_legend_fits_into_the_page(height_m: float):
+    """Of a wide plan and of one that is narrow on its page; signs do not lie upon each other."""
+    shape = shapely.box(0, 0, 20, height_m)
+    rooms = (PlanRoom(1, shape, 4.0, (1.0, 1.0), (), 0.1),)
+    doors = (Doorway((1, 1), np.array([[1.0, 0.0], [2.0, 0.0]])),)
+    plan = RoomPlan("t", "map", rooms, doors, None, two_rooms_plan().map)
+    drawing = draw_plan(plan, FIGURE, shape.bounds)
+    strip = drawing.height - 3 * FIGURE.font
+    words = [
+        each for each in drawing.shapes if isinstance(each, Text) and each.y > strip and not each.is_centred
+    ]
+    ends = [(each.x, each.x + LETTER_EM * each.size * len(each.text)) for each in words]
+    assert words[-1].text == "unsure, little wall around"
+    assert ends[-1][1] < drawing.width
+    assert all(end < start for (_, end), (start, _) in pairwise(ends))
+
+
+def test_a_ray_beyond_the_plan_does_not_reach_into_the_legend():
+    """It leaves the rooms downwards and ends at the rim of the plan."""
+    plan = two_rooms_plan()
+    cells = plan.map.cells.copy()
+    cells[:10, 20:22] = 100
+    plan = dataclasses.replace(plan, map=dataclasses.replace(plan.map, cells=cells))
+    drawing = draw_plan(plan, FIGURE)
+    image = as_pixels(drawing, int(FIGURE.width))
+    strip = image[int(drawing.height - 3 * FIGURE.font) + 2 : -1]
+    assert (strip[:4] == 255).all()
+    assert (strip[-4:] == 255).all()
 
 
 def test_several_plans_share_a_part_of_the_world():

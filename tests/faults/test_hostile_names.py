@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import os
+import shutil
+import subprocess
 import sys
 import xml.etree.ElementTree as ET
 from html.parser import HTMLParser
@@ -15,10 +18,12 @@ import pyarrow.parquet as pq
 import pytest
 import yaml
 from faulty_logs import SEEN, START_NS, grid, room, write_mcap
+from finished_runs import SAMPLE_LOGS
 from mcap.reader import make_reader
 
 from rose2_logs.errors import OutputError
 from rose2_logs.exports.formats import FORMATS
+from rose2_logs.readers import Selection
 from rose2_logs.report.page import write_report
 from rose2_logs.results.figure import export_plan, write_figure
 from rose2_logs.results.folder import RunResults
@@ -170,3 +175,48 @@ def test_a_name_too_long_for_its_results_is_told_and_leaves_nothing(tmp_path: Pa
     with pytest.raises(OutputError, match=r"longer than 246 bytes; give the log a shorter name"):
         analyse_log(log, tmp_path / "out", RunOptions())
     assert list(tmp_path.iterdir()) == [log]
+
+
+@pytest.mark.skipif(sys.platform in ("darwin", "win32"), reason="its file systems know Unicode only")
+def test_a_batch_goes_on_beside_a_log_whose_name_is_not_utf8(tmp_path: Path):
+    """It is one failed log with a line that shows its name; run again, the others stand as they are."""
+    logs, out = tmp_path / "logs", tmp_path / "out"
+    logs.mkdir()
+    write_mcap(logs / "good.mcap", [("/map", START_NS, grid(room(90)))])
+    write_mcap(Path(os.fsdecode(os.fsencode(logs) + b"/caf\xe9.mcap")), [("/map", START_NS, grid(room(90)))])
+    command = [
+        sys.executable,
+        "-m",
+        "rose2_logs",
+        "batch",
+        str(logs),
+        "-o",
+        str(out),
+        "--no-rrd",
+        "--no-mcap",
+    ]
+    for good in ("done", "up to date"):
+        ran = subprocess.run(command, capture_output=True, text=True, check=False)
+        errors = [line for line in ran.stderr.splitlines() if line.startswith("error:")]
+        assert ran.returncode == 2
+        assert len(errors) == 1
+        assert r"caf\xe9.mcap: its name is not UTF-8" in errors[0]
+        assert f"1 {good}, 1 failed" in ran.stdout
+        with (out / "summary.csv").open(encoding="utf-8", newline="") as file:
+            rows = {row["log"]: row for row in csv.DictReader(file)}
+        assert rows["good"]["status"] == "done"
+        assert rows["caf"]["source"].endswith(r"caf\xe9.mcap")
+    assert sorted(folder.name for folder in (out / "logs").iterdir()) == ["good"]
+
+
+@pytest.mark.skipif(sys.platform in ("darwin", "win32"), reason="its file systems know Unicode only")
+def test_a_file_in_a_bag_whose_name_is_not_utf8_is_no_trouble(tmp_path: Path):
+    """It only stands in the list of the log's files."""
+    bag = tmp_path / "bag"
+    shutil.copytree(SAMPLE_LOGS / "ring", bag)
+    Path(os.fsdecode(os.fsencode(bag) + b"/caf\xe9.txt")).write_text("")
+    out = tmp_path / "out"
+    options = RunOptions(selection=Selection(max_snapshots=1), recording=False, annotated_log=False)
+    analyse_log(bag, out, options)
+    names = [file["name"] for file in json.loads((out / "summary.json").read_text())["input"]["files"]]
+    assert r"caf\xe9.txt" in names

@@ -63,7 +63,7 @@ def test_rooms_that_are_unsure_or_unseen_are_named(changed):
     plan = two_rooms_plan()
     bare = dataclasses.replace(plan.rooms[0], confidence=0.0, frontier_m=0.5)
     text = told(changed(), dataclasses.replace(plan, rooms=(bare, plan.rooms[1])))
-    assert "unsure: Room 3 (0%)." in text
+    assert "unsure (?): Room 3 (0%)." in text
     assert "open frontier, not explored to the end: Room 120 (3.0 m)." in text
     assert "not seen: predicted, or furniture: Room 120 (50%)." in text
 

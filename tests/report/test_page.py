@@ -102,6 +102,19 @@ def test_it_says_when_each_room_was_seen_where_the_run_was_smoothed(office_resul
     assert "seen-table" not in Reader(write_report(folder, overwrite=True)).tables
 
 
+def test_lanes_tell_when_each_room_was_right(office_results: Path, tmp_path: Path):
+    """A room of the last map has settled by then; one that was right later than it came formed before."""
+    text = write_report(office_results, tmp_path / "report.html").read_text(encoding="utf-8")
+    tracks = pq.read_table(office_results / "tracks.parquet").to_pylist()
+    signs = {row["track"]: "?" if row["outline_wall_share"] < 0.7 else "" for row in tracks}
+    for row in tracks:
+        name = f"{row['track']}{signs[row['track']]}"
+        if row["in_last_map"]:
+            assert f"<title>{name}: settled</title>" in text
+        right = min(row["shape_right_snapshot"], row["area_settled_snapshot"])
+        assert (f"<title>{name}: forming</title>" in text) == (right > row["first_snapshot"])
+
+
 def test_it_stands_alone(office_results: Path, tmp_path: Path):
     """Nothing is fetched: addresses are data, places in the page, or files beside it."""
     page = write_report(office_results, tmp_path / "page.html")
@@ -207,6 +220,22 @@ def test_many_logs_have_a_page_that_lists_them(office_results: Path, tmp_path: P
     ]
 
 
+def test_the_page_of_a_batch_names_the_logs_that_failed(office_results: Path, tmp_path: Path):
+    """As text, with the reason; a layout that was final in the last map only is not told as final."""
+    shutil.copytree(office_results, tmp_path / "logs" / "a")
+    summary = json.loads((office_results / "summary.json").read_text())
+    rows = pq.read_table(office_results / "snapshots.parquet").to_pylist()
+    summary["layout"]["final_since"] = {"snapshot": rows[-1]["snapshot"], "time_s": 1.0, "coverage": 1.0}
+    (tmp_path / "logs" / "a" / "summary.json").write_text(json.dumps(summary))
+    table = "log,status,reason\na,done,\nbad,failed,<b>no</b> map\n"
+    (tmp_path / "summary.csv").write_text(table, encoding="utf-8")
+    told = Reader(write_reports(tmp_path, panels=1).pages[-1])
+    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "<strong>bad</strong>: &lt;b&gt;no&lt;/b&gt; map" in text
+    (row,) = told.rows("logs-table")
+    assert row[7] == "–"
+
+
 def test_a_folder_without_results_is_named(tmp_path: Path):
     with pytest.raises(LogError, match=r"holds no summary\.json"):
         write_reports(tmp_path)
@@ -226,6 +255,14 @@ def test_panels_stand_evenly_along_coverage(most: int):
         assert places[0] == 0
         # A step of the maps themselves is 0.05 at most.
         assert np.diff(coverage[places]).max() <= 0.9 / (most - 1) + 0.05
+
+
+def test_the_last_panel_is_the_only_one_of_full_coverage_that_is_needed():
+    """Where some maps before the last cover as much, the first map is not given up for one of them."""
+    coverage = np.concatenate([np.linspace(0.1, 1.0, 40), np.ones(10)])
+    places = along_coverage(coverage, 10)
+    assert (places[0], len(places)) == (0, 10)
+    assert (coverage[places] == 1.0).sum() == 1
 
 
 def test_maps_that_cover_the_same_are_spread():

@@ -17,6 +17,7 @@ from saved_maps import save_run
 from rose2_logs.errors import OutputError
 from rose2_logs.readers import Selection
 from rose2_logs.run import RunOptions, analyse_log
+from rose2_logs.sinks.rerun_world import room_label
 from rose2_logs.tracking.alignment import RigidMotion
 from rose2_logs.tracking.frames import MAP_TRACK, RoomEvent
 
@@ -167,3 +168,10 @@ def test_a_shift_of_the_map_is_told_in_metres_and_degrees():
     motion = RigidMotion((3.0, 4.0), (0.204, -0.05), np.deg2rad(1.2))
     text = event_text(RoomEvent("shifted", 5, MAP_TRACK, motion=motion))
     assert text == "the map shifted by +0.20, -0.05 m and turned by +1.2°"
+
+
+def test_names_of_rooms_are_short_enough_for_their_place_in_the_view():
+    """Number and area in one line; of a room that is small in the view the number; a sign if unsure."""
+    assert room_label(7, 22.4, False, 40.0) == "7: 22 m²"
+    assert room_label(7, 22.4, True, 40.0) == "7?: 22 m²"
+    assert room_label(7, 22.4, True, 100.0) == "7?"

@@ -51,7 +51,7 @@ def test_the_summary_names_unsure_rooms_and_the_largest_shift():
     lives.in_last_map, lives.last = tuple(lives.lives), last
     info = RunInfo(Path("a.mcap"), "/map", "rose2", Parameters(), {}, {})
     text = summary_text(info, lives, None, 1)
-    assert "room 3 (31 %), 2 (50 %), 6 (60 %), 7 (60 %), 8 (60 %), 9 (60 %) and 1 more." in text
+    assert "room 3? (31 %), 2? (50 %), 6? (60 %), 7? (60 %), 8? (60 %), 9? (60 %) and 1 more." in text
     assert "1 map, 1 min" in text
     assert "shifted" not in text
     lives.shifts, lives.largest_shift = 2, (Moment(4, 40.0, 0.4), RigidMotion((0.0, 0.0), (0.3, -0.4), 0.02))
