@@ -71,7 +71,7 @@ class McapWriter:
         self._write_record(Header(profile, library))
 
     def register_schema(self, name: str, encoding: str, data: bytes, wanted_id: int | None = None) -> int:
-        """Add a schema and return its id: the wanted one, if it is free."""
+        """Add a schema and return its id: the wanted one, which is not 0, if it is free."""
         number = _free_id(wanted_id, self._schemas)
         self._schemas[number] = Schema(id=number, name=name, encoding=encoding, data=data)
         self._write_record(self._schemas[number])
@@ -85,7 +85,7 @@ class McapWriter:
         metadata: dict[str, str],
         wanted_id: int | None = None,
     ) -> int:
-        """Add a channel and return its id: the wanted one, if it is free; schema 0 is none."""
+        """Add a channel and return its id: the wanted one, 0 too, if it is free; schema 0 is none."""
         number = _free_id(wanted_id, self._channels)
         self._channels[number] = Channel(
             id=number, topic=topic, message_encoding=message_encoding, schema_id=schema_id, metadata=metadata
@@ -266,7 +266,9 @@ class McapWriter:
 
 
 def _free_id(wanted: int | None, taken: dict[int, Any]) -> int:
-    return wanted if wanted and wanted not in taken else next(each for each in count(1) if each not in taken)
+    if wanted is not None and wanted not in taken:
+        return wanted
+    return next(each for each in count(1) if each not in taken)
 
 
 def _read(source: IO[bytes], length: int) -> bytes:
