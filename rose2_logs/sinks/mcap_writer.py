@@ -32,15 +32,15 @@ from mcap.records import (
     SummaryOffset,
 )
 
-MAGIC = b"\x89MCAP0\r\n"
+from rose2_logs.readers.mcap_records import INDEX, INDEX_ENTRY, MAGIC, RECORD
+
 CHUNK_BYTES = 1 << 20
 """Messages are compressed together from this size on; as the mcap package's writer does."""
 COPIED_AT_ONCE = 16 << 20
 """Bytes of a chunk that are in memory at a time while it is copied."""
 
-_RECORD = struct.Struct("<BQ")  # opcode, length of what follows
-_MESSAGE = struct.Struct("<BQHIQQ")  # and channel, sequence, log time, publish time; then the data
-_INDEX = struct.Struct("<BQHI")  # and channel, length of the entries of 16 bytes each
+# Head of a record and what a message begins with, for one call: channel, sequence, log time, publish time.
+_MESSAGE = struct.Struct("<BQHIQQ")
 
 
 class McapWriter:
@@ -103,7 +103,7 @@ class McapWriter:
     ) -> None:
         """Add one message to the chunk in the making; log time and publish time in nanoseconds."""
         self._entries.setdefault(channel_id, []).append((log_time, len(self._records)))
-        length = _MESSAGE.size - _RECORD.size + len(data)
+        length = _MESSAGE.size - RECORD.size + len(data)
         self._records += _MESSAGE.pack(Opcode.MESSAGE, length, channel_id, sequence, log_time, publish_time)
         self._records += data
         if len(self._records) >= CHUNK_BYTES:
@@ -283,11 +283,11 @@ def _indexed_messages(message_index: bytes) -> Counter[int]:
     counts: Counter[int] = Counter()
     place = 0
     while place < len(message_index):
-        if place + _INDEX.size > len(message_index):
+        if place + INDEX.size > len(message_index):
             raise ValueError("a message index is damaged")
-        opcode, length, channel, entries = _INDEX.unpack_from(message_index, place)
-        if opcode != Opcode.MESSAGE_INDEX or length != _INDEX.size - _RECORD.size + entries:
+        opcode, length, channel, entries = INDEX.unpack_from(message_index, place)
+        if opcode != Opcode.MESSAGE_INDEX or length != INDEX.size - RECORD.size + entries:
             raise ValueError("a message index is damaged")
-        counts[channel] += entries // 16
-        place += _RECORD.size + length
+        counts[channel] += entries // INDEX_ENTRY.size
+        place += RECORD.size + length
     return counts
