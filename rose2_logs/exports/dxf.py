@@ -47,6 +47,9 @@ def write_dxf(plan: RoomPlan, path: Path) -> None:
         for name, colour in LAYERS.items():
             document.layers.add(name, color=colour)
         _draw(plan, document.modelspace())
+        # Of itself it lists the classes in the order of a set, which changes from run to run.
+        for name in sorted(document.entitydb.dxf_types_in_use()):
+            document.classes.add_class(name)
         with replacing(path) as part:
             document.saveas(part)
     finally:
