@@ -259,6 +259,19 @@ def renumbered(labels: NDArray[np.int32], number: NDArray[np.int32]) -> NDArray[
     return labels
 
 
+def roots(parent: NDArray[np.intp]) -> NDArray[np.intp]:
+    """What each of N regions (N,) belongs to after all joins.
+
+    Parameters
+    ----------
+    parent : (N,) int
+        The region that each was made part of; itself where it was not.
+    """
+    while not np.array_equal(above := parent[parent], parent):
+        parent = above
+    return parent
+
+
 def label_sizes(labels: NDArray[np.integer], count: int) -> NDArray[np.int64]:
     """Number of cells (count + 1,) of each label 0..count of an image.
 

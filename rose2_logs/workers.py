@@ -29,6 +29,8 @@ Result = TypeVar("Result")
 
 LOOK_AHEAD_PER_WORKER = 2
 """Items handed out and not yet taken back, for each worker: one in work and one waiting."""
+MOST_ON_WINDOWS = 61
+"""Processes that one can wait for at once on Windows: 64 objects, less those of the pool itself."""
 THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "RAYON_NUM_THREADS")
 """Where OpenMP, the linear algebra libraries and Rerun look for the number of threads when loaded."""
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3
@@ -53,12 +55,12 @@ class Workers(Generic[Item, Result]):
     function : callable
         With more than one worker it must be picklable, like its argument and its result.
     count : int
-        Processes; with 1 the work is done in this one.
+        Processes, see `usable_processes`; with 1 the work is done in this one.
     """
 
     def __init__(self, function: Callable[[Item], Result], count: int = 1) -> None:
         self._function = function
-        self._count = count
+        self._count = usable_processes(count)
         self._stack = ExitStack()
         self._pool: ProcessPoolExecutor | None = None
         self._folders: tuple[str, ...] = ()
@@ -145,6 +147,11 @@ class Workers(Generic[Item, Result]):
                     result = _call_on_one_thread(self._function, item)
                 before, result = (item, result), None
             yield before
+
+
+def usable_processes(count: int, platform: str = sys.platform) -> int:
+    """Return how many of so many worker processes the system lets one wait for at once."""
+    return min(count, MOST_ON_WINDOWS) if platform == "win32" else count
 
 
 def ordered_map(

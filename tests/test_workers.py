@@ -12,7 +12,7 @@ import pytest
 
 from rose2_logs import parcels
 from rose2_logs.errors import InvalidMapError
-from rose2_logs.workers import LOOK_AHEAD_PER_WORKER, WorkerError, Workers, ordered_map
+from rose2_logs.workers import LOOK_AHEAD_PER_WORKER, WorkerError, Workers, ordered_map, usable_processes
 
 
 def slow_square(number: int) -> int:
@@ -130,3 +130,9 @@ def test_a_process_is_held_to_one_thread_also_by_libraries_loaded_later():
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert done.stdout == "{1}\n"
+
+
+def test_more_processes_than_windows_can_wait_for_are_not_started():
+    """A machine of 64 cores would otherwise fail before its first map."""
+    assert [usable_processes(count, "win32") for count in (1, 61, 62, 128)] == [1, 61, 61, 61]
+    assert usable_processes(128, "linux") == 128

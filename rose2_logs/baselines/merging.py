@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from rose2_logs.baseline_parameters import VoronoiMergeParameters
 from rose2_logs.baselines.regions import ranks_by_size
+from rose2_logs.occupancy import distinct_labels, roots
 
 WALL = 0
 
@@ -31,7 +32,7 @@ def merge_rooms(
     Returns
     -------
     labels : (H, W) int32
-        Rooms 1.. in the order of the lowest label that each holds.
+        Rooms 1.. in the order of the labels that the others were joined to.
     """
     rooms = _Rooms(labels, resolution_m)
     # Only rooms near the last two that were joined can have become joinable.
@@ -47,12 +48,12 @@ def merge_rooms(
         rooms.join(room, target)
         for changed in sorted(rooms.within_two(target)):
             heapq.heappush(pending, rooms.turn(changed))
-    held = rooms.joined_to[labels]
-    held[labels == WALL] = WALL
-    kept = np.unique(held[held != WALL])
-    number = np.zeros(len(rooms.joined_to), np.int32)
+    present, _ = distinct_labels(labels)
+    holder = roots(rooms.joined_to)
+    kept = np.unique(holder[present[present != WALL]])
+    number = np.zeros(len(holder), np.int32)
     number[kept] = np.arange(1, len(kept) + 1)
-    return number[held]
+    return number[holder][labels]
 
 
 def _is_joined(rooms: _Rooms, room: int, target: int, p: VoronoiMergeParameters) -> bool:
@@ -85,7 +86,7 @@ class _Rooms:
     area_m2 : list of float
         By label; the first, of cells of no room, is not used.
     joined_to : (N,) int
-        Label that holds each label's cells now.
+        Label that each was made part of, which may be part of another since; itself where it was not.
     """
 
     def __init__(self, labels: NDArray[np.int32], resolution_m: float) -> None:
@@ -142,7 +143,7 @@ class _Rooms:
         self._perimeter[target] += self._perimeter[room] - 2 * common
         self._border[room] = {}
         self.area_m2[target] += self.area_m2[room]
-        self.joined_to[self.joined_to == room] = target
+        self.joined_to[room] = target
 
 
 def _borders(labels: NDArray[np.int32]) -> tuple[list[int], list[int], list[int]]:

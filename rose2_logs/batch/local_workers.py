@@ -15,7 +15,7 @@ from types import TracebackType
 from typing import Self
 
 from rose2_logs.batch.task import LogOutcome, LogTask, Progress, analyse_task
-from rose2_logs.workers import limit_process_to_one_thread
+from rose2_logs.workers import limit_process_to_one_thread, usable_processes
 
 DEATH_TIMEOUT_S = 5.0
 """For a process that has closed its pipe to be gone, so that its exit code can be told."""
@@ -27,11 +27,11 @@ class LocalWorkers:
     Parameters
     ----------
     count : int
-        Most processes at a time.
+        Most processes at a time, see `usable_processes`.
     """
 
     def __init__(self, count: int) -> None:
-        self._count = count
+        self._count = usable_processes(count)
         self._waiting: deque[LogTask] = deque()
         self._idle: list[_Worker] = []
         self._busy: list[_Worker] = []

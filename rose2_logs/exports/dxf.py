@@ -23,6 +23,8 @@ LAYERS = {ROOMS: 7, PREDICTED: 8, DOORWAYS: 1, WALLS: 7, LABELS: 7}
 """Layers and their colours by AutoCAD's index: 7 is black or white, 8 grey, 1 red."""
 TEXT_HEIGHT_M = 0.25
 """Labels can be read on a print at 1:100 (2.5 mm)."""
+LABEL_RISE_M = 0.75 * TEXT_HEIGHT_M
+"""The middles of a label's two lines lie this far above and below its point: half a line apart."""
 HATCH_PATTERN, HATCH_SCALE = "ANSI31", 0.08
 """Lines at 45 degrees about a quarter of a metre apart."""
 
@@ -45,6 +47,9 @@ def write_dxf(plan: RoomPlan, path: Path) -> None:
         for name, colour in LAYERS.items():
             document.layers.add(name, color=colour)
         _draw(plan, document.modelspace())
+        # Of itself it lists the classes in the order of a set, which changes from run to run.
+        for name in sorted(document.entitydb.dxf_types_in_use()):
+            document.classes.add_class(name)
         with replacing(path) as part:
             document.saveas(part)
     finally:
@@ -74,9 +79,9 @@ def _draw(plan: RoomPlan, space: Modelspace) -> None:
         if room.label_point_m is None:
             continue
         x, y = room.label_point_m
-        for text, rise in ((room.name, 0.75), (f"{room.area_m2:.1f} m2", -0.75)):
+        for text, rise in ((room.name, LABEL_RISE_M), (f"{room.area_m2:.1f} m2", -LABEL_RISE_M)):
             label = space.add_text(text, height=TEXT_HEIGHT_M, dxfattribs={"layer": LABELS})
-            label.set_placement((x, y + rise * TEXT_HEIGHT_M), align=TextEntityAlignment.MIDDLE_CENTER)
+            label.set_placement((x, y + rise), align=TextEntityAlignment.MIDDLE_CENTER)
     for door in plan.doorways:
         start, end = door.ends_m.tolist()
         space.add_line(start, end, dxfattribs={"layer": DOORWAYS})

@@ -21,6 +21,8 @@ logger = logging.getLogger(__name__)
 ROOM_VALUES = 99
 """An occupancy grid holds 0 for free and 100 for occupied; the values between are for rooms."""
 FREE, OCCUPIED, UNKNOWN_PIXEL = 0, 100, 255
+OCCUPIED_THRESH, FREE_THRESH = 0.65, 0.196
+"""Defaults of map_server, which must be there; in the mode `raw` they mean nothing."""
 ENDINGS = (".rooms.pgm", ".rooms.yaml", ".rooms.list.yaml", ".rooms.labels.png")
 """The image, its description for map_server, what rooms its values are, and the rooms by their numbers."""
 
@@ -70,8 +72,8 @@ def write_labelled_map(plan: RoomPlan, folder: Path, stem: str) -> tuple[Path, .
         "resolution": geometry.resolution_m,
         "origin": [*geometry.origin_xy_m, geometry.yaw_rad],
         "negate": 0,
-        "occupied_thresh": 0.65,
-        "free_thresh": 0.196,
+        "occupied_thresh": OCCUPIED_THRESH,
+        "free_thresh": FREE_THRESH,
     }
     _write_yaml(about, described)
     _write_yaml(listing, _listing(plan, values, about.name, labels.name))

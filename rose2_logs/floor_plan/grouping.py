@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rose2_logs.floor_plan.evidence import EdgeEvidence
-from rose2_logs.occupancy import FloatArray
+from rose2_logs.occupancy import FloatArray, roots
 from rose2_logs.parameters import FloorPlanParameters
 
 Border = tuple[float, float, float]
@@ -158,7 +158,7 @@ class _Groups:
 
     def labels(self) -> NDArray[np.int32]:
         """Group of each face, 0.., -1 for faces that take no part."""
-        root = _roots(self._parent)
+        root = roots(self._parent)
         group = np.full(len(root), -1, np.int32)
         group[self._active] = np.unique(root[self._active], return_inverse=True)[1]
         return group
@@ -181,11 +181,3 @@ def _borders(
         border = (before[0] + open_m, before[1] + closed_m, max(before[2], passage))
         borders[a][b] = borders[b][a] = border
     return borders
-
-
-def _roots(parent: NDArray[np.intp]) -> NDArray[np.intp]:
-    while True:
-        above = parent[parent]
-        if np.array_equal(above, parent):
-            return parent
-        parent = above

@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 
 from rose2_logs.circular_peaks import circular_peaks
 from rose2_logs.explored import ExploredPart
-from rose2_logs.occupancy import UNKNOWN, BoolArray, FloatArray, OccupancySnapshot, classify
+from rose2_logs.occupancy import UNKNOWN, BoolArray, FloatArray, OccupancySnapshot, classify, known_window
 from rose2_logs.parameters import OccupancyParameters, SpectrumParameters
 from rose2_logs.rose.spectrum import angular_energy, compute_spectrum
 from rose2_logs.tracking.alignment import POINTS_MIN, RigidMotion, WallFit, evenly, wall_points
@@ -32,7 +32,7 @@ building, drawn years apart, still have more walls in common than not."""
 RASTER_M = 0.2
 """Cells of the rasters whose shifts are searched; the fit bridges two of them."""
 RASTER_MOST = 1024
-"""Most such cells along a map's side; they are larger in larger maps."""
+"""Most such cells along the side of what a map shows; they are larger in larger maps."""
 WALL_BLUR_M = 0.5
 """Nearness to a wall falls from 1 to 0 over this length: the fit's first gate."""
 TURNS_MOST = 6
@@ -109,6 +109,12 @@ class PlacedMap:
     def resolution_m(self) -> float:
         """Side of a cell."""
         return self.snapshot.geometry.resolution_m
+
+    @property
+    def side_m(self) -> float:
+        """Longer side of the part that is free or occupied, which may reach far beyond the walls."""
+        sides = (along.stop - along.start for along in known_window(self.free | self.occupied))
+        return float(max(sides) * self.resolution_m)
 
     @property
     def can_be_placed(self) -> bool:
@@ -212,9 +218,7 @@ class _Agreement:
 
 def _starts(moving: PlacedMap, fixed: PlacedMap) -> list[RigidMotion]:
     """Places to fit from, the most promising first."""
-    cell_m = max(
-        RASTER_M, *(float(np.ptp(each.walls, axis=0).max()) / RASTER_MOST for each in (moving, fixed))
-    )
+    cell_m = max(RASTER_M, *(each.side_m / RASTER_MOST for each in (moving, fixed)))
     search = _ShiftSearch(moving, fixed, cell_m)
     found = [start for turn in _turns(moving, fixed) for start in search.best(turn)]
     found.sort(key=lambda each: -each[0])

@@ -13,6 +13,7 @@ from rose2_logs.layouts.layout import FinalLayout
 from rose2_logs.occupancy import BoolArray, FloatArray
 from rose2_logs.tracking.alignment import RigidMotion
 from rose2_logs.tracking.matching import assign
+from rose2_logs.tracking.overlap import share_of
 
 RoomStatus = Literal[
     "same", "partly seen", "changed", "split", "merged", "regrouped", "missing", "new", "unseen"
@@ -138,7 +139,7 @@ def _groups(
     """Rows and columns that belong together: pairs, what is part of one of a pair, and single ones."""
     smaller = np.minimum(sizes_a[:, None], sizes_b[None])
     union = sizes_a[:, None] + sizes_b[None] - common
-    iou = np.divide(common, union, out=np.zeros_like(common), where=union > 0)
+    iou = share_of(common, union)
     is_part: BoolArray = (common > 0) & (common >= PART_MIN_SHARE * smaller)
     pairs = assign(iou**2, (iou >= PAIR_MIN_IOU) | is_part)
     links = set(pairs)

@@ -64,7 +64,7 @@ class WallChange:
     @property
     def length_m(self) -> float:
         """Length in metres; of a moved wall, that of the longer stretch."""
-        return max(_length(ends) for ends in (self.ends_a_m, self.ends_b_m) if ends is not None)
+        return max(float(_lengths(ends)) for ends in (self.ends_a_m, self.ends_b_m) if ends is not None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,17 +135,17 @@ def _look_up(
     placed = to_other.points(points)
     reach_m = max(own.map.reach_m, other.map.reach_m)
     on = other.map.on_wall(placed, reach_m)
-    start, end = walls.segments_m[segment, :2], walls.segments_m[segment, 2:]
-    forward = (end - start) / np.maximum(np.linalg.norm(end - start, axis=1), 1e-9)[:, None]
+    along = walls.segments_m[segment]
+    forward = (along[:, 2:] - along[:, :2]) / np.maximum(_lengths(along), 1e-9)[:, None]
     aside = reach_m * np.column_stack([-forward[:, 1], forward[:, 0]])
     free = ~on
     for seen in (points, points + aside, points - aside):
         free &= other.map.is_free(to_other.points(seen))
     cluster = _clusters(walls)[segment]
+    by_cluster = np.argsort(cluster, kind="stable")
     gone = []
     compared = kept = 0
-    for each in np.unique(cluster).tolist():
-        chosen = cluster == each
+    for chosen in np.split(by_cluster, np.flatnonzero(np.diff(cluster[by_cluster])) + 1):
         longest = _longest(walls.segments_m[np.unique(segment[chosen])])
         stretches, told, there = _stretches(points[chosen], on[chosen], free[chosen], longest, reach_m)
         gone.append(stretches)
@@ -156,7 +156,7 @@ def _look_up(
 def _along(segments_m: FloatArray) -> tuple[FloatArray, NDArray[np.intp], BoolArray]:
     """Points (K, 2) along segments and some way beyond, the segment of each, and which lie beyond it."""
     start, end = segments_m[:, :2], segments_m[:, 2:]
-    counts = np.maximum(np.ceil(np.linalg.norm(end - start, axis=1) / STEP_M).astype(int), 1)
+    counts = np.maximum(np.ceil(_lengths(segments_m) / STEP_M).astype(int), 1)
     more = round(BEYOND_M / STEP_M)
     longer = counts + 2 * more
     segment = np.repeat(np.arange(len(counts)), longer)
@@ -173,8 +173,7 @@ def _clusters(walls: Walls) -> NDArray[np.int64]:
 
 
 def _longest(segments_m: FloatArray) -> FloatArray:
-    lengths = np.linalg.norm(segments_m[:, 2:] - segments_m[:, :2], axis=1)
-    longest: FloatArray = segments_m[int(lengths.argmax())]
+    longest: FloatArray = segments_m[int(_lengths(segments_m).argmax())]
     return longest
 
 
@@ -186,7 +185,7 @@ def _stretches(
     A wall's faces are one wall: it is there where any of them is. What lies within reach of a wall that goes
     on or crosses seems to be there, so stretches are longer by this at both ends, as far as the wall reached.
     """
-    along = (line[2:] - line[:2]) / max(_length(line), 1e-9)
+    along = (line[2:] - line[:2]) / max(float(_lengths(line)), 1e-9)
     across = np.array([-along[1], along[0]])
     t, lateral = (points - line[:2]) @ along, (points - line[:2]) @ across
     step = np.floor(t / STEP_M).astype(int)
@@ -224,23 +223,23 @@ def _runs(gone: BoolArray, there: BoolArray) -> list[tuple[int, int]]:
 
 
 def _side_by_side(ones: FloatArray, others: FloatArray) -> list[tuple[int, int, float]]:
-    """Pairs of stretches that may be one wall that moved, and how far it did, metres."""
-    weight, shift = np.zeros((len(ones), len(others))), np.zeros((len(ones), len(others)))
-    for row, one in enumerate(ones):
-        length = _length(one)
-        along = (one[2:] - one[:2]) / length
-        for column, other in enumerate(others):
-            ends = other.reshape(2, 2) - one[:2]
-            t, lateral = ends @ along, ends @ np.array([-along[1], along[0]])
-            overlap = min(length, t.max()) - max(0.0, t.min())
-            turn = np.arctan2(abs(lateral[1] - lateral[0]), abs(t[1] - t[0]))
-            apart = abs(float(lateral.mean()))
-            shorter = min(length, _length(other))
-            if turn <= MOVED_MAX_TURN_RAD and apart <= MOVED_MAX_M and overlap >= MOVED_MIN_OVERLAP * shorter:
-                weight[row, column] = overlap / max(length, _length(other)) / (1 + apart)
-                shift[row, column] = apart
-    return [(row, column, float(shift[row, column])) for row, column in assign(weight, weight > 0)]
+    """Pairs of stretches (A, 4) and (B, 4) that may be one wall that moved, and how far it did, metres."""
+    lengths, other_lengths = _lengths(ones)[:, None], _lengths(others)
+    along = (ones[:, 2:] - ones[:, :2]) / lengths
+    across = np.column_stack([-along[:, 1], along[:, 0]])
+    # Both ends (A, B, 2) of every other stretch, along each one and across it.
+    ends = others.reshape(-1, 2, 2) - ones[:, None, None, :2]
+    t, lateral = ((ends @ axis[:, None, :, None])[..., 0] for axis in (along, across))
+    overlap = np.minimum(lengths, t.max(axis=2)) - np.maximum(0.0, t.min(axis=2))
+    turn = np.arctan2(np.abs(np.diff(lateral)), np.abs(np.diff(t)))[..., 0]
+    apart = np.abs(lateral.mean(axis=2))
+    fits = (turn <= MOVED_MAX_TURN_RAD) & (apart <= MOVED_MAX_M)
+    fits &= overlap >= MOVED_MIN_OVERLAP * np.minimum(lengths, other_lengths)
+    weight = overlap / np.maximum(lengths, other_lengths) / (1 + apart)
+    return [(row, column, float(apart[row, column])) for row, column in assign(weight, fits)]
 
 
-def _length(ends: FloatArray) -> float:
-    return float(np.hypot(*(ends[2:] - ends[:2])))
+def _lengths(ends: FloatArray) -> FloatArray:
+    """Length of each of some stretches (..., 4), metres."""
+    lengths: FloatArray = np.hypot(ends[..., 2] - ends[..., 0], ends[..., 3] - ends[..., 1])
+    return lengths

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import logging
+from collections import deque
 from collections.abc import Iterator
 from types import TracebackType
 from typing import Self
@@ -120,9 +121,10 @@ class LogReader:
         counts = ReadCounts()
         # From the end back: a log may end with messages that are damaged or hold no cells.
         for time in np.unique(self._times_in_range())[::-1]:
-            snapshot = next(self._read(np.array([time]), counts), None)
-            if snapshot is not None:
-                return dataclasses.replace(snapshot, index=-1)
+            # Of several of one time, as in logs without times, it is the last one too.
+            latest = deque(self._read(np.array([time]), counts), maxlen=1)
+            if latest:
+                return dataclasses.replace(latest[0], index=-1)
         raise self._no_map(counts)
 
     def robot_path(self, frame_id: str) -> RobotPath:

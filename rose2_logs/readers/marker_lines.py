@@ -13,7 +13,7 @@ MARKERS_TYPE = "visualization_msgs/msg/MarkerArray"
 
 
 def read_marker_lines(path: Path, topic: str, namespace: str, log_time_ns: int) -> FloatArray | None:
-    """Read the line list of one namespace from the markers logged at a time.
+    """Read the line list of one namespace from the markers logged at a time, of several the last.
 
     Returns
     -------
@@ -30,6 +30,7 @@ def read_marker_lines(path: Path, topic: str, namespace: str, log_time_ns: int) 
     from rosbags.typesys import Stores, get_typestore
 
     store = get_typestore(Stores.ROS2_HUMBLE)
+    lines = None
     try:
         with path.open("rb") as file:
             found = make_reader(file).iter_messages(
@@ -42,7 +43,7 @@ def read_marker_lines(path: Path, topic: str, namespace: str, log_time_ns: int) 
                 for marker in array.markers:  # type: ignore[attr-defined]
                     if marker.ns == namespace:
                         ends = [(point.x, point.y) for point in marker.points]
-                        return np.array(ends, np.float64).reshape(-1, 2, 2)
+                        lines = np.array(ends, np.float64).reshape(-1, 2, 2)
     except (OSError, McapError, ValueError) as error:
         raise LogError(f"{path}: cannot be read: {error}; analyze the log again") from error
-    return None
+    return lines

@@ -187,7 +187,7 @@ def software_table(results: RunResults) -> Table:
     """Log, fingerprint, software and times of the run."""
     summary = results.summary
     about = {"SHA-256 of the log": summary.get("input", {}).get("sha256", MISSING)}
-    about |= {f"{name}": version for name, version in summary.get("versions", {}).items()}
+    about |= summary.get("versions", {})
     seconds = summary.get("seconds", {})
     if "run" in seconds:
         about["time of the analysis"] = f"{seconds['run']:.1f} s, {seconds.get('workers', 1)} process(es)"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -50,20 +49,19 @@ class RunMaps:
         return self
 
     def __exit__(self, *ended: object) -> None:
-        with closing(self._source):
-            pass
+        self._source.close()
 
     def read(self, log_time_ns: int, rooms: Sequence[PlanRoom]) -> PlanMap:
-        """Return the map logged at a time, with the cells of the rooms found in it.
+        """Return the map logged at a time, of several the last, with the cells of the rooms found in it.
 
         Raises
         ------
         LogError
             If it is not there or cannot be read.
         """
-        segmented = self._first(SEGMENTED_TOPIC, log_time_ns)
+        segmented = self._logged(SEGMENTED_TOPIC, log_time_ns)
         try:
-            cells = self._first(self._topic, log_time_ns).cells
+            cells = self._logged(self._topic, log_time_ns).cells
         except LogError:
             cells = segmented.cells
         if cells.shape != segmented.cells.shape:
@@ -73,8 +71,8 @@ class RunMaps:
         cells = np.where((cells is segmented.cells) & (labels > 0), np.int8(0), cells)
         return PlanMap(segmented.geometry, cells, labels)
 
-    def _first(self, topic: str, log_time_ns: int) -> OccupancySnapshot:
-        return LogReader(self._source, topic, Selection(start_ns=log_time_ns, end_ns=log_time_ns)).first()
+    def _logged(self, topic: str, log_time_ns: int) -> OccupancySnapshot:
+        return LogReader(self._source, topic, Selection(start_ns=log_time_ns, end_ns=log_time_ns)).last()
 
     def walls_m(self, log_time_ns: int) -> NDArray[np.float64] | None:
         """Ends (N, 2, 2) of the wall segments of a map, None if none are there.

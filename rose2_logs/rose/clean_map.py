@@ -26,6 +26,15 @@ def structure_score(
     of the cell's neighbourhood along the wall that is occupied, so that a straight wall without an end
     scores 1, whatever its thickness, the size of the map, and the number of walls in it.
 
+    Parameters
+    ----------
+    spectrum : Spectrum
+        Of the occupied cells.
+    occupied : (H, W) bool
+    directions_rad : (D,) float
+        Dominant directions; without any, every cell scores 0.
+    parameters : SpectrumParameters
+
     Returns
     -------
     score : (H, W) float32
@@ -54,6 +63,15 @@ def supported_cells(
 
     A piece is what hangs together over gaps of `piece_max_gap_m`. One shorter than `piece_min_extent_m` is a
     wall only where it lies in line with others, which its mean score tells.
+
+    Parameters
+    ----------
+    score : (H, W) float32
+        See `structure_score`.
+    occupied : (H, W) bool
+    resolution_m : float
+        Side of a cell.
+    parameters : SpectrumParameters
 
     Returns
     -------
@@ -89,10 +107,19 @@ def clean_threshold(
 
     Parameters
     ----------
+    score : (H, W) float32
+        See `structure_score`.
+    occupied : (H, W) bool
     free_m2 : float
         Free area of the map.
     count_walls : callable
-        Number of wall clusters of a clean map.
+        Number of wall clusters of a clean map (H, W).
+    parameters : SpectrumParameters
+
+    Returns
+    -------
+    float
+        Where no threshold leaves few enough, the highest.
     """
     allowed = parameters.walls_max_per_m2 * free_m2
     step = parameters.threshold_step
@@ -108,7 +135,7 @@ def clean_threshold(
 
 
 def attached_cells(clean: BoolArray, candidates: BoolArray) -> BoolArray:
-    """Add to the clean map the candidates that are connected with it: a threshold with hysteresis.
+    """Add to the clean map (H, W) the candidates (H, W) connected with it: a threshold with hysteresis.
 
     Jambs and ends of walls have a low score, for half of their neighbourhood is open.
     """

@@ -6,7 +6,7 @@ import json
 import logging
 from collections import deque
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
 from typing import IO, Any, Self
@@ -103,14 +103,14 @@ class AnnotatedMcap:
         self._opened_source: MessageSource | None = None
         if self._source is None:
             self._opened_source = self._source = open_source(self._info.log_path)
-        self._log: CopiedLog = copied_log(self._source)
         try:
+            self._log: CopiedLog = copied_log(self._source)
             with self._writing():
                 self._path.parent.mkdir(parents=True, exist_ok=True)
                 self._file = self._part.open("wb")
                 self._begin(self._file)
         except BaseException:
-            self._abandon()
+            self._clean_up()
             raise
         return self
 
@@ -183,7 +183,7 @@ class AnnotatedMcap:
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
         if kind is not None:
-            self._abandon()
+            self._clean_up()
             return
         try:
             with self._writing():
@@ -197,7 +197,7 @@ class AnnotatedMcap:
                 self._part.replace(self._path)
                 self._describe()
         finally:
-            self._abandon()
+            self._clean_up()
 
     def _describe(self) -> None:
         """Write what opens the file: layouts of viewers, and the bag's description."""
@@ -297,11 +297,14 @@ class AnnotatedMcap:
         self._own[channel].add(time_ns, time_ns, self._sequence, data)
         self._writer.add_message(channel, time_ns, data, time_ns, self._sequence)
 
-    def _abandon(self) -> None:
+    def _clean_up(self) -> None:
+        """Close both files; what has not been renamed by now is removed."""
         if self._opened_source is not None:
             self._opened_source.close()
         if self._file is not None:
-            self._file.close()
+            # Closing writes what waits: where the disk is full, that fails once more, and hides why it began.
+            with suppress(OSError):
+                self._file.close()
         self._part.unlink(missing_ok=True)
 
     @contextmanager

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
@@ -53,23 +54,21 @@ def write_bag_metadata(log: Path, path: Path) -> None:
             "message_count": count,
         }
     duration_ns = statistics.message_end_time - statistics.message_start_time
-    bag, file_in_it = (
-        {
-            "starting_time": {"nanoseconds_since_epoch": statistics.message_start_time},
-            "duration": {"nanoseconds": duration_ns},
-            "message_count": statistics.message_count,
-        }
-        for _ in range(2)
-    )
+    contents = {
+        "starting_time": {"nanoseconds_since_epoch": statistics.message_start_time},
+        "duration": {"nanoseconds": duration_ns},
+        "message_count": statistics.message_count,
+    }
     described = {
         "version": VERSION,
         "storage_identifier": "mcap",
         "relative_file_paths": [log.name],
-        **bag,
+        **contents,
         "topics_with_message_count": list(topics.values()),
         "compression_format": "",
         "compression_mode": "",
-        "files": [{"path": log.name, **file_in_it}],
+        # A copy, which YAML would else write as a reference to the first.
+        "files": [{"path": log.name, **deepcopy(contents)}],
     }
     with replacing(path) as part:
         text = yaml.safe_dump({"rosbag2_bagfile_information": described}, sort_keys=False)

@@ -8,36 +8,25 @@ from __future__ import annotations
 
 import hashlib
 import struct
-import zlib
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
 
-import lz4.frame
-import zstandard
-from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.reader import make_reader
 
 from rose2_logs.errors import OutputError
+from rose2_logs.readers.mcap_index import DAMAGE
+from rose2_logs.readers.mcap_records import MAGIC, MESSAGE, RECORD, chunk_records, records_in
 from rose2_logs.sinks.mcap_input import CopiedChunk, CopiedMessage
 
 HASH_BYTES = 16
 LARGEST_CHUNK_BYTES = 1 << 30
 """A chunk that is said to be larger is not looked into; it is copied all the same."""
-MAGIC_BYTES = 8
-UNKNOWN_SIZE = -1
-"""Of a zstd frame that does not tell it."""
-DAMAGE = (ValueError, RuntimeError, EOFError, struct.error, zstandard.ZstdError)
-"""What is raised on a chunk whose bytes are not what they should be."""
 
-_RECORD = struct.Struct("<BQ")  # opcode, length of what follows
-_MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time; then the data
-_CHUNK = struct.Struct("<QQQII")  # first and last log time, size and CRC-32 of the records, length of a name
 _TIMES = struct.Struct("<QQI")
-_SIZE = struct.Struct("<Q")
 
 
 @dataclass
@@ -100,8 +89,8 @@ class Tallies(defaultdict[int, Tally]):
             self[channel].merge(Tally(-tally.messages, -tally.hashes))
 
     def _take_copied(self, chunk: CopiedChunk) -> None:
-        chunk.stream.seek(chunk.index.chunk_start_offset + _RECORD.size)
-        self._take_chunk(chunk.stream, chunk.index.chunk_length - _RECORD.size)
+        chunk.stream.seek(chunk.index.chunk_start_offset + RECORD.size)
+        self._take_chunk(chunk.stream, chunk.index.chunk_length - RECORD.size)
 
     def take_file(self, file: IO[bytes]) -> None:
         """Count the messages of an MCAP file from its first record to its data's end.
@@ -111,12 +100,12 @@ class Tallies(defaultdict[int, Tally]):
         ValueError
             If it ends before.
         """
-        file.seek(MAGIC_BYTES)
+        file.seek(len(MAGIC))
         while True:
-            head = file.read(_RECORD.size)
-            if len(head) < _RECORD.size:
+            head = file.read(RECORD.size)
+            if len(head) < RECORD.size:
                 raise ValueError("it is cut off")
-            opcode, length = _RECORD.unpack(head)
+            opcode, length = RECORD.unpack(head)
             end = file.tell() + length
             if opcode == Opcode.DATA_END:
                 return
@@ -130,8 +119,11 @@ class Tallies(defaultdict[int, Tally]):
         """Count the messages of a chunk, all or none."""
         found: dict[int, Tally] = defaultdict(Tally)
         try:
-            for message in _messages(_chunk_records(file, length)):
-                _take_message(found, message)
+            if length > LARGEST_CHUNK_BYTES:
+                raise ValueError("larger than is looked into")
+            for record in records_in(chunk_records(file.read(length), LARGEST_CHUNK_BYTES)):
+                if record.opcode == Opcode.MESSAGE:
+                    _take_message(found, record.content)
         except DAMAGE:
             self.closed_chunks += 1
             return
@@ -140,45 +132,8 @@ class Tallies(defaultdict[int, Tally]):
 
 
 def _take_message(tallies: dict[int, Tally], message: memoryview) -> None:
-    channel, sequence, log_time, publish_time = _MESSAGE.unpack_from(message)
-    tallies[channel].add(log_time, publish_time, sequence, message[_MESSAGE.size :])
-
-
-def _chunk_records(file: IO[bytes], length: int) -> memoryview:
-    """Decompressed records of a chunk, whose content begins here; ValueError if they are not sound."""
-    head = file.read(_CHUNK.size)
-    _, _, size, checksum, name_length = _CHUNK.unpack(head)
-    name = file.read(name_length)
-    (packed_size,) = _SIZE.unpack(file.read(_SIZE.size))
-    if max(size, packed_size) > LARGEST_CHUNK_BYTES or packed_size > length:
-        raise ValueError("larger than is looked into")
-    packed = file.read(packed_size)
-    if name == b"":
-        records = packed
-    elif name == b"zstd":
-        # The frame's own statement goes before any limit.
-        if zstandard.frame_content_size(packed) not in (size, UNKNOWN_SIZE) or size == 0:
-            raise ValueError("of another size than it says")
-        records = zstandard.ZstdDecompressor().decompress(packed, max_output_size=size)
-    elif name == b"lz4":
-        records = lz4.frame.LZ4FrameDecompressor().decompress(packed, max_length=size)
-    else:
-        raise ValueError(f"compressed by {name!r}")
-    if len(records) != size or (checksum and zlib.crc32(records) != checksum):
-        raise ValueError("not the bytes that were written")
-    return memoryview(records)
-
-
-def _messages(records: memoryview) -> Iterator[memoryview]:
-    place = 0
-    while place < len(records):
-        opcode, length = _RECORD.unpack_from(records, place)
-        begin = place + _RECORD.size
-        place = begin + length
-        if opcode == 0 or place > len(records):
-            raise ValueError("no record")
-        if opcode == Opcode.MESSAGE:
-            yield records[begin:place]
+    channel, sequence, log_time, publish_time = MESSAGE.unpack_from(message)
+    tallies[channel].add(log_time, publish_time, sequence, message[MESSAGE.size :])
 
 
 def checked_copy(
@@ -213,7 +168,7 @@ def checked_copy(
             found.take_file(file)
             file.seek(0)
             summary = make_reader(file).get_summary()
-    except (McapError, *DAMAGE) as error:
+    except DAMAGE as error:
         raise OutputError(f"{name}: is not as it was written: {error}") from error
     if summary is None or summary.statistics is None:
         raise OutputError(f"{name}: is not as it was written: it has no summary")

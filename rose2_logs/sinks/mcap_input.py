@@ -16,7 +16,7 @@ from rose2_logs.notices import notice
 from rose2_logs.readers.file_log import FileLog
 from rose2_logs.readers.log_file import Channel, LogFile, StoredMessage
 from rose2_logs.readers.mcap_index import McapFile
-from rose2_logs.readers.mcap_records import Summary
+from rose2_logs.readers.mcap_records import INDEX, INDEX_ENTRY, Summary
 from rose2_logs.readers.source import MessageSource
 from rose2_logs.sinks.ros_messages import ros2_typestore
 
@@ -33,8 +33,6 @@ LATCHED_QOS = (
     "  avoid_ros_namespace_conventions: false"
 )
 """Keep last, depth 1, reliable, transient local: how ROS 2 publishes maps; rosbag2's spelling."""
-INDEX_RECORD_BYTES, INDEX_ENTRY_BYTES = 15, 16
-"""Of an MCAP's message index: record head, channel, length of the entries; log time and offset."""
 
 
 @dataclass(frozen=True)
@@ -199,14 +197,14 @@ class _McapLog(CopiedLog):
 def _is_all_in_indexed_chunks(summary: Summary) -> bool:
     """Whether every message lies in a chunk that is followed by its message index.
 
-    An index record is 15 bytes and 16 for each message, so that its length tells how many there are.
+    Of an index record all but the head is of one length for each message, and so tells how many there are.
     """
     indexed = 0
     for chunk in summary.chunks:
         offsets = chunk.message_index_offsets
         if offsets and min(offsets.values()) != chunk.chunk_start_offset + chunk.chunk_length:
             return False
-        indexed += (chunk.message_index_length - INDEX_RECORD_BYTES * len(offsets)) // INDEX_ENTRY_BYTES
+        indexed += (chunk.message_index_length - INDEX.size * len(offsets)) // INDEX_ENTRY.size
     return (
         summary.statistics.message_count == indexed
         and summary.statistics.chunk_count == len(summary.chunks)

@@ -32,15 +32,15 @@ from mcap.records import (
     SummaryOffset,
 )
 
-MAGIC = b"\x89MCAP0\r\n"
+from rose2_logs.readers.mcap_records import INDEX, INDEX_ENTRY, MAGIC, RECORD
+
 CHUNK_BYTES = 1 << 20
 """Messages are compressed together from this size on; as the mcap package's writer does."""
 COPIED_AT_ONCE = 16 << 20
 """Bytes of a chunk that are in memory at a time while it is copied."""
 
-_RECORD = struct.Struct("<BQ")  # opcode, length of what follows
-_MESSAGE = struct.Struct("<BQHIQQ")  # and channel, sequence, log time, publish time; then the data
-_INDEX = struct.Struct("<BQHI")  # and channel, length of the entries of 16 bytes each
+# Head of a record and what a message begins with, for one call: channel, sequence, log time, publish time.
+_MESSAGE = struct.Struct("<BQHIQQ")
 
 
 class McapWriter:
@@ -71,7 +71,7 @@ class McapWriter:
         self._write_record(Header(profile, library))
 
     def register_schema(self, name: str, encoding: str, data: bytes, wanted_id: int | None = None) -> int:
-        """Add a schema and return its id: the wanted one, if it is free."""
+        """Add a schema and return its id: the wanted one, which is not 0, if it is free."""
         number = _free_id(wanted_id, self._schemas)
         self._schemas[number] = Schema(id=number, name=name, encoding=encoding, data=data)
         self._write_record(self._schemas[number])
@@ -85,7 +85,7 @@ class McapWriter:
         metadata: dict[str, str],
         wanted_id: int | None = None,
     ) -> int:
-        """Add a channel and return its id: the wanted one, if it is free; schema 0 is none."""
+        """Add a channel and return its id: the wanted one, 0 too, if it is free; schema 0 is none."""
         number = _free_id(wanted_id, self._channels)
         self._channels[number] = Channel(
             id=number, topic=topic, message_encoding=message_encoding, schema_id=schema_id, metadata=metadata
@@ -103,7 +103,7 @@ class McapWriter:
     ) -> None:
         """Add one message to the chunk in the making; log time and publish time in nanoseconds."""
         self._entries.setdefault(channel_id, []).append((log_time, len(self._records)))
-        length = _MESSAGE.size - _RECORD.size + len(data)
+        length = _MESSAGE.size - RECORD.size + len(data)
         self._records += _MESSAGE.pack(Opcode.MESSAGE, length, channel_id, sequence, log_time, publish_time)
         self._records += data
         if len(self._records) >= CHUNK_BYTES:
@@ -266,7 +266,9 @@ class McapWriter:
 
 
 def _free_id(wanted: int | None, taken: dict[int, Any]) -> int:
-    return wanted if wanted and wanted not in taken else next(each for each in count(1) if each not in taken)
+    if wanted is not None and wanted not in taken:
+        return wanted
+    return next(each for each in count(1) if each not in taken)
 
 
 def _read(source: IO[bytes], length: int) -> bytes:
@@ -281,11 +283,11 @@ def _indexed_messages(message_index: bytes) -> Counter[int]:
     counts: Counter[int] = Counter()
     place = 0
     while place < len(message_index):
-        if place + _INDEX.size > len(message_index):
+        if place + INDEX.size > len(message_index):
             raise ValueError("a message index is damaged")
-        opcode, length, channel, entries = _INDEX.unpack_from(message_index, place)
-        if opcode != Opcode.MESSAGE_INDEX or length != _INDEX.size - _RECORD.size + entries:
+        opcode, length, channel, entries = INDEX.unpack_from(message_index, place)
+        if opcode != Opcode.MESSAGE_INDEX or length != INDEX.size - RECORD.size + entries:
             raise ValueError("a message index is damaged")
-        counts[channel] += entries // 16
-        place += _RECORD.size + length
+        counts[channel] += entries // INDEX_ENTRY.size
+        place += RECORD.size + length
     return counts

@@ -20,15 +20,18 @@ from rose2_logs.layouts.wall_changes import WALL_STATUSES
 from rose2_logs.occupancy import UNKNOWN, FloatArray, known_window
 from rose2_logs.sinks.layout_picture import ROOM_COLOURS, WALL_COLOURS
 from rose2_logs.sinks.palette import track_colour
-from rose2_logs.sinks.rerun_blueprint import EYE_HEIGHT
+from rose2_logs.sinks.rerun_blueprint import EYE_HEIGHT, PAPER
+from rose2_logs.sinks.rerun_world import LAYER_STEP_M, OUTLINE_POINTS, OUTLINE_SHADE
 from rose2_logs.sinks.ros_messages import outer_rings
 from rose2_logs.tracking.alignment import RigidMotion
 
-LAYER_STEP_M = 0.01
-"""Layers lie this far above each other, so that none flickers through another."""
-OUTLINE_POINTS, WALL_POINTS = 2.0, 4.0
-"""Widths of lines in points of the screen."""
+CELLS, FILLS, OUTLINES, WALLS, CHANGED_WALLS, NAMES = range(6)
+"""Layers above the map, from the lowest, each `LAYER_STEP_M` above the one before."""
+WALL_POINTS = 4.0
+"""Width of walls that differ in points of the screen."""
 FAINT = (110, 110, 110)
+CELLS_OF_A, CELLS_OF_B = (200, 120, 120), (120, 140, 200)
+"""Colours of both maps' occupied cells below what differs."""
 ROOM_ALPHA = 150
 """The map shows through rooms of this opacity, of 255."""
 WIDE_VIEW, FLAT_VIEW = 1.05, 1.65
@@ -47,7 +50,9 @@ def write_comparison_recording(path: Path, comparison: LayoutComparison) -> None
         If the file cannot be written.
     """
     with replacing(path) as part:
-        recording = rr.RecordingStream("rose2_logs_compare", recording_id=_recording_id(comparison))
+        recording = rr.RecordingStream(
+            "rose2_logs_compare", recording_id=f"{comparison.a.name}-{comparison.b.name}"
+        )
         recording.set_sinks(rr.FileSink(str(part)))
         for root in ("a", "b", "difference"):
             recording.log(f"/{root}", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
@@ -62,10 +67,6 @@ def write_comparison_recording(path: Path, comparison: LayoutComparison) -> None
         recording.disconnect()
 
 
-def _recording_id(comparison: LayoutComparison) -> str:
-    return f"{comparison.a.name}-{comparison.b.name}"
-
-
 def _log_layout(
     recording: rr.RecordingStream,
     root: str,
@@ -77,29 +78,29 @@ def _log_layout(
     group_of = {track: number for number, tracks in enumerate(groups, start=1) for track in tracks}
     named = list(zip(layout.tracks, layout.shapes_moved(motion), strict=True))
     for track, shape in named:
-        fill = _mesh([shape], track_colour(group_of[track]), 1, ROOM_ALPHA)
+        fill = _mesh([shape], track_colour(group_of[track]), ROOM_ALPHA)
         recording.log(f"/{root}/rooms/{track}", fill, static=True)
     rings = [(ring, track_colour(group_of[track])) for track, shape in named for ring in outer_rings(shape)]
-    recording.log(f"/{root}/outlines", _strips(rings, OUTLINE_POINTS, 2), static=True)
+    recording.log(f"/{root}/outlines", _strips(rings, OUTLINE_POINTS, OUTLINES), static=True)
     recording.log(
         f"/{root}/names", _names([shape for _, shape in named], list(map(str, layout.tracks))), static=True
     )
     if layout.walls is not None:
         ends = motion.points(layout.walls.segments_m.reshape(-1, 2, 2))
         recording.log(
-            f"/{root}/walls", _strips([(each, FAINT) for each in ends], OUTLINE_POINTS, 3), static=True
+            f"/{root}/walls", _strips([(each, FAINT) for each in ends], OUTLINE_POINTS, WALLS), static=True
         )
 
 
 def _log_differences(recording: rr.RecordingStream, comparison: LayoutComparison) -> None:
     # Both maps' walls below what differs.
     for root, layout, motion, colour in (
-        ("walls_of_a", comparison.a, RigidMotion.none(), (200, 120, 120)),
-        ("walls_of_b", comparison.b, comparison.placement.motion, (120, 140, 200)),
+        ("walls_of_a", comparison.a, RigidMotion.none(), CELLS_OF_A),
+        ("walls_of_b", comparison.b, comparison.placement.motion, CELLS_OF_B),
     ):
         points = motion.points(layout.map.snapshot.geometry.cell_centres(*np.nonzero(layout.map.occupied)))
         radius = layout.map.resolution_m / 2
-        lifted = rr.Points3D(_lifted(points, 0), radii=radius, colors=[colour])
+        lifted = rr.Points3D(_lifted(points, CELLS), radii=radius, colors=[colour])
         recording.log(f"/difference/{root}", lifted, static=True)
     for status in ROOM_STATUSES:
         changes = [change for change in comparison.rooms if change.status == status]
@@ -107,15 +108,15 @@ def _log_differences(recording: rr.RecordingStream, comparison: LayoutComparison
             continue
         path = f"/difference/rooms/{status.replace(' ', '_')}"
         wholes = [shapely.union(change.shape_a, change.shape_b) for change in changes]
-        recording.log(f"{path}/fill", _mesh(wholes, ROOM_COLOURS[status], 1), static=True)
-        dark = tuple(int(value * 0.6) for value in ROOM_COLOURS[status])
+        recording.log(f"{path}/fill", _mesh(wholes, ROOM_COLOURS[status]), static=True)
+        dark = tuple(int(value * OUTLINE_SHADE) for value in ROOM_COLOURS[status])
         rings = [
             (ring, dark)
             for change in changes
             for shape in (change.shape_a, change.shape_b)
             for ring in outer_rings(shape)
         ]
-        recording.log(f"{path}/outline", _strips(rings, OUTLINE_POINTS, 2), static=True)
+        recording.log(f"{path}/outline", _strips(rings, OUTLINE_POINTS, OUTLINES), static=True)
         said = "" if status == "same" else f"{status} "
         texts = [f"{said}{_numbers(change.tracks_a)} > {_numbers(change.tracks_b)}" for change in changes]
         recording.log(f"{path}/names", _names(wholes, texts), static=True)
@@ -129,7 +130,9 @@ def _log_differences(recording: rr.RecordingStream, comparison: LayoutComparison
             if ends is not None
         ]
         if lines:
-            recording.log(f"/difference/walls/{wall_status}", _strips(lines, WALL_POINTS, 4), static=True)
+            recording.log(
+                f"/difference/walls/{wall_status}", _strips(lines, WALL_POINTS, CHANGED_WALLS), static=True
+            )
 
 
 def _numbers(tracks: tuple[int, ...]) -> str:
@@ -165,18 +168,13 @@ def _strips(
     )
 
 
-def _mesh(
-    shapes: list[BaseGeometry], colour: tuple[int, int, int], layer: int, alpha: int = 255
-) -> rr.Mesh3D:
+def _mesh(shapes: list[BaseGeometry], colour: tuple[int, int, int], alpha: int = 255) -> rr.Mesh3D:
     """Fill shapes with triangles."""
-    pieces = [
-        triangle
-        for shape in shapes
-        for triangle in shapely.get_parts(shapely.constrained_delaunay_triangles(shape))
-    ]
-    corners = np.array([shapely.get_coordinates(piece)[:3] for piece in pieces]).reshape(-1, 2)
+    triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(shapes))
+    # The last corner of a ring is its first.
+    corners = shapely.get_coordinates(triangles).reshape(-1, 4, 2)[:, :3].reshape(-1, 2)
     return rr.Mesh3D(
-        vertex_positions=_lifted(corners, layer),
+        vertex_positions=_lifted(corners, FILLS),
         triangle_indices=np.arange(len(corners)).reshape(-1, 3),
         vertex_colors=np.tile(np.array([*colour, alpha], np.uint8), (len(corners), 1)),
     )
@@ -187,7 +185,7 @@ def _names(shapes: list[BaseGeometry], texts: list[str]) -> rr.Points3D:
     circles = shapely.maximum_inscribed_circle([shape for shape, _ in drawn], tolerance=0.05)
     points = shapely.get_coordinates(shapely.get_point(circles, 0)).reshape(-1, 2)
     return rr.Points3D(
-        _lifted(points, 6),
+        _lifted(points, NAMES),
         labels=[text for _, text in drawn],
         show_labels=True,
         radii=rr.components.Radius.ui_points(1.0),
@@ -243,7 +241,7 @@ def _blueprint(comparison: LayoutComparison) -> rrb.Blueprint:
             eye_up=[0.0, 1.0, 0.0],
         )
         return rrb.Spatial3DView(
-            name=name, origin=origin, eye_controls=eye, line_grid=False, background=[236, 236, 236]
+            name=name, origin=origin, eye_controls=eye, line_grid=False, background=PAPER
         )
 
     return rrb.Blueprint(

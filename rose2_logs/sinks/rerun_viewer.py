@@ -50,6 +50,7 @@ def open_viewer(port: int) -> str:
             if viewer.poll() is None:
                 return address
         time.sleep(0.1)
+    _end(viewer)
     raise OutputError("no Rerun viewer is open and none can be started here; leave --live out")
 
 
@@ -145,13 +146,18 @@ def _running(command: Sequence[str], said: IO[bytes]) -> Iterator[subprocess.Pop
     try:
         yield process
     finally:
-        if hasattr(os, "killpg"):
-            # Rerun's command is a script that starts the viewer itself.
-            with suppress(ProcessLookupError):
-                os.killpg(process.pid, signal.SIGTERM)
-        else:
-            process.terminate()
-        process.wait()
+        _end(process)
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    """End a command that began a session of its own, with all that it started."""
+    if hasattr(os, "killpg"):
+        # Rerun's command is a script that starts the viewer itself.
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGTERM)
+    else:
+        process.terminate()
+    process.wait()
 
 
 def _free_port(wished: int) -> int:

@@ -12,7 +12,7 @@ from scipy import ndimage
 from skimage.morphology import skeletonize
 from skimage.segmentation import watershed
 
-from rose2_logs.occupancy import BoolArray, FloatArray, straight_runs
+from rose2_logs.occupancy import BoolArray, FloatArray, roots, straight_runs
 from rose2_logs.parameters import TopologyParameters
 
 DRAWN_BLOCK = 2
@@ -208,6 +208,4 @@ def _join_basins(
                 passages[a][c] = passages[c][a] = max(passages[a].get(c, 0.0), width)
         for c in passages[a]:
             heapq.heappush(heap, (-openness(a, c), min(a, c), max(a, c)))
-    while not np.array_equal(parent, parent[parent]):
-        parent = parent[parent]
-    return parent
+    return roots(parent)

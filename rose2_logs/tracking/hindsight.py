@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from rose2_logs.occupancy import FloatArray
 from rose2_logs.tracking.alignment import RigidMotion
 from rose2_logs.tracking.lives import Moment, RoomLives
+from rose2_logs.tracking.overlap import share_of
 
 AREA_TOLERANCE = 0.1
 """A room has its last area when it is within this share of it."""
@@ -136,8 +137,7 @@ def _iou_with_last(rows: RoomRows, lives: RoomLives, drifts: Mapping[int, RigidM
     last = _valid(np.array([end.polygon for end in ends], object))
     common = shapely.area(shapely.intersection(then, last))
     union = shapely.area(then) + shapely.area(last) - common
-    iou: FloatArray = np.divide(common, union, out=np.zeros(len(ends)), where=union > 0)
-    return iou
+    return share_of(common, union)
 
 
 def _placed(

@@ -36,10 +36,11 @@ class Overlap:
     @property
     def iou(self) -> FloatArray:
         """Intersection over union (A, B) of each pair; 0 where both are empty."""
-        return _share(self.common, self.first_size[:, None] + self.second_size[None] - self.common)
+        return share_of(self.common, self.first_size[:, None] + self.second_size[None] - self.common)
 
 
-def _share(part: FloatArray, whole: FloatArray) -> FloatArray:
+def share_of(part: FloatArray, whole: FloatArray) -> FloatArray:
+    """Each part over its whole, arrays of one shape; 0 where the whole is nothing."""
     return np.divide(part, whole, out=np.zeros_like(part), where=whole > 0)
 
 

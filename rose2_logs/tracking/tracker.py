@@ -15,6 +15,7 @@ from rose2_logs.tracking.alignment import MapAligner
 from rose2_logs.tracking.frames import EVENT_ORDER, MAP_TRACK, EventKind, RoomEvent
 from rose2_logs.tracking.matching import RegionShape, assign, cut_out_rooms
 from rose2_logs.tracking.memory import TrackMemory
+from rose2_logs.tracking.overlap import share_of
 
 WEIGHT_POWER = 2
 """Pairs are weighed by this power of their overlap: one good pair is worth more than two poor ones."""
@@ -134,7 +135,7 @@ class RoomTracker:
         for row, memory in enumerate(self._tracks.memory.values()):
             common = np.array([_common(shape, rooms, boxes, areas) for shape in memory.shapes])
             sizes = np.array([shape.area_m2 for shape in memory.shapes])[:, None]
-            every_iou.append(_share(common, sizes + areas - common))
+            every_iou.append(share_of(common, sizes + areas - common))
             newest[row] = every_iou[-1][-1]
             smaller = np.minimum(sizes[-1], areas)
             is_part[row] = (common[-1] > 0) & (common[-1] >= self._parameters.part_min_share * smaller)
@@ -218,7 +219,3 @@ def _common(shape: RegionShape, rooms: RoomMap, boxes: FloatArray, areas: FloatA
     common = shape.common_area_m2(rooms.labels, rooms.geometry, len(areas))
     # Between grids of different resolution or yaw, sampling may count a little more than there is.
     return np.minimum(common, np.minimum(shape.area_m2, areas))
-
-
-def _share(part: FloatArray, whole: FloatArray) -> FloatArray:
-    return np.divide(part, whole, out=np.zeros_like(part), where=whole > 0)

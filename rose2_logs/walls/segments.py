@@ -74,8 +74,13 @@ def detect_segments(
     clean : (H, W) bool
         Cells of walls.
     directions_rad : (D,) float
+        From 0 to pi; where two fit alike, the earlier one wins.
+    resolution_m : float
+        Side of a cell.
     min_length_m : float
         Shortest segment.
+    parameters : WallParameters
+        Gaps that a segment bridges, and how much of it must be covered.
 
     Returns
     -------
@@ -117,7 +122,10 @@ def detect_segments(
 
 @dataclass(frozen=True, eq=False)
 class _Runs:
-    """Runs of points in the strips along one direction: values (R,), and the run of each `point` (P,)."""
+    """Runs of points in the strips along one direction: values (R,), lengths in metres.
+
+    `point` (P,) are the points' indices, run after run, and `run` (P,) the run of each.
+    """
 
     strip: NDArray[np.intp]
     offset: FloatArray
@@ -131,7 +139,7 @@ class _Runs:
 def _straight_runs(
     points: FloatArray, angle: float, resolution_m: float, parameters: WallParameters
 ) -> Iterator[_Runs]:
-    """Cut the points, sorted into strips along a direction, where the gaps are too long.
+    """Cut the points (P, 2), metres, sorted into strips along a direction, where the gaps are too long.
 
     The strips are two cells wide. They come in two sets, the second of which lies a cell further across, so
     that no wall falls between two strips; each point is once in each set.

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import os
+import subprocess
+import sys
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
@@ -104,6 +107,24 @@ def test_the_same_plan_gives_the_same_files(plan, tmp_path: Path):
     other = write_plan(plan, list(FORMATS), tmp_path / "other", "two")
     assert [file.read_bytes() for file in one] == [file.read_bytes() for file in other]
     assert not ezdxf.options.write_fixed_meta_data_for_testing
+
+
+def test_the_same_plan_gives_the_same_dxf_in_every_process(tmp_path: Path):
+    """Whatever the order of sets, which Python seeds anew in each; these two seeds gave two files."""
+    script = (
+        "import sys; from pathlib import Path; from drawn_plans import two_rooms_plan; "
+        "from rose2_logs.exports.dxf import write_dxf; write_dxf(two_rooms_plan(), Path(sys.argv[1]))"
+    )
+    written = set()
+    for seed in (3, 4):
+        file = tmp_path / f"{seed}.dxf"
+        surroundings = os.environ | {
+            "PYTHONHASHSEED": str(seed),
+            "PYTHONPATH": str(Path(__file__).parents[1]),
+        }
+        subprocess.run([sys.executable, "-c", script, str(file)], env=surroundings, check=True)
+        written.add(file.read_bytes())
+    assert len(written) == 1
 
 
 def test_labelled_map_is_read_as_a_map(plan, tmp_path: Path):

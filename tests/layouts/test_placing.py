@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -121,6 +122,22 @@ def test_a_map_without_walls_cannot_be_laid(cells):
     drawn, _ = office()
     assert place(placed(snapshot(cells)), placed(snapshot(drawn))) is None
     assert place(placed(snapshot(drawn)), placed(snapshot(cells))) is None
+
+
+def test_free_space_far_beyond_the_walls_takes_no_more_memory():
+    """A yard of 800 m around a building of 40 m, in cells of one metre."""
+    cells = np.zeros((800, 800), np.int8)
+    cells[400:440, 400:440] = 100
+    cells[403:437, 402:420] = cells[403:437, 421:438] = 0
+    map_ = snapshot(cells, resolution_m=1.0)
+    tracemalloc.start()
+    try:
+        found = place(placed(map_), placed(map_))
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert found.motion.pose == pytest.approx((0, 0, 0), abs=1e-3)
+    assert peak < 600e6
 
 
 @pytest.mark.parametrize(

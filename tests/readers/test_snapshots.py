@@ -151,6 +151,16 @@ def test_grids_without_cells_are_skipped(write, tmp_path):
         assert seconds([log.first(), log.last()]) == [1, 2]
 
 
+@every_writer
+def test_of_maps_of_one_log_time_the_last_is_the_last(write, tmp_path):
+    """As in a log whose times are all zero: the run's coverage is counted against it."""
+    maps = growing_maps(3)
+    path = write(tmp_path, log_at([1, 1, 1], maps))
+    with open_log(path) as log:
+        np.testing.assert_array_equal(log.first().cells, maps[0].cells)
+        np.testing.assert_array_equal(log.last().cells, maps[-1].cells)
+
+
 def square(known, shape=(40, 40)):
     cells = np.full(shape, -1, np.int8)
     cells[:known, :20] = 0

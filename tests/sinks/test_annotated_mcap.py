@@ -23,6 +23,7 @@ from rose2_logs.errors import OutputError
 from rose2_logs.readers import open_log
 from rose2_logs.run import RunOptions, analyse_log
 from rose2_logs.sinks.annotated_mcap import ADDED, ATTACHMENT, METADATA, AnnotatedMcap
+from rose2_logs.sinks.mcap_writer import McapWriter
 from rose2_logs.sinks.sink import RunInfo
 from rose2_logs.sinks.summary import RunTotals
 from rose2_logs.tracked_stream import start_workers, tracked_snapshots
@@ -258,6 +259,54 @@ def test_chunks_without_a_map_are_copied_as_they_are(tmp_path, compression):
         assert summary.statistics.message_count == sum(counts.values())
         span = (summary.statistics.message_start_time, summary.statistics.message_end_time)
         assert span == (times[0], times[-1])
+
+
+def test_channels_keep_their_ids_zero_too(tmp_path):
+    """Some writers count channels from 0; chunks that are copied as they are name them so."""
+    log = chunked_log(tmp_path / "run.mcap")
+    from_zero = tmp_path / "from_zero.mcap"
+    with log.path.open("rb") as source, from_zero.open("wb") as target:
+        writer, known = McapWriter(target, "ros2", "test"), set()
+        for schema, channel, message in make_reader(source).iter_messages():
+            number = channel.id - 1
+            if number not in known:
+                known.add(number)
+                kind = writer.register_schema(schema.name, schema.encoding, schema.data)
+                assert number == writer.register_channel(
+                    channel.topic, channel.message_encoding, kind, channel.metadata, number
+                )
+            writer.add_message(number, message.log_time, message.data, message.publish_time, message.sequence)
+            writer.flush()
+        writer.finish()
+    path = annotate(from_zero, tmp_path / "out")
+    assert raw_messages(path) == raw_messages(from_zero)
+    with path.open("rb") as file:
+        channels = make_reader(file).get_summary().channels
+    assert [channels[number].topic for number in (0, 1)] == ["/note", "/map"]
+
+
+def test_what_stopped_the_writing_is_told_not_what_closing_meets(tmp_path):
+    """With the greatest size of a file set low, as on a full disk: closing fails once more."""
+    log = LOGS["sample mcap"]
+    script = f"""
+import resource, signal
+from pathlib import Path
+from rose2_logs.errors import OutputError
+from rose2_logs.parameters import Parameters
+from rose2_logs.sinks.annotated_mcap import AnnotatedMcap
+from rose2_logs.sinks.sink import RunInfo
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (2_000, 2_000))
+info = RunInfo(Path({str(log)!r}), "/map", "rose2", Parameters(), {{}}, {{}})
+try:
+    with AnnotatedMcap(Path({str(tmp_path / "run.mcap")!r}), info):
+        pass
+except OutputError as error:
+    print(error)
+"""
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert "run.mcap: cannot be written" in done.stdout
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_damaged_chunk_stays_as_it_is(tmp_path):

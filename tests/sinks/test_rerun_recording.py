@@ -162,6 +162,24 @@ def test_live_without_a_viewer_or_a_screen_says_what_to_do(tmp_path, monkeypatch
     assert not list((tmp_path / "out").glob("*.rrd"))
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="there only the command itself is ended")
+def test_a_viewer_that_does_not_come_up_in_time_is_ended(monkeypatch):
+    """With what it started: nothing is left behind."""
+    from rose2_logs.sinks import rerun_viewer
+
+    elsewhere = free_port()
+    server = f"import socket, time; s = socket.create_server(('127.0.0.1', {elsewhere})); time.sleep(90)"
+    start = f"import subprocess, sys; subprocess.run([sys.executable, '-c', {server!r}])"
+    monkeypatch.setattr(rerun_viewer, "RERUN", (sys.executable, "-c", start))
+    monkeypatch.setattr(rerun_viewer, "VIEWER_START_S", 3.0)
+    with pytest.raises(OutputError, match="no Rerun viewer is open"):
+        rerun_viewer.open_viewer(free_port())
+    end = time.monotonic() + 10
+    while rerun_viewer.listens(elsewhere) and time.monotonic() < end:
+        time.sleep(0.1)
+    assert not rerun_viewer.listens(elsewhere)
+
+
 def test_a_shift_of_the_map_is_told_in_metres_and_degrees():
     from rose2_logs.sinks.event_text import event_text
 

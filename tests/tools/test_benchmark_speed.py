@@ -167,11 +167,11 @@ def test_memory_and_time_of_a_process_count_those_below_it():
 
 def test_maps_of_a_group_are_spread_evenly():
     from benchmarking.map_times import MapToTime
-    from benchmarking.speed import _sampled
+    from benchmarking.robustness import sampled
 
     maps = [MapToTime(group, str(k), lambda: None) for group in "ab" for k in range(5)]
-    assert [map_.name for map_ in _sampled(maps, 3)] == ["0", "2", "4"] * 2
-    assert len(_sampled(maps, None)) == 10
+    assert [map_.name for map_ in sampled(maps, 3)] == ["0", "2", "4"] * 2
+    assert len(sampled(maps, None)) == 10
 
 
 def test_tiles_repeat_the_map():

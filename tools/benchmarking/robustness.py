@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,13 +35,21 @@ class Robustness:
     iou_sym: Mapping[str, float]
 
 
-def sampled(cases: Sequence[Case], per_group: int | None) -> tuple[Case, ...]:
-    """Take at most so many cases of each group, spread evenly over it; all of them for None."""
+class _InGroup(Protocol):
+    @property
+    def group(self) -> str: ...
+
+
+Member = TypeVar("Member", bound=_InGroup)
+
+
+def sampled(items: Sequence[Member], per_group: int | None) -> tuple[Member, ...]:
+    """Take at most so many cases or maps of each group, spread evenly over it; all of them for None."""
     if per_group is None:
-        return tuple(cases)
-    chosen: list[Case] = []
-    for group in dict.fromkeys(case.group for case in cases):
-        members = [case for case in cases if case.group == group]
+        return tuple(items)
+    chosen: list[Member] = []
+    for group in dict.fromkeys(item.group for item in items):
+        members = [item for item in items if item.group == group]
         count = min(per_group, len(members))
         places = np.round(np.linspace(0, len(members) - 1, count)).astype(int)
         chosen.extend(members[place] for place in places.tolist())

@@ -6,7 +6,6 @@ import dataclasses
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -25,7 +24,8 @@ from benchmarking.log_costs import (
     sink_costs,
     start_times,
 )
-from benchmarking.map_times import MapTimes, MapToTime, maps_of_cases, maps_of_logs, time_map
+from benchmarking.map_times import MapTimes, maps_of_cases, maps_of_logs, time_map
+from benchmarking.robustness import sampled
 from benchmarking.scaling import (
     LogTimes,
     TileTimes,
@@ -157,8 +157,10 @@ def measure_speed(options: SpeedOptions) -> Speed:
     with tempfile.TemporaryDirectory(prefix="rose2_speed_") as scratch:
         folder = Path(scratch)
         if "maps" not in options.skip:
-            chosen = _sampled(maps_of_cases(load_all_cases(options.cases)), amount.maps_per_group)
-            chosen += maps_of_logs(options.logs, amount.maps_per_log)
+            chosen = [
+                *sampled(maps_of_cases(load_all_cases(options.cases)), amount.maps_per_group),
+                *maps_of_logs(options.logs, amount.maps_per_log),
+            ]
             with one_core():
                 for number, map_ in enumerate(chosen, start=1):
                     say(f"map {number} of {len(chosen)}: {map_.group}, {map_.name}")
@@ -201,16 +203,6 @@ def measure_speed(options: SpeedOptions) -> Speed:
         tuple(starts),
         look,
     )
-
-
-def _sampled(maps: Sequence[MapToTime], count: int | None) -> list[MapToTime]:
-    """Take at most `count` maps of each group, spread evenly."""
-    chosen = []
-    for group in dict.fromkeys(map_.group for map_ in maps):
-        members = [map_ for map_ in maps if map_.group == group]
-        keep = np.linspace(0, len(members) - 1, min(count or len(members), len(members))).round().astype(int)
-        chosen += [members[k] for k in keep]
-    return chosen
 
 
 def _copies_for(side: int, shape: tuple[int, ...]) -> int:

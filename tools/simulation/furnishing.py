@@ -35,7 +35,7 @@ def chair(rng: np.random.Generator, x: float, y: float) -> list[Polygon]:
     return feet if count == 4 else [*feet, square(x, y, 0.06)]
 
 
-def wall_piece(rng: np.random.Generator, kind: str, length: float) -> tuple[float, list[Polygon]]:
+def wall_piece(rng: np.random.Generator, kind: str) -> tuple[float, list[Polygon]]:
     """Width along the wall, and the shapes, of one piece of furniture that stands at a wall (y = 0)."""
     pick = float(rng.random())
     if kind == "store" or pick < 0.38:
@@ -72,7 +72,6 @@ def furnish(
         Share of the walls that is furnished in the building, 0..1; rooms differ.
     """
     kind = room.name.split()[0]
-    corridor = kind in ("corridor", "hall")
     density = 0.06 if kind == "corridor" else float(np.clip(clutter + rng.normal(0, 0.2), 0.0, 1.0))
     keep_free = shapely.union_all(draft.doorways).buffer(DOOR_CLEARANCE_M, quad_segs=2)
     inside = room.polygon.buffer(0.02)
@@ -83,7 +82,7 @@ def furnish(
         direction = (edge[2:] - edge[:2]) / max(length, 1e-9)
         at = float(rng.uniform(0, 0.4))
         while at < length - 0.5:
-            width, shapes = wall_piece(rng, kind, length)
+            width, shapes = wall_piece(rng, kind)
             if at + width > length or rng.random() > density:
                 at += float(rng.uniform(0.3, 1.2))
                 continue
@@ -94,11 +93,11 @@ def furnish(
                 piece = rotate(piece, float(rng.normal(0, 8)), "center")
             taken = shapely.union_all(placed) if placed else Polygon()
             hull = piece.convex_hull
-            narrow = corridor and kind == "corridor" and hull.area / width > 0.5
+            narrow = kind == "corridor" and hull.area / width > 0.5
             if not narrow and not hull.intersects(keep_free) and not hull.buffer(0.05).intersects(taken):
                 placed.append(piece.intersection(inside))
             at += width + float(rng.exponential(0.25))
-    if not corridor or kind == "hall":
+    if kind != "corridor":
         placed += middle_furniture(rng, room, keep_free, placed, density)
     return [piece for piece in placed if not piece.is_empty]
 

@@ -129,15 +129,13 @@ def room_rows(
     return rows
 
 
-def split_corridor(
-    rng: np.random.Generator, corridor: Polygon, wall_m: float
-) -> tuple[list[Polygon], Polygon]:
-    """Cut a long corridor by a fire door's wall at a random place; the wall is the second value."""
+def split_corridor(rng: np.random.Generator, corridor: Polygon, wall_m: float) -> list[Polygon]:
+    """Cut a long corridor by a fire door's wall at a random place, if that leaves two parts."""
     x0, y0, x1, y1 = corridor.bounds
     x = float(rng.uniform(x0 + 0.35 * (x1 - x0), x0 + 0.65 * (x1 - x0)))
     wall = box(x, y0 - 1, x + wall_m, y1 + 1)
     parts = [part for part in shapely.get_parts(corridor.difference(wall)) if part.area > 6.0]
-    return (parts, wall) if len(parts) == 2 else ([corridor], Polygon())
+    return parts if len(parts) == 2 else [corridor]
 
 
 def facing_walls(a: Polygon, b: Polygon, wall_m: float) -> list[FloatArray]:
@@ -217,8 +215,7 @@ def draw_floor_plan(rng: np.random.Generator, style: str) -> FloorPlanDraft:
     for corridor in corridor_polygons(rng, style):
         rows += room_rows(rng, corridor, draft.wall_m, style)
         if style in ("straight", "campus") and rng.random() < 0.6:
-            parts, _ = split_corridor(rng, corridor, draft.wall_m)
-            corridors += parts
+            corridors += split_corridor(rng, corridor, draft.wall_m)
         else:
             corridors.append(corridor)
     for corridor in sorted(corridors, key=lambda part: -part.area):

@@ -119,7 +119,7 @@ def simulate_building(seed: int, style: str | None = None, *, turn_rad: float | 
     things = shapely.union_all(furniture).intersection(inside)
     outside = shapely.union_all(surroundings(rng, footprint))
     opaque = np.concatenate([boundary_segments(shape) for shape in (walls, things, outside)])
-    start = Point(draft.rooms[0].polygon.representative_point())
+    start = draft.rooms[0].polygon.representative_point()
     room = (
         draft.rooms[0]
         .polygon.buffer(-ROBOT_START_CLEARANCE_M)
