@@ -148,6 +148,12 @@ class FloorPlanParameters:
     wall_tolerance_m: float = number(
         0.15, "m", "A wall counts for an edge when it lies this near: a wall's half thickness and drift.", 0.0
     )
+    blind_look_m: float = number(
+        0.4,
+        "m",
+        "A wall is blind with no free space this near behind it, more than its thickness; 0: none is.",
+        0.0,
+    )
     face_min_seen: float = number(
         0.1, "share", "A face less seen than this is outside: it holds rays through windows.", 0, 1
     )

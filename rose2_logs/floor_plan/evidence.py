@@ -29,6 +29,8 @@ class EdgeEvidence:
     ----------
     wall_m : (E,) float
         Covered by walls.
+    blind_m : (E,) float
+        Of these, what shows no free space on one of its sides, see `_read_lines`.
     open_m : (E,) float
         Open free space.
     length_m : (E,) float
@@ -39,6 +41,7 @@ class EdgeEvidence:
     """
 
     wall_m: FloatArray
+    blind_m: FloatArray
     open_m: FloatArray
     length_m: FloatArray
     passage_share: FloatArray
@@ -74,14 +77,14 @@ def edge_evidence(
     if len(lines_m) == 0:
         nothing = np.zeros(len(edges_m))
         length = np.hypot(edges_m[:, 2] - edges_m[:, 0], edges_m[:, 3] - edges_m[:, 1])
-        return EdgeEvidence(nothing, nothing, length, nothing)
-    line, step_m, is_wall, is_free = _read_lines(lines_m, walls, free, resolution_m, parameters)
+        return EdgeEvidence(nothing, nothing, nothing, length, nothing)
+    line, step_m, is_wall, is_blind, is_free = _read_lines(lines_m, walls, free, resolution_m, parameters)
     offset = np.concatenate([[0], np.cumsum(np.bincount(line, minlength=len(lines_m)))])
     owner, start, end = _place_edges(edges_m, lines_m)
     length = np.hypot(edges_m[:, 2] - edges_m[:, 0], edges_m[:, 3] - edges_m[:, 1])
     on_line = owner >= 0
     lengths = []
-    for flag in (is_wall, is_free & ~is_wall):
+    for flag in (is_wall, is_blind, is_free & ~is_wall):
         total = np.concatenate([[0.0], np.cumsum(flag)])
         samples = np.arange(len(total), dtype=float)
         base, step = offset[owner[on_line]], step_m[owner[on_line]]
@@ -100,7 +103,8 @@ def edge_evidence(
     if len(some):
         bounds = np.minimum(np.column_stack([first[some], last[some]]).ravel(), len(run_share) - 1)
         share[some] = np.maximum.reduceat(run_share, bounds)[::2]
-    return EdgeEvidence(lengths[0], lengths[1], length, share)
+    wall_m, blind_m, open_m = lengths
+    return EdgeEvidence(wall_m, blind_m, open_m, length, share)
 
 
 def _passages(
@@ -179,8 +183,11 @@ def _read_lines(
     free: BoolArray,
     resolution_m: float,
     parameters: FloorPlanParameters,
-) -> tuple[NDArray[np.intp], FloatArray, BoolArray, BoolArray]:
+) -> tuple[NDArray[np.intp], FloatArray, BoolArray, BoolArray, BoolArray]:
     """Sample each line once a cell: a wall is where a wall cell lies across it within the tolerance.
+
+    A wall is blind where no free cell lies within `blind_look_m` on one of its sides, unless another wall
+    runs there: what is behind was not seen, or is a piece of furniture.
 
     Returns
     -------
@@ -188,7 +195,7 @@ def _read_lines(
         Line of each sample, in order along the lines.
     step_m : (L,) float
         Distance between the samples of a line.
-    is_wall, is_free : (S,) bool
+    is_wall, is_blind, is_free : (S,) bool
     """
     vector = lines_m[:, 2:] - lines_m[:, :2]
     length = np.hypot(vector[:, 0], vector[:, 1])
@@ -201,7 +208,17 @@ def _read_lines(
     reach = round(parameters.wall_tolerance_m / resolution_m)
     for step in range(-reach, reach + 1):
         is_wall |= _sample(walls, centre + normal * (step * resolution_m), resolution_m)
-    return line, length / count, is_wall, _sample(free, centre, resolution_m)
+    is_blind = np.zeros(len(line), bool)
+    centre_of_wall, normal_of_wall = centre[is_wall], normal[is_wall]
+    steps = np.arange(1, round(parameters.blind_look_m / resolution_m) + 1) * resolution_m
+    for side in (1, -1):
+        is_empty, is_through = np.ones((2, len(centre_of_wall)), bool)
+        for at_m in side * steps:
+            points = centre_of_wall + normal_of_wall * at_m
+            is_empty &= ~_sample(free, points, resolution_m)
+            is_through &= _sample(walls, points, resolution_m)
+        is_blind[is_wall] |= is_empty & ~is_through
+    return line, length / count, is_wall, is_blind, _sample(free, centre, resolution_m)
 
 
 def _sample(mask: NDArray[Number], points_m: FloatArray, resolution_m: float) -> NDArray[Number]:

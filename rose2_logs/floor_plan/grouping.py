@@ -20,6 +20,7 @@ def group_faces(
     edge_faces: NDArray[np.int32],
     evidence: EdgeEvidence,
     free_m2: FloatArray,
+    seen: FloatArray,
     clearance_m: FloatArray,
     parameters: FloorPlanParameters,
 ) -> NDArray[np.int32]:
@@ -33,10 +34,15 @@ def group_faces(
     passage through it is held against the room on both sides: what narrows like a door does not join.
     What is too small for a room at the end joins the neighbour that it opens to most.
 
+    A wall with nothing to be seen behind it closes a border as far as the faces are not known: a half seen
+    room may go on there. Of faces seen to the full it is furniture, or a wall within.
+
     Parameters
     ----------
     free_m2 : (F,) float
         Free area of each face; faces without any take no part.
+    seen : (F,) float
+        Share of each face that is known to be free.
     clearance_m : (F,) float
         Greatest distance from a wall within each face.
 
@@ -45,7 +51,7 @@ def group_faces(
     group : (F,) int32
         0.. for faces with free area, -1 for the others.
     """
-    groups = _Groups(edge_faces, evidence, free_m2, clearance_m)
+    groups = _Groups(_borders(edge_faces, evidence, seen, free_m2 > 0), free_m2, clearance_m)
     if parameters.grouping == "dbscan":
         _join_by_dbscan(groups, parameters)
     else:
@@ -127,16 +133,12 @@ class _Groups:
     """Groups of faces with what is known of the borders between them."""
 
     def __init__(
-        self,
-        edge_faces: NDArray[np.int32],
-        evidence: EdgeEvidence,
-        free_m2: FloatArray,
-        clearance_m: FloatArray,
+        self, borders: dict[int, dict[int, Border]], free_m2: FloatArray, clearance_m: FloatArray
     ) -> None:
         self.alive = free_m2 > 0
         self.free_m2 = free_m2.copy()
         self.clearance_m = np.maximum(clearance_m, 1e-6)
-        self.borders = _borders(edge_faces, evidence, self.alive)
+        self.borders = borders
         self._active = self.alive.copy()
         self._parent = np.arange(len(free_m2))
 
@@ -165,15 +167,18 @@ class _Groups:
 
 
 def _borders(
-    edge_faces: NDArray[np.int32], evidence: EdgeEvidence, active: NDArray[np.bool_]
+    edge_faces: NDArray[np.int32], evidence: EdgeEvidence, seen: FloatArray, active: NDArray[np.bool_]
 ) -> dict[int, dict[int, Border]]:
     use = np.all(edge_faces >= 0, axis=1)
     use[use] &= np.all(active[edge_faces[use]], axis=1)
+    # Squared, so that what is behind the walls of a face seen by half is still three quarters unknown.
+    known = np.minimum(seen[edge_faces[use]].min(axis=1), 1.0) ** 2
+    closed = evidence.wall_m[use] - known * evidence.blind_m[use]
     borders: dict[int, dict[int, Border]] = defaultdict(dict)
     for (a, b), open_m, closed_m, passage in zip(
         edge_faces[use].tolist(),
         evidence.open_m[use].tolist(),
-        evidence.wall_m[use].tolist(),
+        closed.tolist(),
         evidence.passage_share[use].tolist(),
         strict=True,
     ):

@@ -65,7 +65,8 @@ def make_floor_plan(
     # Without any line the map is one face, however little of it was seen.
     inside = (seen >= parameters.face_min_seen) | (count == 1)
     widest = clearance(face_of_cell, free, walls, count, resolution_m)
-    group = 1 + group_faces(graph.edge_faces, evidence, np.where(inside, area, 0.0), widest, parameters)
+    area[~inside] = 0
+    group = 1 + group_faces(graph.edge_faces, evidence, area, seen, widest, parameters)
     labels = np.concatenate([np.zeros(1, np.int32), group])[face_of_cell]
     labels[~free] = 0
     return FloorPlanResult(graph, evidence, seen, group, labels)

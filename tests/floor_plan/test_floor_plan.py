@@ -108,9 +108,9 @@ def test_how_much_of_a_face_was_seen_does_not_hang_on_the_raster(turn_deg):
     assert plan.seen[face] == pytest.approx(4 * 2 / (10 * 2.1), abs=0.01)
 
 
-def make_evidence(wall, is_open, passage):
+def make_evidence(wall, is_open, passage, blind=0.0):
     wall, is_open = np.array(wall, float), np.array(is_open, float)
-    return EdgeEvidence(wall, is_open, wall + is_open, np.array(passage, float))
+    return EdgeEvidence(wall, blind * wall, is_open, wall + is_open, np.array(passage, float))
 
 
 @pytest.mark.parametrize("grouping", ["agglomerative", "dbscan"])
@@ -122,15 +122,40 @@ def test_what_is_open_joins_and_a_door_does_not_in_any_order_of_edges(order, gro
         np.array([0, 3, 3])[order], np.array([4, 1, 0])[order], np.array([1, 0.3, 0])[order]
     )
     parameters = dataclasses.replace(PARAMETERS, grouping=grouping)
-    group = group_faces(faces, evidence, np.array([8.0, 8.0, 16.0]), np.full(3, 1.5), parameters)
+    group = group_faces(faces, evidence, np.array([8.0, 8.0, 16.0]), np.ones(3), np.full(3, 1.5), parameters)
     assert group[0] == group[1] != group[2]
 
 
 def test_a_niche_joins_its_room_and_a_face_that_was_not_seen_takes_no_part():
     faces = np.array([(0, 1), (0, 2)], np.int32)
     evidence = make_evidence([0.5, 0], [0.5, 4], [0.4, 1])
-    group = group_faces(faces, evidence, np.array([16.0, 0.5, 0.0]), np.array([2, 0.3, 2]), PARAMETERS)
+    group = group_faces(
+        faces, evidence, np.array([16.0, 0.5, 0.0]), np.ones(3), np.array([2, 0.3, 2]), PARAMETERS
+    )
     assert group.tolist() == [0, 0, -1]
+
+
+@pytest.mark.parametrize(("seen", "rooms"), [((1.0, 0.9), 1), ((1.0, 0.4), 2), ((0.4, 1.0), 2)])
+def test_a_wall_with_nothing_behind_divides_faces_that_are_hardly_known(seen, rooms):
+    """A cupboard of 2 m beside a passage of 2 m; behind it, the rest of a room or another one."""
+    evidence = make_evidence([2.0], [2.0], [1.0], blind=1.0)
+    group = group_faces(
+        np.array([(0, 1)], np.int32), evidence, np.full(2, 9.0), np.array(seen), np.full(2, 1.5), PARAMETERS
+    )
+    assert len(set(group)) == rooms
+
+
+def test_a_wall_is_blind_where_it_shows_no_free_space_on_a_side():
+    """A wall of 6 m: behind the first third free space, then nothing, then a wall that comes across."""
+    free, walls = np.zeros((2, 100, 160), bool)
+    free[20:49, 20:140] = True
+    free[52:80, 20:60] = True
+    walls[49:52, 20:140] = True
+    walls[52:80, 100:140] = True
+    line = np.array([(1.0, 2.525, 7.0, 2.525)])
+    evidence = edge_evidence(line, line, walls, free, 0.05, PARAMETERS)
+    assert evidence.wall_m[0] == pytest.approx(6.0, abs=0.1)
+    assert evidence.blind_m[0] == pytest.approx(2.0, abs=0.1)
 
 
 def test_a_strip_along_the_other_side_of_a_wall_changes_room():
