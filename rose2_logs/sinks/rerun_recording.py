@@ -152,7 +152,8 @@ class RerunRecording:
         if self._smoothed is None:
             self._layers.flush()
             self._smoothed = SmoothedWorld(self._new_layers(), self._recording)
-        self._smoothed.log(found, _steps(found.coverage))
+        view_m = view_side_m(self._extent.low_m, self._extent.high_m)
+        self._smoothed.log(found, _steps(found.coverage), view_m)
         self._flush()
 
     def __exit__(

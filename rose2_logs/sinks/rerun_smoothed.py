@@ -18,7 +18,9 @@ from rose2_logs.sinks.rerun_world import (
     OUTLINE_SHADE,
     label_style,
     line_style,
+    room_label,
 )
+from rose2_logs.sinks.shares import percent
 from rose2_logs.tracking.smoothed_run import SmoothedSnapshot
 
 SMOOTHED, SEEN_SHARE = "/world/smoothed", "/run/seen_share"
@@ -46,8 +48,8 @@ class SmoothedWorld:
         self._named: set[int] = set()
         recording.log(OUTLINES, line_style(OUTLINE_POINTS, None), static=True)
 
-    def log(self, found: SmoothedSnapshot, coverage: int) -> None:
-        """Log one map, in the order of the run, at its steps of coverage."""
+    def log(self, found: SmoothedSnapshot, coverage: int, view_side_m: float) -> None:
+        """Log one map, in the order of the run, at its steps of coverage, for a view of that size."""
         snapshot = found.snapshot
         self._layers.begin(snapshot.log_time_ns, snapshot.stamp_ns, snapshot.index, coverage)
         pictures = MapPictures(snapshot)
@@ -67,10 +69,11 @@ class SmoothedWorld:
             if track not in self._known:
                 self._known.add(track)
                 self._begin_track(track)
-            self._layers.add(f"{SEEN_SHARE}/{track}", Scalar(area / last if last > 0 else 0.0))
+            share = area / last if last > 0 else 0.0
+            self._layers.add(f"{SEEN_SHARE}/{track}", Scalar(share))
             if area > 0:
                 shown.add(track)
-                text = f"Room {track}, {area:.0f} of {last:.0f} m²"
+                text = room_label(track, last, view_side_m, told=percent(min(share, 1.0)))
                 self._layers.show(f"{NAMES}/{track}", Label((*points[room], NAME_HEIGHT_M), text))
         for track in sorted(self._named - shown):
             self._layers.clear(f"{NAMES}/{track}")

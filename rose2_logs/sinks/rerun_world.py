@@ -148,7 +148,8 @@ class World:
             self._layers.show(f"{ROOMS}/{track}", _rings(rooms.outer_rings_m[number]))
             x, y, z = points[number]
             wall_share, _ = evidence_of(frame, number)
-            text = room_label(track, float(rooms.areas_m2[number]), is_unsure(wall_share), view_side_m)
+            area_m2 = float(rooms.areas_m2[number])
+            text = room_label(track, area_m2, view_side_m, unsure=is_unsure(wall_share))
             self._layers.show(f"{ROOMS}/{track}/label", Label((x, y, z), text))
 
     def _begin_track(self, track: int) -> None:
@@ -212,15 +213,18 @@ def label_style() -> rr.Points3D:
     )
 
 
-def room_label(track: int, area_m2: float, unsure: bool, view_side_m: float) -> str:
+def room_label(
+    track: int, area_m2: float, view_side_m: float, *, unsure: bool = False, told: str | None = None
+) -> str:
     """Name a room: number and area in one line, the number alone if these would cover its neighbours.
 
-    The viewer cuts labels of several lines down to the first one where there are many.
+    The viewer cuts labels of several lines down to the first one where there are many. `told` stands in place
+    of the area where that is not what matters.
     """
     number = f"{track}{UNSURE_SIGN if unsure else ''}"
     if area_m2 < NAMED_SHARE * view_side_m**2:
         return number
-    return f"{number}: {area_m2:.0f} m²"
+    return f"{number}: {told or f'{area_m2:.0f} m²'}"
 
 
 def _height_m(path: str) -> float:

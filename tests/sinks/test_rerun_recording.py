@@ -190,6 +190,7 @@ def test_a_shift_of_the_map_is_told_in_metres_and_degrees():
 
 def test_names_of_rooms_are_short_enough_for_their_place_in_the_view():
     """Number and area in one line; of a room that is small in the view the number; a sign if unsure."""
-    assert room_label(7, 22.4, False, 40.0) == "7: 22 m²"
-    assert room_label(7, 22.4, True, 40.0) == "7?: 22 m²"
-    assert room_label(7, 22.4, True, 100.0) == "7?"
+    assert room_label(7, 22.4, 40.0) == "7: 22 m²"
+    assert room_label(7, 22.4, 40.0, unsure=True) == "7?: 22 m²"
+    assert room_label(7, 22.4, 40.0, told="51%") == "7: 51%"
+    assert room_label(7, 22.4, 100.0, unsure=True) == "7?"

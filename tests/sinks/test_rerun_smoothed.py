@@ -20,6 +20,7 @@ from rose2_logs.sinks.palette import track_colour
 from rose2_logs.sinks.rerun_layers import Layers
 from rose2_logs.sinks.rerun_pictures import FILL_OPACITY
 from rose2_logs.sinks.rerun_smoothed import SmoothedWorld
+from rose2_logs.sinks.shares import percent
 from rose2_logs.tracking.alignment import RigidMotion
 from rose2_logs.tracking.smoothed_run import SmoothedSnapshot
 from rose2_logs.tracking.smoothing import SmoothedRooms
@@ -81,11 +82,17 @@ def test_how_much_of_each_room_was_seen_is_that_of_the_table(result, smoothed):
 
 
 def test_a_room_is_named_from_when_it_is_seen(result, smoothed):
+    """By its number, and where there is room for it by how much of it was seen."""
+    last = pd.read_parquet(result.folder / "rooms.parquet").set_index(["snapshot", "track"]).area_m2
+    texts = {}
     for track, areas in smoothed.items():
         named = list(rows(result, f"/world/smoothed/names/{track}", "Points3D:labels"))
         assert named[0]["snapshot"] == areas.index[areas > 0][0]
-        text = shown_at(named, "snapshot", smoothed.index[-1])["Points3D:labels"][0]
-        assert text.startswith(f"Room {track}, {areas.iloc[-1]:.0f} of ")
+        at = areas.index[areas > 0][0]
+        seen = percent(min(areas[at] / last[smoothed.index[-1], track], 1.0))
+        texts[track] = shown_at(named, "snapshot", at)["Points3D:labels"][0]
+        assert texts[track] in (f"{track}", f"{track}: {seen}")
+    assert any(":" in text for text in texts.values())
 
 
 def test_the_outlines_are_those_of_the_last_map_from_the_first_on(result):
@@ -125,7 +132,7 @@ def test_outlines_lie_where_the_rooms_lay_before_the_map_shifted(tmp_path: Path)
     recording = rr.RecordingStream("test")
     recording.set_sinks(rr.FileSink(str(tmp_path / "run.rrd")))
     world = SmoothedWorld(Layers(recording), recording)
-    world.log(SmoothedSnapshot(snapshot, 1.0, found, rooms, (7,), to_last), 10_000)
+    world.log(SmoothedSnapshot(snapshot, 1.0, found, rooms, (7,), to_last), 10_000, 20.0)
     world.flush()
     recording.disconnect()
     for chunk in RrdReader(str(tmp_path / "run.rrd")).stream():
