@@ -75,7 +75,7 @@ def make_blueprint(
     if smoothed:
         views.insert(1, _map_view("Smoothed rooms", low_m, high_m, (SMOOTHED,)))
     if "spectrum" in layers:
-        eye = _eye(np.array([-1.0, -1.0]), np.array([1.0, 1.0]))
+        eye = eye_above(np.array([-1.0, -1.0]), np.array([1.0, 1.0]))
         views.append(
             rrb.Spatial3DView(
                 name="Spectrum", origin=SPECTRUM, eye_controls=eye, line_grid=False, background=DARK
@@ -137,7 +137,7 @@ def _map_view(
     return rrb.Spatial3DView(
         name=name,
         origin="/world",
-        eye_controls=_eye(low_m, high_m),
+        eye_controls=eye_above(low_m, high_m),
         line_grid=False,
         background=DARK if SCORE in shown else PAPER,
         overrides=overrides,
@@ -150,15 +150,15 @@ def _up_to_now() -> rrb.VisibleTimeRanges:
     return rrb.VisibleTimeRanges([rrb.VisibleTimeRange(name, start=before, end=now) for name in TIMELINES])
 
 
-def view_side_m(low_m: FloatArray, high_m: FloatArray) -> float:
-    """Height of the part of the world that the view shows so that a rectangle fits in."""
+def view_side_m(low_m: FloatArray, high_m: FloatArray, aspect: float = MAP_ASPECT) -> float:
+    """Height of the part of the world that a view of such an aspect shows so that a rectangle fits in."""
     size = high_m - low_m
-    return float(max(size[0] / MAP_ASPECT, size[1], 1e-3))
+    return float(max(size[0] / aspect, size[1], 1e-3))
 
 
-def _eye(low: FloatArray, high: FloatArray) -> rrb.EyeControls3D:
-    """Look from above so that a rectangle fills the view."""
-    centre, height = (low + high) / 2, EYE_HEIGHT * view_side_m(low, high)
+def eye_above(low: FloatArray, high: FloatArray, aspect: float = MAP_ASPECT) -> rrb.EyeControls3D:
+    """Look from above so that a rectangle fills a view of such an aspect."""
+    centre, height = (low + high) / 2, EYE_HEIGHT * view_side_m(low, high, aspect)
     return rrb.EyeControls3D(
         kind=rrb.Eye3DKind.Orbital,
         position=[centre[0], centre[1] - 1e-3 * height, height],

@@ -9,7 +9,6 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 import shapely
-from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from rose2_logs.files import replacing
@@ -20,13 +19,13 @@ from rose2_logs.layouts.wall_changes import WALL_STATUSES
 from rose2_logs.occupancy import UNKNOWN, FloatArray, known_window
 from rose2_logs.sinks.layout_picture import ROOM_COLOURS, WALL_COLOURS
 from rose2_logs.sinks.palette import track_colour
-from rose2_logs.sinks.rerun_blueprint import EYE_HEIGHT, PAPER
-from rose2_logs.sinks.rerun_world import LAYER_STEP_M, OUTLINE_POINTS, OUTLINE_SHADE
+from rose2_logs.sinks.rerun_blueprint import PAPER, eye_above
+from rose2_logs.sinks.rerun_world import OUTLINE_POINTS, OUTLINE_SHADE, lifted
 from rose2_logs.sinks.ros_messages import outer_rings
 from rose2_logs.tracking.alignment import RigidMotion
 
 CELLS, FILLS, OUTLINES, WALLS, CHANGED_WALLS, NAMES = range(6)
-"""Layers above the map, from the lowest, each `LAYER_STEP_M` above the one before."""
+"""Layers above the map, from the lowest, each one step above the one before."""
 WALL_POINTS = 4.0
 """Width of walls that differ in points of the screen."""
 FAINT = (110, 110, 110)
@@ -100,8 +99,8 @@ def _log_differences(recording: rr.RecordingStream, comparison: LayoutComparison
     ):
         points = motion.points(layout.map.snapshot.geometry.cell_centres(*np.nonzero(layout.map.occupied)))
         radius = layout.map.resolution_m / 2
-        lifted = rr.Points3D(_lifted(points, CELLS), radii=radius, colors=[colour])
-        recording.log(f"/difference/{root}", lifted, static=True)
+        cells = rr.Points3D(lifted(points, CELLS), radii=radius, colors=[colour])
+        recording.log(f"/difference/{root}", cells, static=True)
     for status in ROOM_STATUSES:
         changes = [change for change in comparison.rooms if change.status == status]
         if not changes:
@@ -162,7 +161,7 @@ def _strips(
     lines: Sequence[tuple[FloatArray, tuple[int, ...]]], width_points: float, layer: int
 ) -> rr.LineStrips3D:
     return rr.LineStrips3D(
-        [_lifted(points, layer) for points, _ in lines],
+        [lifted(points, layer) for points, _ in lines],
         colors=[colour for _, colour in lines],
         radii=rr.components.Radius.ui_points(width_points),
     )
@@ -174,7 +173,7 @@ def _mesh(shapes: list[BaseGeometry], colour: tuple[int, int, int], alpha: int =
     # The last corner of a ring is its first.
     corners = shapely.get_coordinates(triangles).reshape(-1, 4, 2)[:, :3].reshape(-1, 2)
     return rr.Mesh3D(
-        vertex_positions=_lifted(corners, FILLS),
+        vertex_positions=lifted(corners, FILLS),
         triangle_indices=np.arange(len(corners)).reshape(-1, 3),
         vertex_colors=np.tile(np.array([*colour, alpha], np.uint8), (len(corners), 1)),
     )
@@ -185,17 +184,12 @@ def _names(shapes: list[BaseGeometry], texts: list[str]) -> rr.Points3D:
     circles = shapely.maximum_inscribed_circle([shape for shape, _ in drawn], tolerance=0.05)
     points = shapely.get_coordinates(shapely.get_point(circles, 0)).reshape(-1, 2)
     return rr.Points3D(
-        _lifted(points, NAMES),
+        lifted(points, NAMES),
         labels=[text for _, text in drawn],
         show_labels=True,
         radii=rr.components.Radius.ui_points(1.0),
         colors=[(255, 255, 255)],
     )
-
-
-def _lifted(points_m: FloatArray, layer: int) -> NDArray[np.float32]:
-    """Points (K, 2) as (K, 3) at a layer's height."""
-    return np.column_stack([points_m, np.full(len(points_m), layer * LAYER_STEP_M)]).astype(np.float32)
 
 
 def _document(comparison: LayoutComparison) -> str:
@@ -229,17 +223,9 @@ def _blueprint(comparison: LayoutComparison) -> rrb.Blueprint:
         corners.append(motion.points(layout.map.walls))
     points = np.concatenate(corners)
     low, high = points.min(axis=0), points.max(axis=0)
-    x, y = ((low + high) / 2).tolist()
 
     def view(name: str, origin: str, aspect: float) -> rrb.Spatial3DView:
-        width, depth = (high - low).tolist()
-        height = EYE_HEIGHT * max(width / aspect, depth, 1.0)
-        eye = rrb.EyeControls3D(
-            kind=rrb.Eye3DKind.Orbital,
-            position=[x, y - 1e-3 * height, height],
-            look_target=[x, y, 0.0],
-            eye_up=[0.0, 1.0, 0.0],
-        )
+        eye = eye_above(low, high, aspect)
         return rrb.Spatial3DView(
             name=name, origin=origin, eye_controls=eye, line_grid=False, background=PAPER
         )

@@ -140,7 +140,7 @@ class World:
         for track in sorted(self._shown - set(frame.track_ids)):
             self._layers.clear(f"{ROOMS}/{track}")
         self._shown = set(frame.track_ids)
-        points = _lifted(np.nan_to_num(rooms.label_points_m), len(HEIGHTS)).tolist()
+        points = lifted(np.nan_to_num(rooms.label_points_m), len(HEIGHTS)).tolist()
         for number, track in enumerate(frame.track_ids):
             if track not in self._known:
                 self._known.add(track)
@@ -181,15 +181,15 @@ class World:
         self._pose = path[-1]
         far = np.hypot(*np.diff(way[:, :2], axis=0).T) > PATH_GAP_M
         lengths = np.diff([0, *np.flatnonzero(far) + 1, len(way)])
-        self._layers.add(PATH, Strips(_lifted(way[:, :2], HEIGHTS.index(PATH)), lengths.astype(np.int32)))
+        self._layers.add(PATH, Strips(lifted(way[:, :2], HEIGHTS.index(PATH)), lengths.astype(np.int32)))
         tip, back, side = ROBOT_LENGTH_M / 2, -ROBOT_LENGTH_M / 2, ROBOT_WIDTH_M / 2
         head = np.array([[tip, 0], [back, side], [0.6 * back, 0], [back, -side], [tip, 0]])
         cosine, sine = np.cos(self._pose[2]), np.sin(self._pose[2])
         there = head @ np.array([[cosine, sine], [-sine, cosine]]) + self._pose[:2]
-        self._layers.show(ROBOT, Strips(_lifted(there, HEIGHTS.index(ROBOT)), np.array([5], np.int32)))
+        self._layers.show(ROBOT, Strips(lifted(there, HEIGHTS.index(ROBOT)), np.array([5], np.int32)))
 
     def _log_lines(self, path: str, ends_m: FloatArray, colours: NDArray[np.uint8] | None = None) -> None:
-        points = _lifted(ends_m.reshape(-1, 2), HEIGHTS.index(path))
+        points = lifted(ends_m.reshape(-1, 2), HEIGHTS.index(path))
         self._layers.show(path, Strips(points, np.full(len(ends_m), 2, np.int32), colours))
 
     def _style_lines(self, path: str, width: float, colour: Colour | None) -> None:
@@ -239,12 +239,12 @@ def _cluster_colours(cluster: NDArray[np.int32]) -> NDArray[np.uint8]:
     return np.array([*colours, UNCLUSTERED_COLOUR])[cluster].astype(np.uint8)
 
 
-def _lifted(points_m: FloatArray, layer: int) -> NDArray[np.float32]:
+def lifted(points_m: FloatArray, layer: int) -> NDArray[np.float32]:
     """Points (K, 2) as (K, 3) at a layer's height."""
     return np.column_stack([points_m, np.full(len(points_m), layer * LAYER_STEP_M)]).astype(np.float32)
 
 
 def _rings(rings: Sequence[FloatArray]) -> Strips:
     """Closed rings at the height of rooms."""
-    points = _lifted(np.concatenate([np.zeros((0, 2)), *rings]), HEIGHTS.index(ROOMS))
+    points = lifted(np.concatenate([np.zeros((0, 2)), *rings]), HEIGHTS.index(ROOMS))
     return Strips(points, np.array([len(ring) for ring in rings], np.int32))
