@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import shapely
@@ -11,6 +11,7 @@ from shapely.geometry.base import BaseGeometry
 
 from rose2_logs.floor_plan.rooms import outline
 from rose2_logs.occupancy import UNKNOWN, BoolArray, FloatArray, GridGeometry, OccupancySnapshot, known_window
+from rose2_logs.parameters import OccupancyParameters
 from rose2_logs.pipeline import SnapshotAnalysis
 from rose2_logs.room_evidence import RoomEvidence, is_unsure
 from rose2_logs.rooms import Doorway
@@ -81,16 +82,21 @@ class PlanMap:
         -1 unknown, 0..100 occupancy in percent; row 0 at the origin.
     labels : (H, W) int32
         Number of the room that a cell belongs to, 0 for none.
+    occupancy : OccupancyParameters
+        Which cells are free and which occupied.
     """
 
     geometry: GridGeometry
     cells: NDArray[np.int8]
     labels: NDArray[np.int32]
+    occupancy: OccupancyParameters = field(default_factory=OccupancyParameters)
 
     def cropped(self) -> PlanMap:
         """Return the smallest part that holds all known cells and all rooms."""
         window = known_window((self.cells != UNKNOWN) | (self.labels > 0))
-        return PlanMap(self.geometry.part(window), self.cells[window], self.labels[window])
+        return replace(
+            self, geometry=self.geometry.part(window), cells=self.cells[window], labels=self.labels[window]
+        )
 
     def corners_m(self) -> FloatArray:
         """Corners (4, 2) of the smallest part that holds all rooms and all that is known but for rays."""
@@ -148,7 +154,11 @@ class RoomPlan:
 
 
 def plan_of_analysis(
-    snapshot: OccupancySnapshot, analysis: SnapshotAnalysis, evidence: RoomEvidence, title: str
+    snapshot: OccupancySnapshot,
+    analysis: SnapshotAnalysis,
+    evidence: RoomEvidence,
+    title: str,
+    occupancy: OccupancyParameters,
 ) -> RoomPlan:
     """Make the plan of a map of its own, whose rooms go by their numbers in it."""
     found = analysis.rooms
@@ -169,7 +179,7 @@ def plan_of_analysis(
             )
         )
     walls = None if analysis.walls is None else analysis.walls.segments_m.reshape(-1, 2, 2)
-    below = PlanMap(snapshot.geometry, snapshot.cells, found.labels)
+    below = PlanMap(snapshot.geometry, snapshot.cells, found.labels, occupancy)
     return RoomPlan(title, snapshot.geometry.frame_id, tuple(rooms), found.doorways, walls, below)
 
 

@@ -92,7 +92,7 @@ def segment_map(
         logger.warning("%s: %s", map_file, note)
     write_label_image(files[0], np.flipud(analysis.rooms.labels))
     evidence = room_evidence(snapshot, analysis.rooms, parameters.occupancy)
-    plan = plan_of_analysis(snapshot, analysis, evidence, name)
+    plan = plan_of_analysis(snapshot, analysis, evidence, name, parameters.occupancy)
     write_json(files[1], plan_geojson(plan, analysis.walls))
     write_image(files[2], draw_rooms(snapshot, analysis))
     more = write_plan(plan, [each for each in formats if each != "geojson"], folder, name)

@@ -12,7 +12,6 @@ import yaml
 from rose2_logs.errors import OutputError
 from rose2_logs.files import replacing
 from rose2_logs.occupancy import classify
-from rose2_logs.parameters import OccupancyParameters
 from rose2_logs.room_plan import PlanMap, RoomPlan
 from rose2_logs.sinks.label_image import write_label_image
 
@@ -89,7 +88,7 @@ def room_values(plan: RoomPlan) -> dict[int, int]:
 
 def labelled_pixels(below: PlanMap, values: dict[int, int]) -> np.ndarray[Any, np.dtype[np.uint8]]:
     """Pixels (H, W) uint8 of a map and its rooms, row 0 at the top."""
-    free, occupied = classify(below.cells, OccupancyParameters())
+    free, occupied = classify(below.cells, below.occupancy)
     pixels = np.full(below.cells.shape, UNKNOWN_PIXEL, np.uint8)
     pixels[free], pixels[occupied] = FREE, OCCUPIED
     of_room = np.zeros(int(below.labels.max(initial=0)) + 1, np.uint8)

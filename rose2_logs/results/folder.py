@@ -193,11 +193,10 @@ class RunResults:
     def open_maps(self) -> RunMaps | nullcontext[None]:
         """Open the maps of the run, as far as the annotated MCAP is there; a context manager."""
         path = self.annotated_log
-        return (
-            nullcontext()
-            if path is None
-            else RunMaps(path, str(self.summary["topic"]), self.parameters("reading").reading)
-        )
+        if path is None:
+            return nullcontext()
+        used = self.parameters("reading", "occupancy")
+        return RunMaps(path, str(self.summary["topic"]), used.reading, used.occupancy)
 
     def parameters(self, *blocks: str) -> Parameters:
         """Return those of some blocks that the run had; of another version's results as far as known."""

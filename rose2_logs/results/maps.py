@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rose2_logs.errors import LogError
 from rose2_logs.occupancy import GridGeometry, OccupancySnapshot
-from rose2_logs.parameters import ReadingParameters
+from rose2_logs.parameters import OccupancyParameters, ReadingParameters
 from rose2_logs.readers import LogReader, Selection, open_source
 from rose2_logs.readers.marker_lines import read_marker_lines
 from rose2_logs.readers.opening import DEFAULT_LIMITS
@@ -34,6 +34,8 @@ class RunMaps:
         The map topic.
     limits : ReadingParameters
         How much it may claim: those that its log was read with.
+    occupancy : OccupancyParameters, optional
+        Which cells were free and which occupied.
 
     Raises
     ------
@@ -41,8 +43,15 @@ class RunMaps:
         If it cannot be opened.
     """
 
-    def __init__(self, path: Path, topic: str, limits: ReadingParameters = DEFAULT_LIMITS) -> None:
+    def __init__(
+        self,
+        path: Path,
+        topic: str,
+        limits: ReadingParameters = DEFAULT_LIMITS,
+        occupancy: OccupancyParameters | None = None,
+    ) -> None:
         self._path, self._topic = path, topic
+        self._occupancy = occupancy or OccupancyParameters()
         self._source: MessageSource = open_source(path, limits)
 
     def __enter__(self) -> RunMaps:
@@ -69,7 +78,7 @@ class RunMaps:
         labels = labels_of_segmented(segmented.cells, segmented.geometry, rooms)
         # Where only the segmented map tells: what belongs to a room is free.
         cells = np.where((cells is segmented.cells) & (labels > 0), np.int8(0), cells)
-        return PlanMap(segmented.geometry, cells, labels)
+        return PlanMap(segmented.geometry, cells, labels, self._occupancy)
 
     def _logged(self, topic: str, log_time_ns: int) -> OccupancySnapshot:
         return LogReader(self._source, topic, Selection(start_ns=log_time_ns, end_ns=log_time_ns)).last()

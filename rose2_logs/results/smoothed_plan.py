@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import shapely
 
@@ -70,7 +72,7 @@ def smoothed_plan(results: RunResults, snapshot: int, maps: RunMaps | None) -> R
         for door in last.doorways
         if set(door.rooms) <= set(shown)
     )
-    below = PlanMap(then.map.geometry, then.map.cells, np.append(np.int32(0), tracks)[found.labels])
+    below = replace(then.map, labels=np.append(np.int32(0), tracks)[found.labels])
     title = f"{then.title}, rooms of the last map"
     return RoomPlan(title, then.frame_id, tuple(shown.values()), doorways, None, below)
 

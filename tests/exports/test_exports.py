@@ -24,6 +24,7 @@ from rose2_logs.errors import OutputError, ParameterError
 from rose2_logs.exports.dxf import LAYERS
 from rose2_logs.exports.formats import FORMATS, planned_files, write_plan
 from rose2_logs.occupancy import GridGeometry
+from rose2_logs.parameters import OccupancyParameters
 from rose2_logs.readers import open_log
 from rose2_logs.results.folder import RunResults
 from rose2_logs.room_plan import PlanMap
@@ -168,6 +169,20 @@ def test_more_rooms_than_values_are_still_told_apart(tmp_path: Path, caplog):
     assert all((cells[labels == number] == values[number]).all() for number in numbers)
     assert (cells[labels == 0] == 0).all()
     assert image.read_bytes().startswith(b"P5")
+
+
+def test_free_and_occupied_are_what_they_were_in_the_analysis(tmp_path: Path):
+    """Cells of 30 % are unknown by map_server's thresholds, and free by those of this plan."""
+    plan = two_rooms_plan()
+    cells, beside = plan.map.cells.copy(), (slice(0, 5), slice(0, 5))
+    cells[beside] = 30
+    for used, value in ((OccupancyParameters(), -1), (OccupancyParameters(free_max_percent=40.0), 0)):
+        below = dataclasses.replace(plan.map, cells=cells, occupancy=used)
+        folder = tmp_path / str(value)
+        folder.mkdir()
+        files = write_plan(dataclasses.replace(plan, map=below), ["map_server"], folder, "map")
+        with open_log(files[1]) as log:
+            assert (log.first().cells[beside] == value).all()
 
 
 def test_graph_is_read_by_networkx(plan, tmp_path: Path):
