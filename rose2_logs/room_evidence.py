@@ -28,6 +28,11 @@ def is_unsure(outline_wall_share: float | None) -> bool:
     return outline_wall_share is not None and outline_wall_share < UNSURE_BELOW
 
 
+def unsure_sign(outline_wall_share: float | None) -> str:
+    """Return what stands behind the number of a room: the sign where it is unsure."""
+    return UNSURE_SIGN if is_unsure(outline_wall_share) else ""
+
+
 @dataclass(frozen=True, eq=False)
 class RoomEvidence:
     """How sure the rooms of one map are.

@@ -11,7 +11,7 @@ from shapely.geometry.base import BaseGeometry
 
 from rose2_logs.drawing.shapes import Area, Colour, Drawing, Lines, Picture, Text, hatching
 from rose2_logs.occupancy import distinct_labels
-from rose2_logs.room_evidence import UNSURE_SIGN
+from rose2_logs.room_evidence import UNSURE_SIGN, unsure_sign
 from rose2_logs.room_plan import PlanMap, PlanRoom, RoomPlan, predicted_parts
 from rose2_logs.sinks.palette import track_colour
 from rose2_logs.sinks.shares import percent
@@ -193,7 +193,7 @@ def _label(room: PlanRoom, shape: BaseGeometry, style: PlanStyle) -> list[Text]:
     (x, y), radius = shapely.get_coordinates(circle)[0].tolist(), float(shapely.length(circle))
     area = f"{room.area_m2:.0f} m²" if room.area_m2 >= 10 else f"{room.area_m2:.1f} m²"
     font, rim = style.font, 0.14 * style.font
-    sign = UNSURE_SIGN if room.is_unsure else ""
+    sign = unsure_sign(room.confidence)
     number, name = f"{room.number}{sign}", f"{room.name}{sign}"
     if not style.has_names:
         return [Text(number, x, y, font, is_bold=True, rim=rim)]

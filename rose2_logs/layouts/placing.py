@@ -20,7 +20,7 @@ from rose2_logs.explored import ExploredPart
 from rose2_logs.occupancy import UNKNOWN, BoolArray, FloatArray, OccupancySnapshot, classify, known_window
 from rose2_logs.parameters import OccupancyParameters, SpectrumParameters
 from rose2_logs.rose.spectrum import angular_energy, compute_spectrum
-from rose2_logs.tracking.alignment import POINTS_MIN, RigidMotion, WallFit, evenly, wall_points
+from rose2_logs.tracking.alignment import POINTS_MIN, RigidMotion, WallFit, evenly, wall_faces
 
 WALL_REACH_M = 0.2
 """A wall is on a wall of the other map when one lies this near: a wall's thickness, and SLAM's drift."""
@@ -95,7 +95,7 @@ class PlacedMap:
         occupied_m = snapshot.geometry.cell_centres(*np.nonzero(self.occupied))
         self.tree = cKDTree(occupied_m)
         self.reach_m = max(WALL_REACH_M, REACH_MIN_CELLS * self.resolution_m)
-        faces_m = wall_points(snapshot, occupancy)
+        faces_m = wall_faces(self.free, self.occupied, snapshot.geometry)
         least = max(POINTS_MIN, FACES_MIN_SHARE * len(occupied_m))
         self.walls = faces_m if len(faces_m) >= least else occupied_m
 

@@ -12,7 +12,7 @@ from rose2_logs.drawing.chart import Mark, Series, lane_chart, line_chart
 from rose2_logs.occupancy import BoolArray, FloatArray, IntArray
 from rose2_logs.report.words import css, css_colour, duration
 from rose2_logs.results.folder import RunResults
-from rose2_logs.room_evidence import UNSURE_SIGN, is_unsure
+from rose2_logs.room_evidence import UNSURE_SIGN, unsure_sign
 from rose2_logs.sinks.palette import state_colours
 
 BLUE, ORANGE, GREEN, VIOLET = "#2f7ed8", "#e07b1a", "#2a9d5c", "#8a5fd0"
@@ -204,7 +204,7 @@ def _lanes(
     lives = {row["track"]: row for row in results.table("tracks", TRACK_COLUMNS).to_pylist()}
     rows = [lives[int(number)] for number in numbers[shown]]
     title = "When each room was there, and when it was right"
-    names = [f"{row['track']}{UNSURE_SIGN if is_unsure(row['outline_wall_share']) else ''}" for row in rows]
+    names = [f"{row['track']}{unsure_sign(row['outline_wall_share'])}" for row in rows]
     colours = [{state: css(colour) for state, colour in state_colours(row["track"]).items()} for row in rows]
     states = _states(results.snapshots["snapshot"], rows, present[shown])
     draw: Callable[[RunAxis], str] = lambda axis: lane_chart(  # noqa: E731

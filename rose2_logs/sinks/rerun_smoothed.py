@@ -17,6 +17,7 @@ from rose2_logs.sinks.rerun_world import (
     OUTLINE_POINTS,
     OUTLINE_SHADE,
     label_style,
+    lifted,
     line_style,
     room_label,
 )
@@ -25,9 +26,9 @@ from rose2_logs.tracking.smoothed_run import SmoothedSnapshot
 
 SMOOTHED, SEEN_SHARE = "/world/smoothed", "/run/seen_share"
 OUTLINES, NAMES = f"{SMOOTHED}/outlines", f"{SMOOTHED}/names"
-HEIGHT_M = (HEIGHTS.index(FILLS) + 0.5) * LAYER_STEP_M
-"""It stands in place of the map's own rooms, right above them."""
-OUTLINE_HEIGHT_M, NAME_HEIGHT_M = HEIGHT_M + LAYER_STEP_M, len(HEIGHTS) * LAYER_STEP_M
+LAYER = HEIGHTS.index(FILLS) + 0.5
+"""They stand in place of the map's own rooms, right above them."""
+OUTLINE_LAYER, NAME_LAYER = LAYER + 1, len(HEIGHTS)
 
 
 class SmoothedWorld:
@@ -53,10 +54,10 @@ class SmoothedWorld:
         snapshot = found.snapshot
         self._layers.begin(snapshot.log_time_ns, snapshot.stamp_ns, snapshot.index, coverage)
         pictures = MapPictures(snapshot)
-        self._layers.show(SMOOTHED, pictures.rooms(found.rooms.labels, found.track_ids, HEIGHT_M))
+        self._layers.show(SMOOTHED, pictures.rooms(found.rooms.labels, found.track_ids, LAYER * LAYER_STEP_M))
         self._layers.show(OUTLINES, _outlines(found))
         seen = RoomMap.from_labels(found.rooms.labels, snapshot.geometry)
-        points = seen.label_points_m.tolist()
+        points = lifted(seen.label_points_m, NAME_LAYER).tolist()
         shown = set()
         for room, (track, area, last) in enumerate(
             zip(
@@ -74,7 +75,7 @@ class SmoothedWorld:
             if area > 0:
                 shown.add(track)
                 text = room_label(track, last, view_side_m, told=percent(min(share, 1.0)))
-                self._layers.show(f"{NAMES}/{track}", Label((*points[room], NAME_HEIGHT_M), text))
+                self._layers.show(f"{NAMES}/{track}", Label(tuple(points[room]), text))
         for track in sorted(self._named - shown):
             self._layers.clear(f"{NAMES}/{track}")
         self._named = shown
@@ -97,7 +98,6 @@ def _outlines(found: SmoothedSnapshot) -> Strips:
     count = [len(of_room) for of_room in rings]
     lengths = [len(ring) for of_room in rings for ring in of_room]
     points = then.points(np.concatenate([np.zeros((0, 2)), *(ring for of_room in rings for ring in of_room)]))
-    lifted = np.column_stack([points, np.full(len(points), OUTLINE_HEIGHT_M)]).astype(np.float32)
     colours = np.array([track_colour(track) for track in found.track_ids], float).reshape(-1, 3)
     of_rings = np.repeat((OUTLINE_SHADE * colours).astype(np.uint8), count, axis=0)
-    return Strips(lifted, np.array(lengths, np.int32), of_rings)
+    return Strips(lifted(points, OUTLINE_LAYER), np.array(lengths, np.int32), of_rings)

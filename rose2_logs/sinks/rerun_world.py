@@ -239,8 +239,8 @@ def _cluster_colours(cluster: NDArray[np.int32]) -> NDArray[np.uint8]:
     return np.array([*colours, UNCLUSTERED_COLOUR])[cluster].astype(np.uint8)
 
 
-def lifted(points_m: FloatArray, layer: int) -> NDArray[np.float32]:
-    """Points (K, 2) as (K, 3) at a layer's height."""
+def lifted(points_m: FloatArray, layer: float) -> NDArray[np.float32]:
+    """Points (K, 2) as (K, 3) at a layer's height; half of one lies between two."""
     return np.column_stack([points_m, np.full(len(points_m), layer * LAYER_STEP_M)]).astype(np.float32)
 
 

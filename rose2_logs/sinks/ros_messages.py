@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from rose2_logs.occupancy import UNKNOWN, FloatArray, classify
 from rose2_logs.parameters import OccupancyParameters
-from rose2_logs.room_evidence import UNSURE_SIGN, is_unsure
+from rose2_logs.room_evidence import unsure_sign
 from rose2_logs.sinks.cdr import CdrWriter
 from rose2_logs.sinks.palette import track_colour
 from rose2_logs.tracking.frames import TrackedSnapshot
@@ -176,7 +176,7 @@ class MessageMaker:
             red, green, blue = (value / 255 for value in track_colour(track))
             fill, line = (red, green, blue, FILL_OPACITY), (red * 0.7, green * 0.7, blue * 0.7, 1.0)
             x, y = points[number]
-            sign = UNSURE_SIGN if is_unsure(evidence_of(frame, number)[0]) else ""
+            sign = unsure_sign(evidence_of(frame, number)[0])
             made += [
                 Marker("rooms", track, TRIANGLES, corners[number], fill),
                 Marker(
