@@ -11,7 +11,7 @@ import pytest
 from finished_runs import SAMPLE_LOGS, run_of
 from hypothesis import settings
 
-from rose2_logs.notices import PACKAGE
+from rose2_logs.system.warnings import PACKAGE
 
 # Where CI is set, as by .ci/run, properties are tried on the same examples each time, however slow the
 # machine is: a failure there is of the change at hand and can be had again. Elsewhere there are new ones.

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rose2_logs.occupancy import GridGeometry, OccupancySnapshot
+from rose2_logs.model.occupancy import GridGeometry, OccupancySnapshot
 
 WALL_M = 0.15
 MARGIN_M = 1.0

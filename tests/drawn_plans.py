@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from rose2_logs.occupancy import GridGeometry
-from rose2_logs.room_plan import PlanMap, PlanRoom, RoomPlan
-from rose2_logs.rooms import Doorway
+from rose2_logs.model.occupancy import GridGeometry
+from rose2_logs.model.room_plan import PlanMap, PlanRoom, RoomPlan
+from rose2_logs.model.rooms import Doorway
 
 RESOLUTION_M = 0.1
 LEFT, RIGHT = 3, 120

@@ -7,11 +7,11 @@ import dataclasses
 import numpy as np
 from drawn_maps import MARGIN_M, SIZE_M, office, snapshot
 
-from rose2_logs.layouts.layout import FinalLayout
-from rose2_logs.layouts.placing import PlacedMap
-from rose2_logs.occupancy import OccupancySnapshot
-from rose2_logs.parameters import Parameters
-from rose2_logs.pipeline import analyse
+from rose2_logs.comparison.final_layout import FinalLayout
+from rose2_logs.comparison.placement import PlacedMap
+from rose2_logs.config.parameters import Parameters
+from rose2_logs.model.occupancy import OccupancySnapshot
+from rose2_logs.segmentation.pipeline import analyse
 
 RESOLUTION_M = 0.05
 ROOM_1, ROOM_2, CORRIDOR = (2.5, 4.0), (7.5, 4.0), (5.0, 1.0)

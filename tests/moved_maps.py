@@ -7,9 +7,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from rose2_logs.occupancy import GridGeometry, OccupancySnapshot
-from rose2_logs.tracking.alignment import RigidMotion
+from rose2_logs.model.occupancy import GridGeometry, OccupancySnapshot
 from rose2_logs.tracking.matching import resample_labels
+from rose2_logs.tracking.registration import RigidMotion
 
 
 def motion_about(

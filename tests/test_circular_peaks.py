@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import signal
 
-from rose2_logs.circular_peaks import circular_peaks
+from rose2_logs.segmentation.circular_peaks import circular_peaks
 
 HEIGHTS = st.lists(st.integers(0, 30), min_size=3, max_size=40, unique=True)
 

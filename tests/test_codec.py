@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 from shapely.geometry import MultiPolygon, Polygon, box
 
-from rose2_logs.codec import Codec, dataclasses_within
-from rose2_logs.occupancy import CellValues, GridGeometry
-from rose2_logs.parameters import Parameters
-from rose2_logs.pipeline import SnapshotAnalysis, analyse
-from rose2_logs.room_evidence import RoomEvidence, room_evidence
+from rose2_logs.config.parameters import Parameters
+from rose2_logs.model.occupancy import CellValues, GridGeometry
+from rose2_logs.model.room_quality import RoomEvidence, room_evidence
+from rose2_logs.runs.codec import Codec, dataclasses_within
+from rose2_logs.segmentation.pipeline import SnapshotAnalysis, analyse
 
 CODEC = Codec([SnapshotAnalysis, RoomEvidence])
 

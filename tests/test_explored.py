@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from saved_maps import two_rooms
 
-from rose2_logs.explored import ExploredPart, block_side
-from rose2_logs.occupancy import GridGeometry, OccupancySnapshot, is_same_to_analysis
-from rose2_logs.parameters import OccupancyParameters, Parameters
-from rose2_logs.pipeline import analyse
+from rose2_logs.config.parameters import OccupancyParameters, Parameters
+from rose2_logs.model.explored import ExploredPart, block_side
+from rose2_logs.model.occupancy import GridGeometry, OccupancySnapshot, is_same_to_analysis
+from rose2_logs.segmentation.pipeline import analyse
 
 FREE, OCCUPIED, UNKNOWN = 0, 100, -1
 

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from drawn_maps import office, snapshot
 
+from rose2_logs.config.parameters import Parameters
 from rose2_logs.errors import InvalidMapError, OutputError
-from rose2_logs.journal import MAGIC, Found, Journal, JournaledWorkers, kept_maps
-from rose2_logs.occupancy import OccupancySnapshot
-from rose2_logs.parameters import Parameters
-from rose2_logs.pipeline import analyse
-from rose2_logs.room_evidence import room_evidence
-from rose2_logs.workers import Workers
+from rose2_logs.model.occupancy import OccupancySnapshot
+from rose2_logs.model.room_quality import room_evidence
+from rose2_logs.runs.journal import MAGIC, Found, Journal, JournaledWorkers, kept_maps
+from rose2_logs.segmentation.pipeline import analyse
+from rose2_logs.system.workers import Workers
 
 FACTS = {"topic": "/map", "parameters": {"walls": {"a": 0.1}}}
 FRAME = 12

@@ -10,9 +10,16 @@ import numpy as np
 import pytest
 from drawn_maps import office, snapshot
 
-from rose2_logs.parameters import Parameters
-from rose2_logs.parcels import ALIGNMENT_BYTES, LARGE_BYTES, ParcelError, pack, parcel_folders, unpack
-from rose2_logs.pipeline import SnapshotAnalysis, analyse
+from rose2_logs.config.parameters import Parameters
+from rose2_logs.segmentation.pipeline import SnapshotAnalysis, analyse
+from rose2_logs.system.shared_memory import (
+    ALIGNMENT_BYTES,
+    LARGE_BYTES,
+    ParcelError,
+    pack,
+    parcel_folders,
+    unpack,
+)
 
 
 def test_an_analysis_comes_out_as_it_went_in(tmp_path: Path):
@@ -78,7 +85,7 @@ def test_where_no_folder_has_room_it_says_so_and_leaves_nothing(tmp_path: Path):
     """With the greatest size of a file set low, as on a full disk."""
     script = f"""
 import resource, numpy as np
-from rose2_logs.parcels import pack, ParcelError
+from rose2_logs.system.shared_memory import pack, ParcelError
 resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
 try:
     pack(np.ones(1_000_000), [{str(tmp_path)!r}])

@@ -5,9 +5,9 @@ import pytest
 import shapely
 from drawn_maps import agreement, office, snapshot
 
+from rose2_logs.config.parameters import Parameters
 from rose2_logs.errors import ParameterError
-from rose2_logs.parameters import Parameters
-from rose2_logs.pipeline import analyse
+from rose2_logs.segmentation.pipeline import analyse
 
 PARAMETERS = Parameters()
 

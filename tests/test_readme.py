@@ -6,7 +6,7 @@ import re
 import subprocess
 from pathlib import Path
 
-from rose2_logs.parameters import load_parameters
+from rose2_logs.config.parameters import load_parameters
 
 PROJECT = Path(__file__).parents[1]
 README = (PROJECT / "README.md").read_text(encoding="utf-8")

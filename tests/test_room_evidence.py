@@ -10,10 +10,10 @@ import shapely
 from drawn_maps import office, snapshot
 from drawn_rooms import rows
 
-from rose2_logs.occupancy import OccupancySnapshot
-from rose2_logs.parameters import OccupancyParameters
-from rose2_logs.room_evidence import RoomEvidence, room_evidence
-from rose2_logs.rooms import RoomMap
+from rose2_logs.config.parameters import OccupancyParameters
+from rose2_logs.model.occupancy import OccupancySnapshot
+from rose2_logs.model.room_quality import RoomEvidence, room_evidence
+from rose2_logs.model.rooms import RoomMap
 
 PARAMETERS = OccupancyParameters()
 

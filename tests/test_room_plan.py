@@ -7,7 +7,7 @@ import pytest
 import shapely
 from drawn_plans import LEFT, RIGHT, two_rooms_plan
 
-from rose2_logs.room_plan import predicted_parts
+from rose2_logs.model.room_plan import predicted_parts
 
 
 @pytest.mark.parametrize("yaw_rad", [0.0, 0.5, -2.0])

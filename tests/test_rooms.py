@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import shapely
 
-from rose2_logs.occupancy import GridGeometry
-from rose2_logs.rooms import RoomMap
+from rose2_logs.model.occupancy import GridGeometry
+from rose2_logs.model.rooms import RoomMap
 
 GEOMETRY = GridGeometry(0.1, (-3.0, 2.0), 0.4, "map", (40, 100))
 

@@ -13,11 +13,11 @@ import pytest
 from finished_runs import SAMPLE_LOGS
 from saved_maps import FREE, WALL, save_map, save_run, two_rooms
 
+from rose2_logs.config.parameters import Parameters
 from rose2_logs.errors import LogError, OutputError, ParameterError
-from rose2_logs.parameters import Parameters
-from rose2_logs.provenance import fingerprint, log_files
-from rose2_logs.readers import Selection
-from rose2_logs.run import TABLES, RunOptions, analyse_log, log_stem, seconds_into_log
+from rose2_logs.io import Selection
+from rose2_logs.runs.provenance import fingerprint, log_files
+from rose2_logs.workflows.analyze import TABLES, RunOptions, analyse_log, log_stem, seconds_into_log
 
 SHARED_BAGS = Path(__file__).parents[2] / "shared" / "bags"
 TABLES_ONLY = RunOptions(recording=False, annotated_log=False)
@@ -104,9 +104,7 @@ def test_a_map_that_did_not_change_is_not_analysed_again(tmp_path: Path, monkeyp
     assert (result.totals.snapshots, result.totals.unchanged) == (5, 2)
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert summary["results"]["unchanged_maps"] == 2
-    monkeypatch.setattr(
-        "rose2_logs.tracked_stream.is_same_to_analysis", lambda before, now, parameters: False
-    )
+    monkeypatch.setattr("rose2_logs.runs.stream.is_same_to_analysis", lambda before, now, parameters: False)
     each = analyse_log(folder, tmp_path / "each", options)
     assert (each.totals.snapshots, each.totals.unchanged) == (5, 0)
     assert table_bytes(tmp_path / "out") == table_bytes(tmp_path / "each")

@@ -14,8 +14,8 @@ import pytest
 import yaml
 
 from rose2_logs.errors import InvalidMapError
-from rose2_logs.readers.descriptions import load_yaml
-from rose2_logs.report import page
+from rose2_logs.io.discovery import load_yaml
+from rose2_logs.outputs.report import page
 
 PACKAGE = Path(__file__).parents[1] / "rose2_logs"
 FILES = sorted(PACKAGE.rglob("*.py"))

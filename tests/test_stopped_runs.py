@@ -17,12 +17,12 @@ from typing import Any
 import pytest
 from saved_maps import save_map, save_run, two_rooms
 
-from rose2_logs.cli import main
+from rose2_logs.cli.main import main
+from rose2_logs.config.parameters import Parameters
 from rose2_logs.errors import AlreadyWholeError, InvalidMapError, OutputError
-from rose2_logs.files import locked
-from rose2_logs.output_folder import OutputFolder, difference
-from rose2_logs.parameters import Parameters
-from rose2_logs.run import TABLES, RunOptions, analyse_log
+from rose2_logs.runs.output_folder import OutputFolder, difference
+from rose2_logs.system.files import locked
+from rose2_logs.workflows.analyze import TABLES, RunOptions, analyse_log
 
 SEEN = (110, 130, 150, 170, 190, 210, 240)
 OPTIONS = {"recording": False, "annotated_log": True}
@@ -31,7 +31,7 @@ JOURNAL, PART, LOCK = ".out.journal", ".out.part", ".out.lock"
 KILLED = """
 import os, signal, sys
 from pathlib import Path
-from rose2_logs.run import RunOptions, analyse_log
+from rose2_logs.workflows.analyze import RunOptions, analyse_log
 
 log, folder, moment, overwrite, recording = sys.argv[1:]
 kill = lambda: os.kill(os.getpid(), signal.SIGKILL)
@@ -135,7 +135,7 @@ def test_results_that_only_the_earlier_run_has_made_go_with_it(log: Path, tmp_pa
 
 
 def count_calls(monkeypatch, analysed: list[int]) -> None:
-    from rose2_logs import tracked_stream
+    from rose2_logs.runs import stream as tracked_stream
 
     real = tracked_stream.analyse
 

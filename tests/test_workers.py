@@ -10,9 +10,15 @@ import time
 import numpy as np
 import pytest
 
-from rose2_logs import parcels
 from rose2_logs.errors import InvalidMapError
-from rose2_logs.workers import LOOK_AHEAD_PER_WORKER, WorkerError, Workers, ordered_map, usable_processes
+from rose2_logs.system import shared_memory as parcels
+from rose2_logs.system.workers import (
+    LOOK_AHEAD_PER_WORKER,
+    WorkerError,
+    Workers,
+    ordered_map,
+    usable_processes,
+)
 
 
 def slow_square(number: int) -> int:
@@ -122,7 +128,7 @@ def test_a_killed_worker_is_one_clear_line():
 def test_a_process_is_held_to_one_thread_also_by_libraries_loaded_later():
     """Several processes share the processors, each with a whole log."""
     program = (
-        "from rose2_logs.workers import limit_process_to_one_thread\n"
+        "from rose2_logs.system.workers import limit_process_to_one_thread\n"
         "limit_process_to_one_thread()\n"
         "import cv2, numpy, scipy.linalg, sklearn.cluster\n"
         "from threadpoolctl import threadpool_info\n"

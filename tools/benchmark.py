@@ -43,10 +43,10 @@ from benchmarking.sensitivity import (
 from benchmarking.speed import FULL, QUICK, SpeedOptions, measure_speed
 from benchmarking.speed_report import write_speed_report
 
+from rose2_logs.config.parameters import load_parameters
 from rose2_logs.errors import Rose2LogsError
-from rose2_logs.parameters import load_parameters
-from rose2_logs.pipeline import METHODS
-from rose2_logs.sinks.summary import write_json
+from rose2_logs.runs.summary import write_json
+from rose2_logs.segmentation.pipeline import METHODS
 
 SHARED_CASES = Path(__file__).parents[2] / "shared" / "benchmark" / "cases.json"
 """The room segmentation benchmark's place beside the project."""

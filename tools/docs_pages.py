@@ -16,9 +16,9 @@ from typing import Any
 import pyarrow as pa
 import typer
 
-from rose2_logs.cli import app
-from rose2_logs.parameters import Parameters, describe_parameters
-from rose2_logs.sinks import table_schemas
+from rose2_logs.cli.main import app
+from rose2_logs.config.parameters import Parameters, describe_parameters
+from rose2_logs.runs import table_schemas
 
 NAME = "rose2-logs"
 TABLES = {

@@ -76,7 +76,7 @@ def fuzz(target: str, arguments: list[str]) -> None:
     """Be the process that runs one target; it ends within."""
     import atheris
 
-    with atheris.instrument_imports(include=["rose2_logs.readers", "rose2_logs.sinks.mcap_input"]):
+    with atheris.instrument_imports(include=["rose2_logs.io", "rose2_logs.outputs.mcap.input"]):
         from fuzzing import targets
 
     targets.quieten()

@@ -20,7 +20,7 @@ from rosbags.rosbag2 import Writer as Bag2FileWriter
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
-from rose2_logs.occupancy import GridGeometry
+from rose2_logs.model.occupancy import GridGeometry
 
 NANOSECONDS = 1_000_000_000
 MAP, TF, ODOM = "/map", "/tf", "/odom"

@@ -22,23 +22,23 @@ import shapely
 from numpy.typing import NDArray
 from PIL import Image as PillowImage
 
-from rose2_logs.comparing import compare_runs
+from rose2_logs.config.parameters import Parameters, ReadingParameters
+from rose2_logs.drawing.case_picture import room_colours
 from rose2_logs.drawing.pixels import as_pixels
 from rose2_logs.drawing.plan import PANEL, draw_plan
-from rose2_logs.explored import ExploredPart
-from rose2_logs.floor_plan.stage import make_floor_plan
-from rose2_logs.occupancy import UNKNOWN, BoolArray, FloatArray, OccupancySnapshot, known_window
-from rose2_logs.parameters import Parameters, ReadingParameters
-from rose2_logs.pipeline import SnapshotAnalysis, analyse
-from rose2_logs.readers import Selection, open_log
-from rose2_logs.results.folder import RunResults
-from rose2_logs.rose.spectrum import Spectrum, compute_spectrum
-from rose2_logs.rose.stage import find_structure
-from rose2_logs.run import RunOptions, analyse_log, seconds_into_log
-from rose2_logs.sinks.comparison_picture import room_colours
-from rose2_logs.topology.splitting import split_rooms
-from rose2_logs.topology.voronoi import voronoi_graph
-from rose2_logs.walls.stage import count_walls, find_walls
+from rose2_logs.io import Selection, open_log
+from rose2_logs.model.explored import ExploredPart
+from rose2_logs.model.occupancy import UNKNOWN, BoolArray, FloatArray, OccupancySnapshot, known_window
+from rose2_logs.runs.folder import RunResults
+from rose2_logs.segmentation.floor_plan.stage import make_floor_plan
+from rose2_logs.segmentation.pipeline import SnapshotAnalysis, analyse
+from rose2_logs.segmentation.rose.spectrum import Spectrum, compute_spectrum
+from rose2_logs.segmentation.rose.stage import find_structure
+from rose2_logs.segmentation.topology.splitting import split_rooms
+from rose2_logs.segmentation.topology.voronoi import voronoi_graph
+from rose2_logs.segmentation.walls.stage import count_walls, find_walls
+from rose2_logs.workflows.analyze import RunOptions, analyse_log, seconds_into_log
+from rose2_logs.workflows.compare import compare_runs
 
 Image = NDArray[np.uint8]
 Colour = tuple[int, int, int]

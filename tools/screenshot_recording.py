@@ -19,7 +19,7 @@ from typing import Any
 
 from rerun.experimental import ViewerClient
 
-from rose2_logs.sinks.rerun_blueprint import COVERAGE_UNIT
+from rose2_logs.outputs.rerun.blueprint import COVERAGE_UNIT
 
 PORT = 9899
 LOAD_TIMEOUT_S = 60.0

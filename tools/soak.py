@@ -19,10 +19,10 @@ from benchmarking.gauges import memory_now
 from log_writing import robot_log
 from numpy.typing import NDArray
 
-from rose2_logs.occupancy import GridGeometry
-from rose2_logs.run import RunOptions, RunResult, analyse_log
-from rose2_logs.tracking.frames import TrackedSnapshot
-from rose2_logs.workers import keep_freed_memory
+from rose2_logs.model.occupancy import GridGeometry
+from rose2_logs.system.workers import keep_freed_memory
+from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot
+from rose2_logs.workflows.analyze import RunOptions, RunResult, analyse_log
 
 RESOLUTION_M = 0.1
 ROOMS = (2, 2)

@@ -14,7 +14,7 @@ from typing import Any, Self
 from rose2_logs.batch.remote import EXTRA
 from rose2_logs.batch.task import LogOutcome, LogTask, Progress, analyse_task
 from rose2_logs.errors import ParameterError
-from rose2_logs.workers import WorkerError
+from rose2_logs.system.workers import WorkerError
 
 logger = logging.getLogger(__name__)
 

@@ -8,9 +8,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from rose2_logs import files
 from rose2_logs.batch.task import RUNNING
-from rose2_logs.files import writing
+from rose2_logs.system import files
+from rose2_logs.system.files import writing
 
 LOGS_FOLDER = "logs"
 WORK_FOLDER = ".batch"

@@ -15,7 +15,7 @@ from types import TracebackType
 from typing import Self
 
 from rose2_logs.batch.task import LogOutcome, LogTask, Progress, analyse_task
-from rose2_logs.workers import limit_process_to_one_thread, usable_processes
+from rose2_logs.system.workers import limit_process_to_one_thread, usable_processes
 
 DEATH_TIMEOUT_S = 5.0
 """For a process that has closed its pipe to be gone, so that its exit code can be told."""

@@ -13,8 +13,8 @@ from urllib.parse import parse_qsl, unquote, urlsplit
 from urllib.request import url2pathname
 
 from rose2_logs.errors import LogError
-from rose2_logs.files import readable
-from rose2_logs.readers.discovery import MAP_ENDINGS, STORAGE_ENDINGS, is_bag, is_storage, logs_among
+from rose2_logs.io.discovery import MAP_ENDINGS, STORAGE_ENDINGS, is_bag, is_storage, logs_among
+from rose2_logs.system.files import readable
 
 _WEB = ("http://", "https://")
 _SIGNED = re.compile("signature|token|credential|^sig$", re.IGNORECASE)

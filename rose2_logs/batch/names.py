@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 
 from rose2_logs.batch.location import Location
-from rose2_logs.readers.discovery import stem_of
+from rose2_logs.io.discovery import stem_of
 
 LONGEST_BYTES = 120
 """File systems take names of 255 bytes; endings and ``log=`` come on top."""

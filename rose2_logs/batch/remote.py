@@ -11,7 +11,7 @@ from urllib.parse import unquote
 
 from rose2_logs.batch.location import Location
 from rose2_logs.errors import LogError
-from rose2_logs.readers.discovery import (
+from rose2_logs.io.discovery import (
     IMAGE_ENDINGS,
     MAP_ENDINGS,
     STORAGE_ENDINGS,

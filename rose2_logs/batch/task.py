@@ -23,7 +23,7 @@ from rose2_logs import __version__
 from rose2_logs.batch.location import Location
 from rose2_logs.batch.record import BatchSettings, Record, Signature, signature_of
 from rose2_logs.errors import LogError, OutputError, Rose2LogsError
-from rose2_logs.notices import PACKAGE, Notices, gathered
+from rose2_logs.system.warnings import PACKAGE, Notices, gathered
 
 RETRY_PAUSE_S = 2.0
 """Before the second try after a fault of storage or network; doubled for each further one."""
@@ -222,9 +222,9 @@ def _analyse(task: LogTask, report: Report, notices: Notices) -> LogOutcome:
 
 
 def _analyse_local(task: LogTask, path: Path, signature: Signature, report: Report) -> LogOutcome:
-    from rose2_logs.provenance import fingerprint
-    from rose2_logs.readers import Selection
-    from rose2_logs.run import SUMMARY, RunOptions, analyse_log, seconds_into_log
+    from rose2_logs.io import Selection
+    from rose2_logs.runs.provenance import fingerprint
+    from rose2_logs.workflows.analyze import SUMMARY, RunOptions, analyse_log, seconds_into_log
 
     if task.known is not None:
         is_same = fingerprint(path)["sha256"] == task.known.sha256

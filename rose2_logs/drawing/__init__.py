@@ -1,1 +1,1 @@
-"""Floor plans and curves drawn as SVG and as pixels."""
+"""Floor plans, maps and curves drawn as SVG and as pixels."""

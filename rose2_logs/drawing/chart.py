@@ -9,9 +9,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from rose2_logs.drawing.axes import Axis, axis_of
 from rose2_logs.drawing.svg import escape, quoteattr
-from rose2_logs.occupancy import FloatArray, IntArray
-from rose2_logs.sinks.axes import Axis, axis_of
+from rose2_logs.model.occupancy import FloatArray, IntArray
 
 WIDTH, HEIGHT = 420.0, 210.0
 LEFT, RIGHT, TOP, BOTTOM = 44.0, 12.0, 10.0, 36.0

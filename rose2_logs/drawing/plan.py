@@ -9,12 +9,12 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
+from rose2_logs.drawing.palette import track_colour
 from rose2_logs.drawing.shapes import Area, Colour, Drawing, Lines, Picture, Text, hatching
-from rose2_logs.occupancy import distinct_labels
-from rose2_logs.room_evidence import UNSURE_SIGN, unsure_sign
-from rose2_logs.room_plan import PlanMap, PlanRoom, RoomPlan, predicted_parts
-from rose2_logs.sinks.palette import track_colour
-from rose2_logs.sinks.shares import percent
+from rose2_logs.model.occupancy import distinct_labels
+from rose2_logs.model.room_plan import PlanMap, PlanRoom, RoomPlan, predicted_parts
+from rose2_logs.model.room_quality import UNSURE_SIGN, unsure_sign
+from rose2_logs.system.text import percent
 
 UNKNOWN_GREY, FREE_GREY, OCCUPIED_GREY = 232, 255, 25
 SEEN_OPACITY, PREDICTED_OPACITY, SHAPE_OPACITY = 0.55, 0.22, 0.5

@@ -9,7 +9,7 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from rose2_logs.occupancy import FloatArray
+from rose2_logs.model.occupancy import FloatArray
 
 Colour = tuple[int, int, int]
 """Red, green, blue in 0..255."""

@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rose2_logs.config.parameters import Parameters
 from rose2_logs.errors import CasesError
 from rose2_logs.evaluation.cases import Case
 from rose2_logs.evaluation.scores import Scores, mean_scores, score
-from rose2_logs.parameters import Parameters
-from rose2_logs.workers import ordered_map
+from rose2_logs.system.workers import ordered_map
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +67,7 @@ def evaluate_cases(
 
 def evaluate_case(case: Case, method: str, parameters: Parameters) -> CaseResult:
     """Segment and score one case."""
-    from rose2_logs.pipeline import analyse
+    from rose2_logs.segmentation.pipeline import analyse
 
     snapshot, truth = case.snapshot(), case.truth()
     if snapshot.cells.shape != truth.shape:

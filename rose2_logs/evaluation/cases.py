@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from PIL import Image, UnidentifiedImageError
 
 from rose2_logs.errors import CasesError
-from rose2_logs.occupancy import UNKNOWN, GridGeometry, OccupancySnapshot
+from rose2_logs.model.occupancy import UNKNOWN, GridGeometry, OccupancySnapshot
 
 OCCUPIED_MAX_GREY = 89
 """Darker is occupied: (255 - grey) / 255 above map_server's default occupied_thresh of 0.65."""

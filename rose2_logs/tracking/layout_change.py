@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rose2_logs.occupancy import FloatArray
-from rose2_logs.rooms import RoomMap
-from rose2_logs.tracking.alignment import RigidMotion
+from rose2_logs.model.occupancy import FloatArray
+from rose2_logs.model.rooms import RoomMap
 from rose2_logs.tracking.matching import RegionShape, cut_out_rooms
+from rose2_logs.tracking.registration import RigidMotion
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rose2_logs.occupancy import BoolArray, FloatArray, GridGeometry
-from rose2_logs.tracking.alignment import RigidMotion
+from rose2_logs.model.occupancy import BoolArray, FloatArray, GridGeometry
+from rose2_logs.tracking.registration import RigidMotion
 
 ROWS_AT_ONCE = 256
 """Rows resampled together: bounds the memory for coordinates to some megabytes for the largest maps."""

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from rose2_logs.occupancy import FloatArray
-from rose2_logs.tracking.alignment import RigidMotion
+from rose2_logs.model.occupancy import FloatArray
 from rose2_logs.tracking.matching import RegionShape
+from rose2_logs.tracking.registration import RigidMotion
 
 
 class TrackMemory:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rose2_logs.occupancy import FloatArray
+from rose2_logs.model.occupancy import FloatArray
 
 DIRECT_LABELS = 1000
 """Labels up to this one are counted as they are: their table of pairs stays below the size of a map."""

@@ -7,15 +7,15 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from rose2_logs.occupancy import BoolArray, FloatArray, OccupancySnapshot
-from rose2_logs.parameters import OccupancyParameters, TrackingParameters
-from rose2_logs.pipeline import SnapshotAnalysis
-from rose2_logs.rooms import RoomMap
-from rose2_logs.tracking.alignment import MapAligner
-from rose2_logs.tracking.frames import EVENT_ORDER, MAP_TRACK, EventKind, RoomEvent
+from rose2_logs.config.parameters import OccupancyParameters, TrackingParameters
+from rose2_logs.model.occupancy import BoolArray, FloatArray, OccupancySnapshot
+from rose2_logs.model.rooms import RoomMap
+from rose2_logs.segmentation.pipeline import SnapshotAnalysis
 from rose2_logs.tracking.matching import RegionShape, assign, cut_out_rooms
 from rose2_logs.tracking.memory import TrackMemory
 from rose2_logs.tracking.overlap import share_of
+from rose2_logs.tracking.registration import MapAligner
+from rose2_logs.tracking.tracked_snapshot import EVENT_ORDER, MAP_TRACK, EventKind, RoomEvent
 
 WEIGHT_POWER = 2
 """Pairs are weighed by this power of their overlap: one good pair is worth more than two poor ones."""

@@ -6,10 +6,10 @@ import shapely
 from drawn_maps import agreement, office, snapshot
 from free_masks import RESOLUTION_M, overlap_with_room, ring, two_rooms
 
-from rose2_logs.baselines.stage import BASELINES, segment_by_baseline
-from rose2_logs.floor_plan.rooms import room_outlines
-from rose2_logs.parameters import Parameters
-from rose2_logs.pipeline import METHODS, analyse
+from rose2_logs.config.parameters import Parameters
+from rose2_logs.segmentation.baselines.stage import BASELINES, segment_by_baseline
+from rose2_logs.segmentation.floor_plan.rooms import room_outlines
+from rose2_logs.segmentation.pipeline import METHODS, analyse
 
 PARAMETERS = Parameters()
 every_method = pytest.mark.parametrize("method", BASELINES)

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from free_masks import DOOR, two_rooms
 
-from rose2_logs.baselines.critical_lines import best_lines, critical_lines
-from rose2_logs.baselines.regions import obstacle_distance
-from rose2_logs.baselines.voronoi_graph import boundary_cells
+from rose2_logs.segmentation.baselines.critical_lines import best_lines, critical_lines
+from rose2_logs.segmentation.baselines.regions import obstacle_distance
+from rose2_logs.segmentation.baselines.voronoi_graph import boundary_cells
 
 CORRIDOR = np.zeros((31, 120), bool)
 CORRIDOR[5:26] = True

@@ -6,8 +6,8 @@ import numpy as np
 from drawn_maps import agreement
 from free_masks import RESOLUTION_M, ring, two_rooms, with_pocket
 
-from rose2_logs.baseline_parameters import DistanceParameters
-from rose2_logs.baselines.distance import segment_distance
+from rose2_logs.config.baselines import DistanceParameters
+from rose2_logs.segmentation.baselines.distance import segment_distance
 
 PARAMETERS = DistanceParameters()
 

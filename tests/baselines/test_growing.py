@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from drawn_rooms import rows
 
-from rose2_logs.baselines.growing import grow
-from rose2_logs.baselines.regions import ranks_by_size
+from rose2_logs.segmentation.baselines.growing import grow
+from rose2_logs.segmentation.baselines.regions import ranks_by_size
 
 
 def grown_one_by_one(seeds, free):

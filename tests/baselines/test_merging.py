@@ -5,8 +5,8 @@ import dataclasses
 import numpy as np
 from drawn_rooms import rows
 
-from rose2_logs.baseline_parameters import VoronoiMergeParameters
-from rose2_logs.baselines.merging import merge_rooms
+from rose2_logs.config.baselines import VoronoiMergeParameters
+from rose2_logs.segmentation.baselines.merging import merge_rooms
 
 PARAMETERS = VoronoiMergeParameters()
 

@@ -6,8 +6,8 @@ import numpy as np
 from drawn_maps import agreement
 from free_masks import RESOLUTION_M, ring, two_rooms, with_pocket
 
-from rose2_logs.baseline_parameters import MorphologicalParameters
-from rose2_logs.baselines.morphological import segment_morphological
+from rose2_logs.config.baselines import MorphologicalParameters
+from rose2_logs.segmentation.baselines.morphological import segment_morphological
 
 PARAMETERS = MorphologicalParameters()
 

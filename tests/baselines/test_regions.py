@@ -3,7 +3,7 @@
 import numpy as np
 from drawn_rooms import rows
 
-from rose2_logs.baselines.regions import (
+from rose2_logs.segmentation.baselines.regions import (
     cells_on_lines,
     connected_parts,
     eroded,

@@ -7,8 +7,8 @@ import pytest
 from drawn_maps import agreement
 from free_masks import RESOLUTION_M, overlap_with_room, ring, two_rooms, with_pocket
 
-from rose2_logs.baseline_parameters import VoronoiBaselineParameters, VoronoiMergeParameters
-from rose2_logs.baselines.voronoi import cut_rooms, segment_voronoi
+from rose2_logs.config.baselines import VoronoiBaselineParameters, VoronoiMergeParameters
+from rose2_logs.segmentation.baselines.voronoi import cut_rooms, segment_voronoi
 
 PARAMETERS, MERGE = VoronoiBaselineParameters(), VoronoiMergeParameters()
 

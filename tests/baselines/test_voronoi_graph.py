@@ -3,8 +3,8 @@
 import numpy as np
 from free_masks import DOOR, two_rooms
 
-from rose2_logs.baselines.regions import connected_parts, obstacle_distance
-from rose2_logs.baselines.voronoi_graph import boundary_cells, narrowest_cells, voronoi_cells
+from rose2_logs.segmentation.baselines.regions import connected_parts, obstacle_distance
+from rose2_logs.segmentation.baselines.voronoi_graph import boundary_cells, narrowest_cells, voronoi_cells
 
 
 def test_boundary_cells_are_free_and_have_an_obstacle_at_a_side():

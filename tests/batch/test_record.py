@@ -18,8 +18,8 @@ from rose2_logs.batch.record import (
     local_signature,
     read_record,
 )
+from rose2_logs.config.parameters import Parameters
 from rose2_logs.errors import LogError
-from rose2_logs.parameters import Parameters
 
 
 @pytest.fixture

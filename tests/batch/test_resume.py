@@ -18,9 +18,9 @@ from rose2_logs.batch import driver, task
 from rose2_logs.batch.driver import BatchOptions, BatchResult, run_batch
 from rose2_logs.batch.folders import LOGS_FOLDER, REPLACED, WORK_FOLDER, put_in_place
 from rose2_logs.batch.record import RECORD, BatchSettings
+from rose2_logs.config.parameters import Parameters
 from rose2_logs.errors import LogError, OutputError, ParameterError
-from rose2_logs.parameters import Parameters
-from rose2_logs.sinks.sink import RECORDING_LAYERS
+from rose2_logs.runs.sink import RECORDING_LAYERS
 
 QUIET = BatchSettings(recording=False, annotated_log=False)
 
@@ -249,7 +249,7 @@ def test_results_that_cannot_be_put_in_place_leave_the_earlier_ones(batches, tmp
 
 def fails(times: int, error: OSError, monkeypatch) -> list[int]:
     """Let the first calls of what reads a log fail; return a list that grows with each call."""
-    from rose2_logs import run
+    from rose2_logs.workflows import analyze as run
 
     calls: list[int] = []
     whole = run.analyse_log
@@ -284,7 +284,7 @@ def test_what_no_try_will_mend_is_not_tried_again(batches, monkeypatch):
 
 def test_a_log_that_changes_while_it_is_read_fails(batches, monkeypatch):
     """Its results would be of no log at all; the earlier ones stand."""
-    from rose2_logs import run
+    from rose2_logs.workflows import analyze as run
 
     whole = run.analyse_log
 

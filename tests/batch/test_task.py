@@ -81,10 +81,10 @@ def test_warnings_are_gathered_and_counted(work, log, monkeypatch):
 
     def analyse(*_: object) -> None:
         for number in range(count):
-            logging.getLogger("rose2_logs.readers").warning("trouble %d", number)
+            logging.getLogger("rose2_logs.io").warning("trouble %d", number)
         raise LogError("no more")
 
-    monkeypatch.setattr("rose2_logs.run.analyse_log", analyse)
+    monkeypatch.setattr("rose2_logs.workflows.analyze.analyse_log", analyse)
     outcome = analyse_task(LogTask(log, "maps", work, QUIET), ignore)
     assert outcome.reason == "no more"
     assert outcome.warnings == (*(f"trouble {number}" for number in range(MOST_WARNINGS)), "3 more warnings")
@@ -92,7 +92,7 @@ def test_warnings_are_gathered_and_counted(work, log, monkeypatch):
 
 def test_a_fault_of_the_tool_is_told_as_one_with_its_traceback(work, log, monkeypatch):
     """For --debug."""
-    monkeypatch.setattr("rose2_logs.run.analyse_log", lambda *_: 1 // 0)
+    monkeypatch.setattr("rose2_logs.workflows.analyze.analyse_log", lambda *_: 1 // 0)
     outcome = analyse_task(LogTask(log, "maps", work, QUIET), ignore)
     assert outcome.reason.startswith("ZeroDivisionError: ")
     assert outcome.reason.endswith("(a fault of rose2-logs)")

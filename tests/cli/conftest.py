@@ -6,8 +6,8 @@ import sys
 
 import pytest
 
-from rose2_logs.cli import main
-from rose2_logs.cli_options import state
+from rose2_logs.cli.main import main
+from rose2_logs.cli.options import state
 
 
 @pytest.fixture

@@ -15,7 +15,7 @@ from PIL import Image
 from saved_maps import RESOLUTION_M, save_map, save_run, two_rooms
 
 from rose2_logs import __version__
-from rose2_logs.sinks.label_image import write_label_image
+from rose2_logs.drawing.image_files import write_label_image
 
 VERBS = (
     "info", "analyze", "batch", "view", "serve",

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from PIL import Image
 from saved_maps import FREE, UNKNOWN, WALL, save_map
 
-from rose2_logs.comparing import FILES
+from rose2_logs.workflows.compare import FILES
 
 BIN = Path(sys.executable).parent
 

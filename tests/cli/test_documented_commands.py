@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 import typer
 
-from rose2_logs.cli import app
-from rose2_logs.sinks.ros_messages import ROOM_DEFINITION, ROOMS_DEFINITION
+from rose2_logs.cli.main import app
+from rose2_logs.outputs.mcap.ros_messages import ROOM_DEFINITION, ROOMS_DEFINITION
 
 PROJECT = Path(__file__).parents[2]
 PAGES = [PROJECT / "README.md", *sorted((PROJECT / "docs").rglob("*.md"))]

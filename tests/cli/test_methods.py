@@ -12,9 +12,9 @@ import pytest
 from PIL import Image
 from saved_maps import RESOLUTION_M, save_map, save_run, two_rooms
 
-from rose2_logs.cli import main
-from rose2_logs.pipeline import METHODS
-from rose2_logs.sinks.label_image import write_label_image
+from rose2_logs.cli.main import main
+from rose2_logs.drawing.image_files import write_label_image
+from rose2_logs.segmentation.pipeline import METHODS
 
 FILES = {
     "maps.rrd",

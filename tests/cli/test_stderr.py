@@ -13,7 +13,7 @@ import pytest
 from mcap.writer import Writer
 from saved_maps import save_run
 
-from rose2_logs.notices import PACKAGE, gathered, muted, notice
+from rose2_logs.system.warnings import PACKAGE, gathered, muted, notice
 
 MAPS = 12
 
@@ -143,7 +143,8 @@ def test_a_folder_that_cannot_be_written_to_is_one_line(tmp_path):
 
 
 def test_a_map_that_the_method_stumbles_over_is_left_out(monkeypatch, tmp_path):
-    from rose2_logs import run, tracked_stream
+    from rose2_logs.runs import stream as tracked_stream
+    from rose2_logs.workflows import analyze as run
 
     maps = save_run(tmp_path / "maps")
     analyse = tracked_stream.analyse

@@ -11,7 +11,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from rose2_logs.cli import main
+from rose2_logs.cli.main import main
 
 PROJECT = Path(__file__).parents[2]
 TUTORIAL = (PROJECT / "docs" / "tutorial.md").read_text(encoding="utf-8")
@@ -31,7 +31,7 @@ def printed(tmp_path: Path, monkeypatch) -> str:
     monkeypatch.chdir(tmp_path)
     out = io.StringIO()
     # Not `file`, whose value is where standard output goes at that time: it would be kept after the test.
-    monkeypatch.setattr("rose2_logs.reporting._out._file", out)
+    monkeypatch.setattr("rose2_logs.cli.printing._out._file", out)
     names: dict[str, object] = {"print": lambda frame: out.write(f"{frame.to_string(index=False)}\n")}
     for language, block in re.findall(r"```(sh|python)\n(.*?)```", TUTORIAL, re.DOTALL):
         if language == "python":

@@ -14,6 +14,7 @@ import shapely
 from drawn_plans import LEFT, RIGHT, two_rooms_plan
 from PIL import Image
 
+from rose2_logs.drawing.palette import track_colour
 from rose2_logs.drawing.pixels import as_pixels
 from rose2_logs.drawing.plan import (
     FIGURE,
@@ -27,9 +28,8 @@ from rose2_logs.drawing.plan import (
 )
 from rose2_logs.drawing.shapes import Area, Drawing, Lines, Text, hatching
 from rose2_logs.drawing.svg import as_svg
-from rose2_logs.room_plan import PlanRoom, RoomPlan
-from rose2_logs.rooms import Doorway
-from rose2_logs.sinks.palette import track_colour
+from rose2_logs.model.room_plan import PlanRoom, RoomPlan
+from rose2_logs.model.rooms import Doorway
 
 SVG = "{http://www.w3.org/2000/svg}"
 

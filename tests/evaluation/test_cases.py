@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from rose2_logs.drawing.image_files import write_label_image
 from rose2_logs.errors import CasesError, OutputError
 from rose2_logs.evaluation.cases import load_cases
-from rose2_logs.sinks.label_image import write_label_image
 
 
 @pytest.fixture

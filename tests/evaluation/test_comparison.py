@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from rose2_logs.evaluation.comparison import Mark, compare
+from rose2_logs.evaluation.case_errors import Mark, compare
 
 label_arrays = hnp.arrays(np.int32, (5, 6), elements=st.integers(0, 4))
 

@@ -11,15 +11,14 @@ from drawn_rooms import rows
 from moved_maps import motion_about
 from PIL import Image
 
+from rose2_logs.config.parameters import OccupancyParameters, Parameters
+from rose2_logs.drawing.image_files import write_label_image
 from rose2_logs.evaluation.benchmark import CaseResult
-from rose2_logs.evaluation.canvas import placed
 from rose2_logs.evaluation.cases import Case, load_cases
-from rose2_logs.evaluation.run_tracks import RunTracks, run_tracks_as_json
+from rose2_logs.evaluation.run_tracks import RunTracks, placed, run_tracks_as_json
 from rose2_logs.evaluation.scores import score
-from rose2_logs.evaluation.truth_tracks import TruthLinker
-from rose2_logs.occupancy import GridGeometry
-from rose2_logs.parameters import OccupancyParameters, Parameters
-from rose2_logs.sinks.label_image import write_label_image
+from rose2_logs.evaluation.tracks import TruthLinker
+from rose2_logs.model.occupancy import GridGeometry
 
 BENCHMARK = Path(__file__).parents[3] / "shared" / "benchmark"
 

@@ -13,9 +13,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
+from rose2_logs.drawing.image_files import write_label_image
 from rose2_logs.evaluation.cases import load_cases
 from rose2_logs.evaluation.scores import FIGURES, Scores, mean_scores, score
-from rose2_logs.sinks.label_image import write_label_image
 
 BENCHMARK = Path(__file__).parents[3] / "shared" / "benchmark"
 

@@ -20,14 +20,14 @@ from drawn_plans import LEFT, RIGHT, two_rooms_plan
 from PIL import Image
 from shapely.geometry import shape
 
+from rose2_logs.config.parameters import OccupancyParameters
 from rose2_logs.errors import OutputError, ParameterError
-from rose2_logs.exports.dxf import LAYERS
-from rose2_logs.exports.formats import FORMATS, planned_files, write_plan
-from rose2_logs.occupancy import GridGeometry
-from rose2_logs.parameters import OccupancyParameters
-from rose2_logs.readers import open_log
-from rose2_logs.results.folder import RunResults
-from rose2_logs.room_plan import PlanMap
+from rose2_logs.io import open_log
+from rose2_logs.model.occupancy import GridGeometry
+from rose2_logs.model.room_plan import PlanMap
+from rose2_logs.outputs.exports.dxf import LAYERS
+from rose2_logs.outputs.exports.formats import FORMATS, planned_files, write_plan
+from rose2_logs.runs.folder import RunResults
 
 
 @pytest.fixture(params=[0.0, 0.4], ids=["straight", "turned"])
@@ -114,7 +114,7 @@ def test_the_same_plan_gives_the_same_dxf_in_every_process(tmp_path: Path):
     """Whatever the order of sets, which Python seeds anew in each; these two seeds gave two files."""
     script = (
         "import sys; from pathlib import Path; from drawn_plans import two_rooms_plan; "
-        "from rose2_logs.exports.dxf import write_dxf; write_dxf(two_rooms_plan(), Path(sys.argv[1]))"
+        "from rose2_logs.outputs.exports.dxf import write_dxf; write_dxf(two_rooms_plan(), Path(sys.argv[1]))"
     )
     written = set()
     for seed in (3, 4):

@@ -24,10 +24,10 @@ from faulty_logs import (
 )
 from faulty_maps import SAVED_FAULTS, write_maps
 
+from rose2_logs.config.parameters import ReadingParameters
 from rose2_logs.errors import LogError
-from rose2_logs.notices import gathered
-from rose2_logs.parameters import ReadingParameters
-from rose2_logs.readers import open_log
+from rose2_logs.io import open_log
+from rose2_logs.system.warnings import gathered
 
 PAGE = Path(__file__).parents[2] / "docs" / "faults.md"
 LIMITS = ReadingParameters(map_max_cells=1 << 24, chunk_max_bytes=4 << 20)

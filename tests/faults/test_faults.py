@@ -12,8 +12,8 @@ from bombs import BOMBS
 from fault_table import LIMITS, PAGE, TABLES, expected, make, outcome
 from faulty_logs import COUNT, INPUTS, MESSAGE_FAULTS, SEEN, Grid, room
 
-from rose2_logs.notices import StrictError, gathered
-from rose2_logs.readers import open_log
+from rose2_logs.io import open_log
+from rose2_logs.system.warnings import StrictError, gathered
 
 CASES = [(table, *case) for table, cases in TABLES.items() for case in cases()]
 PEAK_BYTES = 3 * LIMITS.chunk_max_bytes

@@ -22,12 +22,12 @@ from finished_runs import SAMPLE_LOGS
 from mcap.reader import make_reader
 
 from rose2_logs.errors import OutputError
-from rose2_logs.exports.formats import FORMATS
-from rose2_logs.readers import Selection
-from rose2_logs.report.page import write_report
-from rose2_logs.results.figure import export_plan, write_figure
-from rose2_logs.results.folder import RunResults
-from rose2_logs.run import NAMELESS, RunOptions, analyse_log, log_stem
+from rose2_logs.io import Selection
+from rose2_logs.outputs.exports.formats import FORMATS
+from rose2_logs.outputs.report.page import write_report
+from rose2_logs.runs.folder import RunResults
+from rose2_logs.workflows.analyze import NAMELESS, RunOptions, analyse_log, log_stem
+from rose2_logs.workflows.figure import export_plan, write_figure
 
 MAPS = 2
 HARMLESS = "map"

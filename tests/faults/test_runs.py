@@ -12,7 +12,7 @@ from faulty_logs import COUNT, INPUTS
 from mcap.reader import make_reader
 
 from rose2_logs.errors import InvalidMapError
-from rose2_logs.run import RunOptions, analyse_log
+from rose2_logs.workflows.analyze import RunOptions, analyse_log
 
 CASES = [
     # table, fault, kind of log, maps that are analysed, messages of the log in the annotated MCAP

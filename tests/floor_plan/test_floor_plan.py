@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 import shapely
 
-from rose2_logs.floor_plan.doorways import find_doorways
-from rose2_logs.floor_plan.evidence import EdgeEvidence, edge_evidence
-from rose2_logs.floor_plan.faces import build_faces, rasterise
-from rose2_logs.floor_plan.grouping import group_faces
-from rose2_logs.floor_plan.rooms import adopt_left_out, outline, settle_borders
-from rose2_logs.floor_plan.stage import make_floor_plan
-from rose2_logs.parameters import FloorPlanParameters
+from rose2_logs.config.parameters import FloorPlanParameters
+from rose2_logs.segmentation.floor_plan.doorways import find_doorways
+from rose2_logs.segmentation.floor_plan.edge_weights import EdgeEvidence, edge_evidence
+from rose2_logs.segmentation.floor_plan.faces import build_faces, rasterise
+from rose2_logs.segmentation.floor_plan.grouping import group_faces
+from rose2_logs.segmentation.floor_plan.rooms import adopt_left_out, outline, settle_borders
+from rose2_logs.segmentation.floor_plan.stage import make_floor_plan
 
 PARAMETERS = FloorPlanParameters()
 GRID_LINES = np.array([(x, -1, x, 7) for x in (2, 4)] + [(-1, y, 7, y) for y in (1, 3, 5)], float)

@@ -10,11 +10,11 @@ import pytest
 from layout_makers import CORRIDOR, ROOM_1, ROOM_2, drawn_office, layout_of, painted, room_at
 from moved_maps import motion_about, moved
 
-from rose2_logs.layouts.comparison import compare_layouts
-from rose2_logs.layouts.room_changes import compare_rooms
-from rose2_logs.layouts.wall_changes import STEP_M, _stretches, compare_walls
-from rose2_logs.readers import open_log
-from rose2_logs.tracking.alignment import RigidMotion
+from rose2_logs.comparison.layouts import compare_layouts
+from rose2_logs.comparison.room_changes import compare_rooms
+from rose2_logs.comparison.wall_changes import STEP_M, _stretches, compare_walls
+from rose2_logs.io import open_log
+from rose2_logs.tracking.registration import RigidMotion
 
 SAMPLE = Path(__file__).parents[2] / "sample_logs" / "office.mcap"
 STILL = RigidMotion.none()

@@ -12,12 +12,12 @@ from drawn_maps import office, snapshot
 from layout_makers import layout_of
 from moved_maps import motion_about, moved
 
-from rose2_logs.layouts.comparison import compare_layouts
-from rose2_logs.layouts.placing import PlacedMap, _is_same, place
-from rose2_logs.occupancy import OccupancySnapshot
-from rose2_logs.parameters import OccupancyParameters
-from rose2_logs.readers import open_log
-from rose2_logs.tracking.alignment import RigidMotion
+from rose2_logs.comparison.layouts import compare_layouts
+from rose2_logs.comparison.placement import PlacedMap, _is_same, place
+from rose2_logs.config.parameters import OccupancyParameters
+from rose2_logs.io import open_log
+from rose2_logs.model.occupancy import OccupancySnapshot
+from rose2_logs.tracking.registration import RigidMotion
 
 SAMPLES = Path(__file__).parents[2] / "sample_logs"
 OCCUPANCY = OccupancyParameters()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rose2_logs.readers.discovery import logs_among
+from rose2_logs.io.discovery import logs_among
 
 
 @pytest.mark.parametrize(

@@ -31,10 +31,10 @@ from reader_logs import (
 from scipy.ndimage import binary_dilation
 from test_messages import SCHEMA, foxglove_message
 
+from rose2_logs.config.parameters import ReadingParameters
 from rose2_logs.errors import InvalidMapError, LogError, NoMapTopicError
-from rose2_logs.notices import StrictError, gathered
-from rose2_logs.parameters import ReadingParameters
-from rose2_logs.readers import Selection, inspect_log, open_log
+from rose2_logs.io import Selection, inspect_log, open_log
+from rose2_logs.system.warnings import StrictError, gathered
 
 needs_shared = pytest.mark.skipif(
     not SHARED.is_dir(), reason="the folder of real logs is not beside the project"
@@ -330,7 +330,7 @@ def test_compressed_files_of_one_name_from_several_folders_are_several_files(tmp
 
 def test_each_chunk_of_a_bag_written_topic_by_topic_is_decompressed_once(tmp_path, monkeypatch):
     """Its chunks overlap in time throughout; as many decompressions as messages take hours for a long bag."""
-    from rose2_logs.readers import bag_index
+    from rose2_logs.io import bag_index
 
     bag = write_bag(tmp_path / "run.bag", written_topic_by_topic(), compression="LZ4", chunk_bytes=2**14)
     begins = []
@@ -351,7 +351,7 @@ def test_each_chunk_of_a_bag_written_topic_by_topic_is_decompressed_once(tmp_pat
 
 def test_no_more_chunks_of_a_bag_are_kept_than_their_size_allows():
     """The latest always is; the one that was not asked for the longest goes first."""
-    from rose2_logs.readers.bag_index import _Chunks
+    from rose2_logs.io.rosbag1.index import _Chunks
 
     read = []
 
@@ -550,7 +550,7 @@ def test_random_damage_gives_maps_or_a_known_error_never_a_crash(name, tmp_path)
 
 def test_importing_the_readers_loads_no_format_library():
     code = (
-        "import sys, rose2_logs.readers\n"
+        "import sys, rose2_logs.io\n"
         "heavy = ('rosbags', 'mcap', 'apsw', 'google', 'PIL', 'yaml')\n"
         "print([name for name in heavy if name in sys.modules])"
     )
@@ -619,7 +619,7 @@ def test_a_third_party_log_without_maps_says_so_in_one_line(name):
 
 def test_a_sector_that_cannot_be_read_is_damage_and_a_lost_network_is_not(tmp_path, monkeypatch):
     """The first costs a map; the second may pass, so it is no verdict on the log."""
-    from rose2_logs.readers import checked_file
+    from rose2_logs.io import checked_file
 
     maps, messages = noisy_run()
     path = FORMATS["mcap-uncompressed"](tmp_path, messages)
@@ -638,7 +638,7 @@ def test_a_sector_that_cannot_be_read_is_damage_and_a_lost_network_is_not(tmp_pa
         class Checked(checked_file.CheckedFile, FailingFile):
             pass
 
-        monkeypatch.setattr("rose2_logs.readers.mcap_index.CheckedFile", Checked)
+        monkeypatch.setattr("rose2_logs.io.mcap.index.CheckedFile", Checked)
         with open_log(path) as log:
             if number == 0:
                 assert len(list(log.snapshots())) == 4

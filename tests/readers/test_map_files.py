@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 from rose2_logs.errors import InvalidMapError, LogError, NoMapTopicError
-from rose2_logs.readers import Selection, inspect_log, open_log
+from rose2_logs.io import Selection, inspect_log, open_log
 
 
 def save(path, pixels, *, image=None, **described):

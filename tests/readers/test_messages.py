@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from reader_logs import START_NS, Map, Update, serialized, serialized_costmap, typestore
 
 from rose2_logs.errors import InvalidMapError
-from rose2_logs.readers.messages import Grid, Patch, decoder, flat_yaw_of
+from rose2_logs.io.messages import Grid, Patch, decoder, flat_yaw_of
 
 GRID = "nav_msgs/msg/OccupancyGrid"
 ENCODINGS = {1: "ros1", 2: "cdr"}

@@ -11,8 +11,8 @@ import pytest
 from mcap.writer import Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from rose2_logs.readers import Selection, open_log
-from rose2_logs.readers.poses import BASE_FRAMES, POSE_STEP_M, POSE_STEP_S
+from rose2_logs.io import Selection, open_log
+from rose2_logs.io.poses import BASE_FRAMES, POSE_STEP_M, POSE_STEP_S
 
 PROJECT = Path(__file__).parents[2]
 ROS2, ROS1 = get_typestore(Stores.ROS2_HUMBLE), get_typestore(Stores.ROS1_NOETIC)
@@ -183,7 +183,7 @@ def test_broken_numbers_are_passed_over(tmp_path):
 
 
 def test_transforms_in_a_circle_end():
-    from rose2_logs.readers.poses import _base_in, _Edge
+    from rose2_logs.io.poses import _base_in, _Edge
 
     edges = {BASE_FRAMES[0]: _Edge("odom", (1.0, 0.0, 0.0)), "odom": _Edge(BASE_FRAMES[0], (1.0, 0.0, 0.0))}
     assert _base_in("map", edges) == (None, ())

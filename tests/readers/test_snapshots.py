@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 from reader_logs import START_NS, Map, Update, growing_maps, write_bag, write_mcap, write_rosbag2
 
 from rose2_logs.errors import LogError, ParameterError
-from rose2_logs.notices import gathered
-from rose2_logs.occupancy import GridGeometry
-from rose2_logs.readers import Selection, open_log
-from rose2_logs.readers.map_stream import known_area_change_m2
-from rose2_logs.readers.messages import Grid
+from rose2_logs.io import Selection, open_log
+from rose2_logs.io.map_stream import known_area_change_m2
+from rose2_logs.io.messages import Grid
+from rose2_logs.model.occupancy import GridGeometry
+from rose2_logs.system.warnings import gathered
 
 SECOND = 10**9
 WRITERS = {

@@ -9,7 +9,7 @@ import pytest
 from finished_runs import SAMPLE_LOGS, renamed_topic, run_of
 from looking import CHROMIUM, needs_chromium
 
-from rose2_logs.report.page import write_report
+from rose2_logs.outputs.report.page import write_report
 
 pytestmark = needs_chromium
 PHONE = {"width": 390, "height": 844}

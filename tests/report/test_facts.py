@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 from drawn_plans import two_rooms_plan
 
-from rose2_logs.report.facts import NOT_FINAL, notes, tiles
-from rose2_logs.results.folder import RunResults
+from rose2_logs.outputs.report.facts import NOT_FINAL, notes, tiles
+from rose2_logs.runs.folder import RunResults
 
 
 @pytest.fixture

@@ -16,10 +16,10 @@ import pytest
 from finished_runs import SAMPLE_LOGS, renamed_topic, run_of
 
 from rose2_logs.errors import LogError, OutputError
-from rose2_logs.report import tables
-from rose2_logs.report.overview import write_reports
-from rose2_logs.report.page import along_coverage, write_report
-from rose2_logs.report.words import date_of, duration
+from rose2_logs.outputs.report import tables
+from rose2_logs.outputs.report.overview import write_reports
+from rose2_logs.outputs.report.page import along_coverage, write_report
+from rose2_logs.outputs.report.words import date_of, duration
 
 
 class Reader(HTMLParser):

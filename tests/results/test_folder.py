@@ -12,11 +12,11 @@ from finished_runs import SAMPLE_LOGS, run_of
 from saved_maps import save_run
 
 from rose2_logs.errors import LogError, OutputError, ParameterError
-from rose2_logs.occupancy import GridGeometry
-from rose2_logs.results.figure import export_plan
-from rose2_logs.results.folder import RunResults, find_results
-from rose2_logs.results.maps import labels_of_segmented
-from rose2_logs.room_plan import PlanRoom
+from rose2_logs.model.occupancy import GridGeometry
+from rose2_logs.model.room_plan import PlanRoom
+from rose2_logs.runs.folder import RunResults, find_results
+from rose2_logs.runs.maps import labels_of_segmented
+from rose2_logs.workflows.figure import export_plan
 
 
 def saved_maps_run(folder: Path) -> Path:

@@ -12,9 +12,9 @@ import pytest
 from finished_runs import SAMPLE_LOGS, run_of
 
 from rose2_logs.errors import LogError
-from rose2_logs.results.figure import write_figure
-from rose2_logs.results.folder import RunResults
-from rose2_logs.results.smoothed_plan import smoothed_plan
+from rose2_logs.runs.folder import RunResults
+from rose2_logs.runs.projected_plan import smoothed_plan
+from rose2_logs.workflows.figure import write_figure
 
 
 @pytest.fixture(scope="module")

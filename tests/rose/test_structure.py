@@ -7,9 +7,14 @@ from drawn_maps import SIZE_M, office
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from rose2_logs.parameters import SpectrumParameters
-from rose2_logs.rose.clean_map import attached_cells, clean_threshold, structure_score, supported_cells
-from rose2_logs.rose.spectrum import (
+from rose2_logs.config.parameters import SpectrumParameters
+from rose2_logs.segmentation.rose.clean_map import (
+    attached_cells,
+    clean_threshold,
+    structure_score,
+    supported_cells,
+)
+from rose2_logs.segmentation.rose.spectrum import (
     PICTURE_SIDE,
     angular_energy,
     compute_spectrum,

@@ -19,10 +19,10 @@ from rosbags.rosbag2 import Reader
 from saved_maps import save_run
 
 from rose2_logs.errors import OutputError
-from rose2_logs.readers import Selection, open_log
-from rose2_logs.run import RunOptions, analyse_log
-from rose2_logs.sinks.annotated_mcap import ADDED
-from rose2_logs.sinks.viewer_layouts import offered
+from rose2_logs.io import Selection, open_log
+from rose2_logs.outputs.mcap.annotated import ADDED
+from rose2_logs.outputs.mcap.viewer_layouts import offered
+from rose2_logs.workflows.analyze import RunOptions, analyse_log
 
 PROJECT = Path(__file__).parents[2]
 OFFICE, WING = PROJECT / "sample_logs" / "office.mcap", PROJECT / "sample_logs" / "wing.bag"

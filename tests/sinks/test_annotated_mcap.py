@@ -20,13 +20,13 @@ from rosbags.highlevel import AnyReader
 from saved_maps import save_run
 
 from rose2_logs.errors import OutputError
-from rose2_logs.readers import open_log
-from rose2_logs.run import RunOptions, analyse_log
-from rose2_logs.sinks.annotated_mcap import ADDED, ATTACHMENT, METADATA, AnnotatedMcap
-from rose2_logs.sinks.mcap_writer import McapWriter
-from rose2_logs.sinks.sink import RunInfo
-from rose2_logs.sinks.summary import RunTotals
-from rose2_logs.tracked_stream import start_workers, tracked_snapshots
+from rose2_logs.io import open_log
+from rose2_logs.outputs.mcap.annotated import ADDED, ATTACHMENT, METADATA, AnnotatedMcap
+from rose2_logs.outputs.mcap.writer import McapWriter
+from rose2_logs.runs.sink import RunInfo
+from rose2_logs.runs.stream import start_workers, tracked_snapshots
+from rose2_logs.runs.summary import RunTotals
+from rose2_logs.workflows.analyze import RunOptions, analyse_log
 
 PROJECT = Path(__file__).parents[2]
 SHARED = PROJECT.parent / "shared" / "bags"
@@ -42,7 +42,7 @@ LOGS = {
 
 
 def annotate(log: Path, folder: Path, **changes) -> Path:
-    from rose2_logs.readers import Selection
+    from rose2_logs.io import Selection
 
     options = RunOptions(selection=Selection(max_snapshots=3), recording=False, **changes)
     result = analyse_log(log, folder, options)
@@ -292,9 +292,9 @@ def test_what_stopped_the_writing_is_told_not_what_closing_meets(tmp_path):
 import resource, signal
 from pathlib import Path
 from rose2_logs.errors import OutputError
-from rose2_logs.parameters import Parameters
-from rose2_logs.sinks.annotated_mcap import AnnotatedMcap
-from rose2_logs.sinks.sink import RunInfo
+from rose2_logs.config.parameters import Parameters
+from rose2_logs.outputs.mcap.annotated import AnnotatedMcap
+from rose2_logs.runs.sink import RunInfo
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 resource.setrlimit(resource.RLIMIT_FSIZE, (2_000, 2_000))
 info = RunInfo(Path({str(log)!r}), "/map", "rose2", Parameters(), {{}}, {{}})

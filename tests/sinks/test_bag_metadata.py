@@ -7,7 +7,7 @@ from pathlib import Path
 import yaml
 from mcap.writer import Writer
 
-from rose2_logs.sinks.mcap_bag_metadata import write_bag_metadata
+from rose2_logs.outputs.mcap.bag_metadata import write_bag_metadata
 
 
 def test_a_channel_without_a_type_is_left_out(tmp_path: Path):

@@ -9,11 +9,11 @@ import pytest
 from PIL import Image
 from saved_maps import RESOLUTION_M, two_rooms
 
+from rose2_logs.drawing.case_pictures import COLUMNS, ROWS, CasePictures
+from rose2_logs.drawing.image_files import write_label_image
 from rose2_logs.evaluation.benchmark import CaseResult
 from rose2_logs.evaluation.cases import Case
 from rose2_logs.evaluation.scores import score
-from rose2_logs.sinks.case_pictures import COLUMNS, ROWS, CasePictures
-from rose2_logs.sinks.label_image import write_label_image
 
 
 @pytest.fixture

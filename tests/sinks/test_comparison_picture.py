@@ -5,9 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rose2_logs.evaluation.comparison import Mark, compare
-from rose2_logs.evaluation.scores import score
-from rose2_logs.sinks.comparison_picture import (
+from rose2_logs.drawing.case_picture import (
     MARK_COLOURS,
     SIDE_MIN_PX,
     draw_comparison,
@@ -15,6 +13,8 @@ from rose2_logs.sinks.comparison_picture import (
     room_colours,
     text_line,
 )
+from rose2_logs.evaluation.case_errors import Mark, compare
+from rose2_logs.evaluation.scores import score
 
 WALL, FREE = 100, 0
 

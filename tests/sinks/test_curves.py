@@ -5,9 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rose2_logs.evaluation.along import RunPoint
-from rose2_logs.evaluation.scores import Scores
-from rose2_logs.sinks.curves import (
+from rose2_logs.drawing.curves import (
     BOTTOM_PX,
     HEIGHT_PX,
     LEFT_PX,
@@ -19,6 +17,8 @@ from rose2_logs.sinks.curves import (
     draw_along,
     draw_curves,
 )
+from rose2_logs.evaluation.along import RunPoint
+from rose2_logs.evaluation.scores import Scores
 
 
 def pixels_of(image, colour) -> np.ndarray:

@@ -19,8 +19,8 @@ from looking import CHROMIUM, coloured_share, free_port, needs_chromium, needs_v
 from numpy.typing import NDArray
 from PIL import Image
 
-from rose2_logs.readers import Selection
-from rose2_logs.run import RunOptions, analyse_log
+from rose2_logs.io import Selection
+from rose2_logs.workflows.analyze import RunOptions, analyse_log
 
 PROJECT = Path(__file__).parents[2]
 GOLDEN = Path(__file__).with_name("golden")

@@ -12,9 +12,9 @@ from mcap.writer import CompressionType, IndexType, Writer
 from saved_maps import save_run
 
 from rose2_logs.errors import OutputError
-from rose2_logs.run import RunOptions, analyse_log
-from rose2_logs.sinks import annotated_mcap
-from rose2_logs.sinks.mcap_check import Tallies, Tally, checked_copy
+from rose2_logs.outputs.mcap import annotated as annotated_mcap
+from rose2_logs.outputs.mcap.check import Tallies, Tally, checked_copy
+from rose2_logs.workflows.analyze import RunOptions, analyse_log
 
 OFFICE = Path(__file__).parents[2] / "sample_logs" / "office.mcap"
 TOPICS = ("/a", "/b", "/silent")
@@ -107,7 +107,7 @@ def test_a_chunk_that_is_damaged_is_not_looked_into():
 
 def test_the_summary_tells_what_was_copied(tmp_path: Path):
     """Numbers as another reader counts them in the log; the added ones are one a map."""
-    from rose2_logs.readers import Selection
+    from rose2_logs.io import Selection
 
     options = RunOptions(recording=False, selection=Selection(max_snapshots=2))
     analyse_log(OFFICE, tmp_path / "out", options)

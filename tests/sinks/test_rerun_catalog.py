@@ -16,8 +16,8 @@ import pytest
 from saved_maps import save_run
 
 from rose2_logs.errors import LogError, OutputError
-from rose2_logs.run import RunOptions, analyse_log
-from rose2_logs.sinks.rerun_catalog import find_recordings, serve_recordings
+from rose2_logs.outputs.rerun.catalog import find_recordings, serve_recordings
+from rose2_logs.workflows.analyze import RunOptions, analyse_log
 
 BIN = Path(sys.executable).parent
 

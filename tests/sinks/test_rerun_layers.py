@@ -13,8 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rerun.chunk import RrdReader
 
-from rose2_logs.sinks.rerun_columns import Label, Picture, Strips
-from rose2_logs.sinks.rerun_layers import Layers
+from rose2_logs.outputs.rerun.columns import Label, Picture, Strips
+from rose2_logs.outputs.rerun.layers import Layers
 
 TIMELINES = ("message_log_time", "ros2_timestamp", "snapshot", "coverage")
 COMPONENTS = {"/line": "LineStrips3D:strips", "/picture": "GridMap:data", "/label": "Points3D:labels"}

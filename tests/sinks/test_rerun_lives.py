@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import rerun as rr
 
-from rose2_logs.sinks.rerun_layers import Instant
-from rose2_logs.sinks.rerun_lives import FORMING, LOST, SETTLED, SHAPED, Lives
-from rose2_logs.tracking.hindsight import Hindsight
-from rose2_logs.tracking.lives import Moment
+from rose2_logs.outputs.rerun.lanes import FORMING, LOST, SETTLED, SHAPED, Lives
+from rose2_logs.outputs.rerun.layers import Instant
+from rose2_logs.tracking.convergence import Hindsight
+from rose2_logs.tracking.track_history import Moment
 
 
 def lanes(tmp_path, tracks_of_maps, hindsight) -> dict[str, list[tuple[int, str]]]:

@@ -15,11 +15,11 @@ from looking import free_port, needs_vulkan
 from saved_maps import save_run
 
 from rose2_logs.errors import OutputError
-from rose2_logs.readers import Selection
-from rose2_logs.run import RunOptions, analyse_log
-from rose2_logs.sinks.rerun_world import room_label
-from rose2_logs.tracking.alignment import RigidMotion
-from rose2_logs.tracking.frames import MAP_TRACK, RoomEvent
+from rose2_logs.io import Selection
+from rose2_logs.outputs.rerun.world import room_label
+from rose2_logs.tracking.registration import RigidMotion
+from rose2_logs.tracking.tracked_snapshot import MAP_TRACK, RoomEvent
+from rose2_logs.workflows.analyze import RunOptions, analyse_log
 
 PROJECT = Path(__file__).parents[2]
 BIN = Path(sys.executable).parent
@@ -96,9 +96,9 @@ def test_layers_that_were_not_asked_for_are_not_written(tmp_path):
 
 
 def test_a_run_that_fails_leaves_no_recording(tmp_path):
-    from rose2_logs.parameters import Parameters
-    from rose2_logs.sinks.rerun_recording import RerunRecording
-    from rose2_logs.sinks.sink import RunInfo
+    from rose2_logs.config.parameters import Parameters
+    from rose2_logs.outputs.rerun.recording import RerunRecording
+    from rose2_logs.runs.sink import RunInfo
 
     path = tmp_path / "run.rrd"
     info = RunInfo(save_run(tmp_path / "maps"), "/map", "rose2", Parameters(), {}, {})
@@ -112,7 +112,7 @@ def test_a_run_is_shown_in_the_viewer_that_is_open_and_stored_too(tmp_path, monk
     from rerun.experimental import ViewerClient
 
     port = free_port()
-    monkeypatch.setattr("rose2_logs.sinks.rerun_viewer.VIEWER_PORT", port)
+    monkeypatch.setattr("rose2_logs.outputs.rerun.viewer.VIEWER_PORT", port)
     monkeypatch.setenv("PATH", f"{BIN}:/usr/bin:/bin")
     monkeypatch.setenv("HOME", str(tmp_path))
     with ViewerClient.spawn(headless=True, port=port, detach_process=False) as viewer:
@@ -131,7 +131,7 @@ def test_a_viewer_that_is_closed_along_the_way_does_not_stop_the_run(tmp_path, m
     from rerun.experimental import ViewerClient
 
     port = free_port()
-    monkeypatch.setattr("rose2_logs.sinks.rerun_viewer.VIEWER_PORT", port)
+    monkeypatch.setattr("rose2_logs.outputs.rerun.viewer.VIEWER_PORT", port)
     monkeypatch.setenv("PATH", f"{BIN}:/usr/bin:/bin")
     monkeypatch.setenv("HOME", str(tmp_path))
     seen = []
@@ -155,7 +155,7 @@ def test_live_without_a_viewer_or_a_screen_says_what_to_do(tmp_path, monkeypatch
     for name in ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"):
         monkeypatch.delenv(name, raising=False)
     # A port of its own: the one of the viewers may be in use by another test.
-    monkeypatch.setattr("rose2_logs.sinks.rerun_viewer.VIEWER_PORT", free_port())
+    monkeypatch.setattr("rose2_logs.outputs.rerun.viewer.VIEWER_PORT", free_port())
     options = RunOptions(selection=Selection(max_snapshots=1), annotated_log=False, live=True)
     with pytest.raises(OutputError, match="no Rerun viewer is open"):
         analyse_log(PROJECT / "sample_logs" / "office.mcap", tmp_path / "out", options)
@@ -165,7 +165,7 @@ def test_live_without_a_viewer_or_a_screen_says_what_to_do(tmp_path, monkeypatch
 @pytest.mark.skipif(sys.platform == "win32", reason="there only the command itself is ended")
 def test_a_viewer_that_does_not_come_up_in_time_is_ended(monkeypatch):
     """With what it started: nothing is left behind."""
-    from rose2_logs.sinks import rerun_viewer
+    from rose2_logs.outputs.rerun import viewer as rerun_viewer
 
     elsewhere = free_port()
     server = f"import socket, time; s = socket.create_server(('127.0.0.1', {elsewhere})); time.sleep(90)"
@@ -181,7 +181,7 @@ def test_a_viewer_that_does_not_come_up_in_time_is_ended(monkeypatch):
 
 
 def test_a_shift_of_the_map_is_told_in_metres_and_degrees():
-    from rose2_logs.sinks.event_text import event_text
+    from rose2_logs.drawing.event_text import event_text
 
     motion = RigidMotion((3.0, 4.0), (0.204, -0.05), np.deg2rad(1.2))
     text = event_text(RoomEvent("shifted", 5, MAP_TRACK, motion=motion))

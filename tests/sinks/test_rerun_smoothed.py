@@ -14,16 +14,15 @@ from drawn_rooms import drawn
 from finished_runs import SAMPLE_LOGS
 from rerun.chunk import RrdReader
 
-from rose2_logs.readers import Selection
-from rose2_logs.run import RunOptions, RunResult, analyse_log
-from rose2_logs.sinks.palette import track_colour
-from rose2_logs.sinks.rerun_layers import Layers
-from rose2_logs.sinks.rerun_pictures import FILL_OPACITY
-from rose2_logs.sinks.rerun_smoothed import SmoothedWorld
-from rose2_logs.sinks.shares import percent
-from rose2_logs.tracking.alignment import RigidMotion
-from rose2_logs.tracking.smoothed_run import SmoothedSnapshot
-from rose2_logs.tracking.smoothing import SmoothedRooms
+from rose2_logs.drawing.palette import track_colour
+from rose2_logs.io import Selection
+from rose2_logs.outputs.rerun.layers import Layers
+from rose2_logs.outputs.rerun.pictures import FILL_OPACITY
+from rose2_logs.outputs.rerun.projected import SmoothedWorld
+from rose2_logs.system.text import percent
+from rose2_logs.tracking.back_projection import SmoothedRooms, SmoothedSnapshot
+from rose2_logs.tracking.registration import RigidMotion
+from rose2_logs.workflows.analyze import RunOptions, RunResult, analyse_log
 
 TIMELINES = ("message_log_time", "ros2_timestamp", "snapshot", "coverage")
 CELL_M2 = 0.05**2

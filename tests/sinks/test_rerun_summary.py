@@ -7,12 +7,12 @@ from pathlib import Path
 
 import shapely
 
-from rose2_logs.parameters import Parameters
-from rose2_logs.sinks.rerun_summary import summary_text
-from rose2_logs.sinks.sink import RunInfo
-from rose2_logs.tracking.alignment import RigidMotion
-from rose2_logs.tracking.hindsight import Hindsight
-from rose2_logs.tracking.lives import Moment, RoomLife, RoomLives
+from rose2_logs.config.parameters import Parameters
+from rose2_logs.outputs.rerun.summary import summary_text
+from rose2_logs.runs.sink import RunInfo
+from rose2_logs.tracking.convergence import Hindsight
+from rose2_logs.tracking.registration import RigidMotion
+from rose2_logs.tracking.track_history import Moment, RoomLife, RoomLives
 
 
 def test_the_summary_tells_rooms_and_since_when_they_were_right():

@@ -9,12 +9,10 @@ import pytest
 import shapely
 from drawn_maps import office, snapshot
 
-from rose2_logs.floor_plan.rooms import outline
-from rose2_logs.occupancy import GridGeometry
-from rose2_logs.parameters import Parameters, TrackingParameters
-from rose2_logs.pipeline import METHODS, analyse
-from rose2_logs.rooms import RoomMap
-from rose2_logs.sinks.ros_messages import (
+from rose2_logs.config.parameters import Parameters, TrackingParameters
+from rose2_logs.model.occupancy import GridGeometry
+from rose2_logs.model.rooms import RoomMap
+from rose2_logs.outputs.mcap.ros_messages import (
     ROOMS_TYPE,
     MessageMaker,
     Triangles,
@@ -22,7 +20,9 @@ from rose2_logs.sinks.ros_messages import (
     ring_segments,
     ros2_typestore,
 )
-from rose2_logs.tracking.frames import TrackedSnapshot
+from rose2_logs.segmentation.floor_plan.rooms import outline
+from rose2_logs.segmentation.pipeline import METHODS, analyse
+from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot
 from rose2_logs.tracking.tracker import RoomTracker
 
 GRID = "nav_msgs/msg/OccupancyGrid"

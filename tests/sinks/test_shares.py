@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rose2_logs.sinks.shares import percent
+from rose2_logs.system.text import percent
 
 
 @pytest.mark.parametrize(

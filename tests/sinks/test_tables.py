@@ -12,13 +12,13 @@ import pytest
 import shapely
 from drawn_rooms import drawn, rows
 
+from rose2_logs.config.parameters import TrackingParameters
 from rose2_logs.errors import OutputError
-from rose2_logs.parameters import TrackingParameters
-from rose2_logs.rooms import Doorway
-from rose2_logs.sinks import parquet_table
-from rose2_logs.sinks.tables import Tables
-from rose2_logs.tracking.alignment import RigidMotion
-from rose2_logs.tracking.frames import MAP_TRACK, RoomEvent, TrackedSnapshot
+from rose2_logs.model.rooms import Doorway
+from rose2_logs.runs import parquet_table
+from rose2_logs.runs.tables import Tables
+from rose2_logs.tracking.registration import RigidMotion
+from rose2_logs.tracking.tracked_snapshot import MAP_TRACK, RoomEvent, TrackedSnapshot
 from rose2_logs.tracking.tracker import RoomTracker
 
 NAMES = ("snapshots", "rooms", "tracks", "events", "doorways")

@@ -12,10 +12,10 @@ import pytest
 from PIL import Image
 from saved_maps import RESOLUTION_M, two_rooms
 
+from rose2_logs.drawing.image_files import write_label_image
 from rose2_logs.errors import CasesError, ParameterError
 from rose2_logs.evaluation.cases import Case
-from rose2_logs.pipeline import METHODS
-from rose2_logs.sinks.label_image import write_label_image
+from rose2_logs.segmentation.pipeline import METHODS
 
 PROJECT = Path(__file__).parents[2]
 
@@ -111,7 +111,7 @@ def test_the_data_files_beside_the_tool_can_be_used():
     """Every ablation changes the defaults; targets and published figures are as they are defined."""
     from benchmarking.references import load_ablations, load_published
 
-    from rose2_logs.parameters import Parameters
+    from rose2_logs.config.parameters import Parameters
 
     ablations = load_ablations()
     assert len({ablation.name for ablation in ablations}) == len(ablations)

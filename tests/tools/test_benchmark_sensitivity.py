@@ -18,9 +18,9 @@ from benchmarking.sensitivity import (
 )
 from test_benchmark import PROJECT, write_cases
 
+from rose2_logs.config.parameters import Parameters
 from rose2_logs.errors import ParameterError
 from rose2_logs.evaluation.cases import Case
-from rose2_logs.parameters import Parameters
 
 
 def case(group: str, name: str) -> Case:

@@ -14,7 +14,7 @@ import pytest
 from saved_maps import FREE, RESOLUTION_M, WALL, two_rooms
 
 from rose2_logs.errors import Rose2LogsError
-from rose2_logs.readers import open_log
+from rose2_logs.io import open_log
 
 PROJECT = Path(__file__).parents[2]
 needs_proc = pytest.mark.skipif(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rose2_logs.occupancy import GridGeometry, OccupancySnapshot
+from rose2_logs.model.occupancy import GridGeometry, OccupancySnapshot
 
 NAMES = ("quarter turn", "mirror", "padding", "2x finer", "turned by 30 degrees", "1 % unknown")
 

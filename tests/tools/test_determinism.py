@@ -13,13 +13,13 @@ import pytest
 from mcap.reader import make_reader
 from saved_maps import FREE, WALL, two_rooms
 
-from rose2_logs.occupancy import GridGeometry
-from rose2_logs.run import TABLES
+from rose2_logs.model.occupancy import GridGeometry
+from rose2_logs.workflows.analyze import TABLES
 
 PROGRAM = """
 import sys
 from pathlib import Path
-from rose2_logs.run import RunOptions, analyse_log
+from rose2_logs.workflows.analyze import RunOptions, analyse_log
 if __name__ == "__main__":
     log, folder, workers = sys.argv[1:]
     analyse_log(Path(log), Path(folder), RunOptions(recording=False, workers=int(workers)))

@@ -14,8 +14,8 @@ import typer
 import yaml
 from docs_pages import PAGES, TABLES, commands_page, parameters_page, tables_page
 
-from rose2_logs.cli import app
-from rose2_logs.parameters import Parameters, describe_parameters, load_parameters
+from rose2_logs.cli.main import app
+from rose2_logs.config.parameters import Parameters, describe_parameters, load_parameters
 
 PROJECT = Path(__file__).parents[2]
 DOCS = PROJECT / "docs"
@@ -113,7 +113,7 @@ def test_the_method_is_drawn_stage_by_stage():
     """Ten pictures that differ from each other, each with something on it."""
     from make_docs_pictures import METHOD_LOG, method_pictures
 
-    from rose2_logs.readers import open_log
+    from rose2_logs.io import open_log
 
     with open_log(METHOD_LOG) as reader:
         pictures = dict(method_pictures(reader.last(), Parameters()))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
 
-from rose2_logs.occupancy import GridGeometry
+from rose2_logs.model.occupancy import GridGeometry
 
 KINDS = ["run.mcap", "run.bag", "run"]
 START_NS = 1_700_000_000_000_000_000

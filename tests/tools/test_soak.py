@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from rose2_logs.run import RunOptions
+from rose2_logs.workflows.analyze import RunOptions
 
 
 @pytest.mark.skipif(not Path("/proc/self/fd").exists(), reason="the kernel tells no open files here")

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from mcap.reader import make_reader
 
-from rose2_logs.log_facts import describe_log
+from rose2_logs.workflows.info import describe_log
 
 SAMPLE = Path(__file__).parents[2] / "sample_logs" / "office.mcap"
 COUNTERS = Path("/proc/self/io")

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from rose2_logs.parameters import TopologyParameters
-from rose2_logs.topology.splitting import split_rooms
-from rose2_logs.topology.voronoi import clearance_m, parts_of_room, voronoi_graph, voronoi_lines
+from rose2_logs.config.parameters import TopologyParameters
+from rose2_logs.segmentation.topology.splitting import split_rooms
+from rose2_logs.segmentation.topology.voronoi import clearance_m, parts_of_room, voronoi_graph, voronoi_lines
 
 PARAMETERS = TopologyParameters()
 NO_LINES = np.zeros((0, 4))

@@ -10,10 +10,10 @@ import pytest
 from drawn_maps import office, snapshot
 from moved_maps import motion_about, moved
 
-from rose2_logs.occupancy import GridGeometry, OccupancySnapshot
-from rose2_logs.parameters import TrackingParameters
-from rose2_logs.readers import open_log
-from rose2_logs.tracking.alignment import MapAligner, RigidMotion
+from rose2_logs.config.parameters import TrackingParameters
+from rose2_logs.io import open_log
+from rose2_logs.model.occupancy import GridGeometry, OccupancySnapshot
+from rose2_logs.tracking.registration import MapAligner, RigidMotion
 
 PARAMETERS = TrackingParameters()
 SAMPLE = Path(__file__).parents[2] / "sample_logs" / "office.mcap"

@@ -10,13 +10,13 @@ import pytest
 import shapely
 from drawn_rooms import drawn, rows
 
-from rose2_logs.parameters import TrackingParameters
-from rose2_logs.rooms import RoomMap
-from rose2_logs.tracking.alignment import RigidMotion
-from rose2_logs.tracking.frames import TrackedSnapshot
-from rose2_logs.tracking.hindsight import Hindsight, RoomRows, look_back
+from rose2_logs.config.parameters import TrackingParameters
+from rose2_logs.model.rooms import RoomMap
+from rose2_logs.tracking.convergence import Hindsight, RoomRows, look_back
 from rose2_logs.tracking.layout_change import LayoutFollower, variation_of_information
-from rose2_logs.tracking.lives import Moment, RoomLives
+from rose2_logs.tracking.registration import RigidMotion
+from rose2_logs.tracking.track_history import Moment, RoomLives
+from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot
 from rose2_logs.tracking.tracker import RoomTracker
 
 MOTION = RigidMotion((4.0, -1.0), (0.5, 0.25), math.radians(20))

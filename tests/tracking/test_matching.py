@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rose2_logs.occupancy import GridGeometry
+from rose2_logs.model.occupancy import GridGeometry
 from rose2_logs.tracking.matching import resample_labels
 
 SHARES = st.floats(-6, 6).map(lambda value: round(value, 2))

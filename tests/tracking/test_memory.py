@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rose2_logs.occupancy import GridGeometry
+from rose2_logs.model.occupancy import GridGeometry
 from rose2_logs.tracking.matching import RegionShape
 from rose2_logs.tracking.memory import TrackMemory
 

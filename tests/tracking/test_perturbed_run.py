@@ -11,11 +11,11 @@ from moved_maps import motion_about, moved
 from numpy.typing import NDArray
 from PIL import Image
 
+from rose2_logs.config.parameters import TrackingParameters
 from rose2_logs.evaluation.tracks import TrackComparison, TrackScores
-from rose2_logs.occupancy import GridGeometry, OccupancySnapshot
-from rose2_logs.parameters import TrackingParameters
-from rose2_logs.readers import open_log
-from rose2_logs.rooms import RoomMap
+from rose2_logs.io import open_log
+from rose2_logs.model.occupancy import GridGeometry, OccupancySnapshot
+from rose2_logs.model.rooms import RoomMap
 from rose2_logs.tracking.matching import resample_labels
 from rose2_logs.tracking.overlap import overlap_of
 from rose2_logs.tracking.tracker import RoomTracker

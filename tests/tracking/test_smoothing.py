@@ -9,11 +9,11 @@ import pytest
 from drawn_maps import office
 from moved_maps import motion_about, moved
 
-from rose2_logs.occupancy import GridGeometry, OccupancySnapshot
-from rose2_logs.parameters import TrackingParameters
-from rose2_logs.rooms import RoomMap
-from rose2_logs.tracking.alignment import RigidMotion
-from rose2_logs.tracking.smoothing import Smoother, motions_to_last
+from rose2_logs.config.parameters import TrackingParameters
+from rose2_logs.model.occupancy import GridGeometry, OccupancySnapshot
+from rose2_logs.model.rooms import RoomMap
+from rose2_logs.tracking.back_projection import Smoother, motions_to_last
+from rose2_logs.tracking.registration import RigidMotion
 
 RESOLUTION_M = 0.1
 PARAMETERS = TrackingParameters(smoothed_min_area_m2=0.5)

@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rose2_logs.parameters import WallParameters
-from rose2_logs.walls.clusters import cluster_segments, covered_length, weighted_median
-from rose2_logs.walls.lines import representative_lines
-from rose2_logs.walls.segments import Segments, detect_segments, local_directions
+from rose2_logs.config.parameters import WallParameters
+from rose2_logs.segmentation.walls.clusters import cluster_segments, covered_length, weighted_median
+from rose2_logs.segmentation.walls.lines import representative_lines
+from rose2_logs.segmentation.walls.segments import Segments, detect_segments, local_directions
 
 PARAMETERS = WallParameters()
 DIRECTIONS = np.array([0.0, np.pi / 2])

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
-from rose2_logs.workers import give_back_freed_memory
+from rose2_logs.system.workers import give_back_freed_memory
 
 Result = TypeVar("Result")
 

@@ -17,13 +17,13 @@ from mcap.writer import CompressionType, Writer
 from sparse_log import write_sparse_log
 
 from benchmarking.gauges import bytes_read, timed
-from rose2_logs.log_facts import describe_log
-from rose2_logs.parameters import Parameters
-from rose2_logs.readers import open_log
-from rose2_logs.run import RunOptions
-from rose2_logs.sinks.sink import RunInfo, Sink
-from rose2_logs.sinks.summary import RunTotals
-from rose2_logs.tracked_stream import start_workers, tracked_snapshots
+from rose2_logs.config.parameters import Parameters
+from rose2_logs.io import open_log
+from rose2_logs.runs.sink import RunInfo, Sink
+from rose2_logs.runs.stream import start_workers, tracked_snapshots
+from rose2_logs.runs.summary import RunTotals
+from rose2_logs.workflows.analyze import RunOptions
+from rose2_logs.workflows.info import describe_log
 
 MESSAGE_BYTES = 1 << 20
 """Of the log to copy: about a picture or a cloud of points."""
@@ -101,9 +101,9 @@ def sink_costs(log: Path, parameters: Parameters, folder: Path) -> SinkCosts:
 
     Rerun's own threads write the recording; their time is that of the part during which they do so.
     """
-    from rose2_logs.sinks.annotated_mcap import AnnotatedMcap
-    from rose2_logs.sinks.rerun_recording import RerunRecording
-    from rose2_logs.sinks.tables import Tables
+    from rose2_logs.outputs.mcap.annotated import AnnotatedMcap
+    from rose2_logs.outputs.rerun.recording import RerunRecording
+    from rose2_logs.runs.tables import Tables
 
     options = RunOptions(parameters=parameters)
     info = RunInfo(log, "/map", options.method, parameters, {}, {})
@@ -143,7 +143,7 @@ def sink_costs(log: Path, parameters: Parameters, folder: Path) -> SinkCosts:
 
 def copy_times(sample: Path, size_bytes: int, folder: Path) -> CopyTimes:
     """Annotate a log of noise in compressed chunks, with two maps of a sample log at its ends."""
-    from rose2_logs.sinks.annotated_mcap import AnnotatedMcap
+    from rose2_logs.outputs.mcap.annotated import AnnotatedMcap
 
     log = folder / "noise.mcap"
     _write_noise(log, sample, size_bytes)

@@ -12,11 +12,11 @@ import numpy as np
 from scipy import fft
 
 from benchmarking.gauges import peak_allocated, peak_memory, timed
+from rose2_logs.config.parameters import Parameters
 from rose2_logs.evaluation.cases import Case
-from rose2_logs.occupancy import BoolArray, OccupancySnapshot, classify, known_window
-from rose2_logs.parameters import Parameters
-from rose2_logs.pipeline import SnapshotAnalysis, analyse
-from rose2_logs.readers import Selection, open_log
+from rose2_logs.io import Selection, open_log
+from rose2_logs.model.occupancy import BoolArray, OccupancySnapshot, classify, known_window
+from rose2_logs.segmentation.pipeline import SnapshotAnalysis, analyse
 
 HOUGH_THRESHOLD = 20
 """Votes of a line in the floor's Hough transform: about a metre of wall at 5 cm."""

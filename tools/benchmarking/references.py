@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from rose2_logs.config.parameters import Parameters, load_parameters
 from rose2_logs.errors import ParameterError
 from rose2_logs.evaluation.scores import FIGURES
-from rose2_logs.parameters import Parameters, load_parameters
-from rose2_logs.pipeline import METHODS
+from rose2_logs.segmentation.pipeline import METHODS
 
 PUBLISHED_FILE = Path(__file__).with_name("published.toml")
 ABLATIONS_FILE = Path(__file__).with_name("ablations.toml")

@@ -11,12 +11,12 @@ import numpy as np
 from benchmarking.accuracy import Accuracy
 from benchmarking.markdown import bold, difference, figures_of, percent, rooms_of, table
 from benchmarking.transforms import TRANSFORMS
+from rose2_logs.drawing.curves import Curve, draw_curves
+from rose2_logs.drawing.image_files import write_image
 from rose2_logs.evaluation.benchmark import CaseResult, group_means
 from rose2_logs.evaluation.scores import FIGURES, Scores, mean_scores
-from rose2_logs.provenance import software_versions
-from rose2_logs.sinks.curves import Curve, draw_curves
-from rose2_logs.sinks.label_image import write_image
-from rose2_logs.sinks.summary import write_json
+from rose2_logs.runs.provenance import software_versions
+from rose2_logs.runs.summary import write_json
 
 IOU = ("iou_sym", "iou_seg", "iou_gt")
 EXPLAINED = """\

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarking.transforms import TRANSFORMS
+from rose2_logs.config.parameters import Parameters
 from rose2_logs.evaluation.cases import Case
 from rose2_logs.evaluation.scores import score
-from rose2_logs.parameters import Parameters
-from rose2_logs.pipeline import analyse
-from rose2_logs.workers import ordered_map
+from rose2_logs.segmentation.pipeline import analyse
+from rose2_logs.system.workers import ordered_map
 
 
 @dataclass(frozen=True)

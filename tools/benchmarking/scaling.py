@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from benchmarking.gauges import ProcessTree, peak_memory
 from benchmarking.map_times import time_analysis
+from rose2_logs.config.parameters import Parameters
 from rose2_logs.errors import Rose2LogsError
-from rose2_logs.occupancy import GridGeometry, OccupancySnapshot, known_window
-from rose2_logs.parameters import Parameters
-from rose2_logs.pipeline import analyse
+from rose2_logs.model.occupancy import GridGeometry, OccupancySnapshot, known_window
+from rose2_logs.segmentation.pipeline import analyse
 
 START_NS = 1_700_000_000_000_000_000
 MAP_EVERY_S = 5.0

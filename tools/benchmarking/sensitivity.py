@@ -12,11 +12,11 @@ import numpy as np
 
 from benchmarking.markdown import bold, difference, percent, table
 from benchmarking.references import load_toml
+from rose2_logs.config.parameters import Parameters, describe_parameters
 from rose2_logs.errors import ParameterError
 from rose2_logs.evaluation.benchmark import evaluate_cases
 from rose2_logs.evaluation.cases import Case
-from rose2_logs.occupancy import FloatArray
-from rose2_logs.parameters import Parameters, describe_parameters
+from rose2_logs.model.occupancy import FloatArray
 
 BUILDINGS_FILE = Path(__file__).with_name("buildings.toml")
 BLOCKS = ("spectrum", "walls", "floor_plan", "topology")

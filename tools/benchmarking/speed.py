@@ -36,10 +36,10 @@ from benchmarking.scaling import (
     time_tiles,
     write_growing_log,
 )
-from rose2_logs.parameters import load_parameters
-from rose2_logs.pipeline import METHODS
-from rose2_logs.provenance import software_versions
-from rose2_logs.readers import open_log
+from rose2_logs.config.parameters import load_parameters
+from rose2_logs.io import open_log
+from rose2_logs.runs.provenance import software_versions
+from rose2_logs.segmentation.pipeline import METHODS
 
 GROWING_SIDE = 1000
 """Cells along the side of the maps of the logs that are written for the scaling runs."""

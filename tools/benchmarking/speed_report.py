@@ -12,10 +12,10 @@ from benchmarking.map_times import MapTimes
 from benchmarking.markdown import table
 from benchmarking.scaling import LogTimes, TileTimes
 from benchmarking.speed import GROWING_SIDE, Speed
-from rose2_logs.pipeline import METHODS
-from rose2_logs.sinks.curves import Curve, draw_curves
-from rose2_logs.sinks.label_image import write_image
-from rose2_logs.sinks.summary import write_json
+from rose2_logs.drawing.curves import Curve, draw_curves
+from rose2_logs.drawing.image_files import write_image
+from rose2_logs.runs.summary import write_json
+from rose2_logs.segmentation.pipeline import METHODS
 
 EXPLAINED = """\
 Times of maps are seconds of processor time of one core, everything run once before; `whole` is reading the

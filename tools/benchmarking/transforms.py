@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rose2_logs.occupancy import UNKNOWN, OccupancySnapshot
+from rose2_logs.model.occupancy import UNKNOWN, OccupancySnapshot
 
 Cells = NDArray[np.int8]
 Labels = NDArray[np.int32]

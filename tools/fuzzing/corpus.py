@@ -21,8 +21,8 @@ from rosbags.rosbag1 import Writer as BagWriter
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from fuzzing.targets import FRAME_BYTES, SPLIT
-from rose2_logs.occupancy import GridGeometry, OccupancySnapshot
-from rose2_logs.readers import open_log
+from rose2_logs.io import open_log
+from rose2_logs.model.occupancy import GridGeometry, OccupancySnapshot
 
 MAPS, SIDE = 3, 12
 """Maps of a seed, and the side in cells of what is cut out of them: small inputs are run faster."""

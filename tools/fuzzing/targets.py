@@ -8,21 +8,21 @@ import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+from rose2_logs.config.parameters import ReadingParameters
+from rose2_logs.config.selection import Selection
 from rose2_logs.errors import LogError
-from rose2_logs.notices import PACKAGE
-from rose2_logs.occupancy import OccupancySnapshot
-from rose2_logs.parameters import ReadingParameters
-from rose2_logs.readers.bag_index import BagFile
-from rose2_logs.readers.file_log import FileLog, OpenFile
-from rose2_logs.readers.foxglove_grid import grid_decoder
-from rose2_logs.readers.log import LogReader
-from rose2_logs.readers.map_files import read_map
-from rose2_logs.readers.map_stream import MapStream, ReadCounts
-from rose2_logs.readers.mcap_index import DAMAGE, McapFile
-from rose2_logs.readers.messages import Decoder, Grid, decoder
-from rose2_logs.readers.selection import Selection
-from rose2_logs.readers.sqlite_index import SqliteFile
-from rose2_logs.sinks.mcap_input import CopiedChunk, copied_log
+from rose2_logs.io.file_log import FileLog, OpenFile
+from rose2_logs.io.foxglove_grid import grid_decoder
+from rose2_logs.io.log import LogReader
+from rose2_logs.io.map_stream import MapStream, ReadCounts
+from rose2_logs.io.mcap.index import DAMAGE, McapFile
+from rose2_logs.io.messages import Decoder, Grid, decoder
+from rose2_logs.io.rosbag1.index import BagFile
+from rose2_logs.io.rosbag2.index import SqliteFile
+from rose2_logs.io.saved_maps import read_map
+from rose2_logs.model.occupancy import OccupancySnapshot
+from rose2_logs.outputs.mcap.input import CopiedChunk, copied_log
+from rose2_logs.system.warnings import PACKAGE
 
 LIMITS = ReadingParameters(map_max_cells=1 << 16, chunk_max_bytes=1 << 22, map_max_messages=2000)
 """Low, so that what is read in spite of them shows in the memory of the process."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation, label
 from skimage.graph import MCP_Geometric
 
-from rose2_logs.occupancy import GridGeometry
+from rose2_logs.model.occupancy import GridGeometry
 from simulation.building import Building, FloatArray
 from simulation.lidar import Lidar
 from simulation.mapper import LogOddsMapper, MapperSettings

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rose2_logs.occupancy import GridGeometry
+from rose2_logs.model.occupancy import GridGeometry
 
 FloatArray = NDArray[np.float64]
 

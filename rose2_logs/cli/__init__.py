@@ -1,0 +1,1 @@
+"""The command line ``rose2-logs``: the only place that prints."""

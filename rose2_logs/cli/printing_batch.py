@@ -1,0 +1,122 @@
+"""What the command line shows of a batch: bars, a line for each log, a table at the end."""
+
+from __future__ import annotations
+
+from types import TracebackType
+from typing import TYPE_CHECKING, Self
+
+from rich.markup import escape
+
+from rose2_logs.cli.messages import error, warning
+from rose2_logs.cli.printing import print_line, print_table, progress_bar
+
+if TYPE_CHECKING:
+    from rich.progress import TaskID
+
+    from rose2_logs.batch.driver import BatchResult, LogState
+    from rose2_logs.batch.task import Progress
+
+MOST_BARS = 10
+"""Logs in work that have a bar of their own; a cluster may have hundreds."""
+COLOURS = {"done": "green", "up to date": "green", "failed": "bold red"}
+
+
+class BatchDisplay:
+    """Shows how a batch goes on: a bar over all logs, one for each log in work, a line for each that ends.
+
+    Parameters
+    ----------
+    debug : bool
+        Whether to show the tracebacks of failures.
+    """
+
+    def __init__(self, debug: bool = False) -> None:
+        self._debug = debug
+        self._bar = progress_bar("{task.fields[note]}")
+        self._all: TaskID | None = None
+        self._running: dict[str, TaskID] = {}
+        self._over: set[str] = set()
+        self._logs = self._ended = self._failed = 0
+
+    def __enter__(self) -> Self:
+        self._bar.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, failure: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self._bar.stop()
+
+    def begin(self, logs: int, up_to_date: int) -> None:
+        """Start the bar over all logs."""
+        self._logs, self._ended = logs, up_to_date
+        self._all = self._bar.add_task("all logs", total=logs, completed=up_to_date, note=self._note())
+
+    def progress(self, told: Progress) -> None:
+        """Move a log's bar."""
+        if told.name in self._over:
+            return
+        if told.name not in self._running:
+            if len(self._running) >= MOST_BARS:
+                return
+            self._running[told.name] = self._bar.add_task(told.name, total=1.0, note="")
+        self._bar.update(self._running[told.name], completed=told.share)
+
+    def retry(self, name: str, reason: str) -> None:
+        """Tell that a log is tried again."""
+        warning(f"{name}: {reason}; it is tried again")
+        self._remove(name)
+
+    def finished(self, state: LogState) -> None:
+        """Tell what became of a log."""
+        if state.outcome is not None:
+            # A log that had moved was begun under another name.
+            self._over.add(state.outcome.name)
+            self._remove(state.outcome.name)
+            for told in state.outcome.warnings:
+                warning(f"{state.name}: {told}")
+        self._ended += 1
+        row = state.row
+        if state.status == "failed":
+            self._failed += 1
+            if self._debug and state.outcome and state.outcome.details:
+                print_line(escape(state.outcome.details), to_error=True)
+            error(f"{state.name}: {row['reason']}")
+        else:
+            found = f"{row['snapshots']} maps, {row['rooms_last']} rooms, {row['run_s']:.1f} s"
+            print_line(f"[green]{state.status}:[/] {escape(state.name)}, {found}", to_error=True)
+        if self._all is not None:
+            self._bar.update(self._all, completed=self._ended, note=self._note())
+
+    def _note(self) -> str:
+        return f"{self._ended}/{self._logs}" + (f", {self._failed} failed" if self._failed else "")
+
+    def _remove(self, name: str) -> None:
+        if name in self._running:
+            self._bar.remove_task(self._running.pop(name))
+
+
+def print_batch(result: BatchResult) -> None:
+    """Print one line for each log of a batch, how many went well, and where everything is."""
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False)
+    table.add_column("log", overflow="fold")
+    table.add_column("status", no_wrap=True)
+    for heading in ("maps", "rooms", "tracks", "s"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    table.add_column("why", overflow="fold")
+    for state in result.states:
+        row, colour = state.row, COLOURS[state.status]
+        figures = [
+            "" if row[name] is None else str(row[name]) for name in ("snapshots", "rooms_last", "tracks")
+        ]
+        seconds = "" if row["run_s"] is None else f"{row['run_s']:.1f}"
+        status = f"[{colour}]{state.status}[/]"
+        table.add_row(escape(state.name), status, *figures, seconds, escape(row["reason"] or ""))
+    print_table(table)
+    counts = {status: sum(state.status == status for state in result.states) for status in COLOURS}
+    print_line(", ".join(f"{count} {status}" for status, count in counts.items() if count))
+    print_line(f"results in [bold]{escape(str(result.out))}[/]")
+    for file in result.files:
+        print_line(f"  {escape(file.name)}")

@@ -1,0 +1,113 @@
+"""What the command line shows of a comparison of two runs."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from rich.markup import escape
+
+from rose2_logs.cli.messages import warning
+from rose2_logs.cli.printing import print_line, print_table
+
+if TYPE_CHECKING:
+    from rose2_logs.comparison.layouts import LayoutComparison
+    from rose2_logs.workflows.compare import ComparisonResult
+
+WALLS_SHOWN = 12
+"""Walls that are printed, the longest of each kind first; the table holds all."""
+
+
+def print_comparison(result: ComparisonResult) -> None:
+    """Print how the layouts lie, what became of rooms and walls, and where the results are."""
+    found = result.comparison
+    if not found.same_building:
+        warning(
+            "these do not seem to be two runs in one building: hardly any walls agree, and what is told "
+            "below means little"
+        )
+        if found.scale is not None:
+            cell_a_m, cell_b_m = found.a.map.resolution_m, found.b.map.resolution_m
+            warning(
+                f"B would fit if it were {found.scale:.2f} times as large: is the size of a cell right? With "
+                f"{cell_b_m * found.scale:.4f} m instead of {cell_b_m:.4f} m in B, or "
+                f"{cell_a_m / found.scale:.4f} m instead of {cell_a_m:.4f} m in A, they show one building"
+            )
+    elif found.ambiguous:
+        warning(
+            "the building fits about as well in another way, as when it looks the same turned by half a "
+            "circle: B may lie wrongly over A"
+        )
+    _print_overview(found)
+    _print_rooms(found)
+    _print_walls(found)
+    print_line(f"results in [bold]{escape(str(result.folder))}[/]")
+    for file in result.files:
+        print_line(f"  {escape(file.name)}")
+
+
+def _print_overview(found: LayoutComparison) -> None:
+    from rich.table import Table
+
+    x, y, yaw = found.placement.motion.pose
+    yaw_deg = math.degrees(math.remainder(yaw, 2 * math.pi))
+    table = Table(box=None, show_header=False, pad_edge=False)
+    table.add_row("A", escape(f"{found.a.name}, {len(found.a.tracks)} rooms"))
+    table.add_row("B", escape(f"{found.b.name}, {len(found.b.tracks)} rooms"))
+    table.add_row("B's frame in A's", f"{x:+.2f}, {y:+.2f} m, turned by {yaw_deg:+.2f} deg")
+    sure = "not the same building" if not found.same_building else "ambiguous" if found.ambiguous else "sure"
+    table.add_row(
+        "alignment",
+        f"{sure}: walls agree at {found.placement.agreement:.0%} of where both explored, "
+        f"which is {found.placement.common_share:.0%} of the smaller map's walls",
+    )
+    table.add_row("overlap", f"floor {found.floor_iou:.0%}, rooms {found.rooms_iou:.0%}")
+    counts = ", ".join(f"{count} {status}" for status, count in found.room_counts.items())
+    table.add_row("rooms", counts)
+    if found.walls is not None:
+        lengths = found.walls.lengths_m
+        told = ", ".join(f"{length:.1f} m {status}" for status, length in lengths.items())
+        table.add_row("walls", told or "none missing, new or moved")
+    print_table(table)
+
+
+def _print_rooms(found: LayoutComparison) -> None:
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False)
+    table.add_column("rooms", no_wrap=True)
+    for heading in ("in A", "in B", "IoU", "both explored", "m2 in A", "m2 in B"):
+        table.add_column(heading, justify="right")
+    for change in found.rooms:
+        table.add_row(
+            change.status,
+            ", ".join(map(str, change.tracks_a)) or "-",
+            ", ".join(map(str, change.tracks_b)) or "-",
+            f"{change.iou:.2f}",
+            f"{change.explored_share:.0%}",
+            f"{change.area_a_m2:.1f}",
+            f"{change.area_b_m2:.1f}",
+        )
+    print_table(table)
+
+
+def _print_walls(found: LayoutComparison) -> None:
+    from rich.table import Table
+
+    if found.walls is None or not found.walls.changes:
+        return
+    table = Table(box=None, pad_edge=False)
+    table.add_column("walls", no_wrap=True)
+    for heading in ("m", "moved by m", "in A from .. to", "in B from .. to"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    longest = sorted(found.walls.changes, key=lambda change: -change.length_m)[:WALLS_SHOWN]
+    for change in (each for each in found.walls.changes if each in longest):
+        ends = (
+            "-" if each is None else "{:.1f}, {:.1f} .. {:.1f}, {:.1f}".format(*each)
+            for each in (change.ends_a_m, change.ends_b_m)
+        )
+        shift = "" if change.shift_m is None else f"{change.shift_m:.2f}"
+        table.add_row(change.status, f"{change.length_m:.1f}", shift, *ends)
+    print_table(table)
+    if len(found.walls.changes) > WALLS_SHOWN:
+        print_line(f"and {len(found.walls.changes) - WALLS_SHOWN} shorter ones, see wall_changes.parquet")

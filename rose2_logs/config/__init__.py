@@ -1,0 +1,1 @@
+"""Every number and choice that a result depends on."""

@@ -1,0 +1,130 @@
+"""Which of a folder's files make up logs: told by their names alone, so that a listing is enough."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from rose2_logs.errors import InvalidMapError, LogError
+
+MAP_ENDINGS = (".yaml", ".yml")
+IMAGE_ENDINGS = (".pgm", ".png", ".bmp")
+STORAGE_ENDINGS = (".mcap", ".db3", ".bag", ".bag.active")
+"""The last one is of a bag that its recorder did not close."""
+COMPRESSED_ENDING = ".zstd"
+"""Of the files of a ROS 2 bag that was compressed file by file."""
+ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
+"""First bytes of what zstd compressed. No CDR message begins so: its first byte is 0."""
+ANNOTATED_ENDING = ".rose2.mcap"
+"""Of our own annotated logs, which are results and no new logs."""
+BAG_DESCRIPTION = "metadata.yaml"
+
+
+def stem_of(name: str) -> str:
+    """Name of a log without its format's ending."""
+    for ending in (*STORAGE_ENDINGS, *MAP_ENDINGS):
+        name = name.removesuffix(ending)
+    return name
+
+
+def logs_among(files: Iterable[str], folder_name: str) -> list[str]:
+    """Find the logs in a folder by the names of its files.
+
+    A folder is one log if it is a ROS 2 bag, see `is_bag`, or if it holds saved maps and no bags: those are
+    the maps of one run. Each other MCAP file, bag or database is a log. Hidden files and annotated logs are
+    left out.
+
+    Parameters
+    ----------
+    files : iterable of str
+        Paths relative to the folder, with ``/`` between their parts; from any depth.
+    folder_name : str
+        The folder's own name.
+
+    Returns
+    -------
+    list of str
+        Paths of the logs relative to the folder, sorted; ``""`` is the folder itself.
+    """
+    names_in: dict[str, list[str]] = defaultdict(list)
+    for file in files:
+        path = PurePosixPath(file)
+        if not any(part.startswith(".") for part in path.parts):
+            names_in[_text(path.parent)].append(path.name)
+    found: list[str] = []
+    bags: list[str] = []
+    for folder in sorted(names_in):
+        if any(folder == bag or folder.startswith(f"{bag}/") or bag == "" for bag in bags):
+            continue
+        names = sorted(names_in[folder])
+        if is_bag(names, PurePosixPath(folder).name or folder_name):
+            bags.append(folder)
+            found.append(folder)
+        elif stored := [name for name in names if is_storage(name)]:
+            found += [f"{folder}/{name}" if folder else name for name in stored]
+        elif _holds_maps(names):
+            found.append(folder)
+    return sorted(found)
+
+
+def is_bag(names: Sequence[str], folder_name: str) -> bool:
+    """Whether the files of a folder make up a ROS 2 bag.
+
+    It holds ``metadata.yaml`` beside its storage files, or, of a recording that was not closed, storage files
+    ``FOLDER_0``, ``FOLDER_1`` .. and no others.
+    """
+    stored = [name for name in names if is_storage(name.removesuffix(COMPRESSED_ENDING))]
+    if not stored or BAG_DESCRIPTION in names:
+        return bool(stored)
+    parts = {f"{folder_name}_{number}" for number in range(len(stored))}
+    return {PurePosixPath(name.removesuffix(COMPRESSED_ENDING)).stem for name in stored} == parts
+
+
+def is_storage(name: str) -> bool:
+    """Whether a name is that of an MCAP file, bag or database, and not of an annotated log."""
+    return name.lower().endswith(STORAGE_ENDINGS) and not name.endswith(ANNOTATED_ENDING)
+
+
+def _text(folder: PurePosixPath) -> str:
+    return "" if folder == PurePosixPath(".") else folder.as_posix()
+
+
+def _holds_maps(names: Sequence[str]) -> bool:
+    stems = {PurePosixPath(name).stem for name in names if name.lower().endswith(IMAGE_ENDINGS)}
+    return any(name.lower().endswith(MAP_ENDINGS) and PurePosixPath(name).stem in stems for name in names)
+
+
+LARGEST_BYTES = 1 << 22
+"""Descriptions are some kilobytes; those of bags with thousands of files a megabyte."""
+
+
+def load_yaml(path: Path) -> dict[str, Any]:
+    """Read a mapping from a YAML file.
+
+    Raises
+    ------
+    LogError
+        If the file cannot be read or is too large.
+    InvalidMapError
+        If it is not YAML, or describes nothing.
+    """
+    import yaml
+
+    try:
+        if path.stat().st_size > LARGEST_BYTES:
+            raise LogError(f"{path}: is no description of a map or a bag, it is too large", file=path)
+        # In C where there is one: the one in Python takes time with the square of what is nested.
+        loader = yaml.CSafeLoader if yaml.__with_libyaml__ else yaml.SafeLoader
+        described = yaml.load(path.read_text(encoding="utf-8"), loader)  # noqa: S506 (both are safe)
+    except (OSError, UnicodeDecodeError) as error:
+        raise LogError(f"{path}: cannot be read: {error}", file=path) from error
+    # Nesting without end, and numbers and dates that Python does not take.
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        raise InvalidMapError(f"{path}: is not YAML: {' '.join(str(error).split())}", file=path) from error
+    if not isinstance(described, dict):
+        raise InvalidMapError(
+            f"{path}: does not describe a map; it needs image, resolution and origin", file=path
+        )
+    return described

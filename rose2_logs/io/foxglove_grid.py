@@ -1,0 +1,142 @@
+"""Occupancy from ``foxglove.Grid`` protobuf messages, by the schema that the log carries."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rose2_logs.errors import InvalidMapError
+from rose2_logs.io.messages import (
+    FOXGLOVE_GRID_TYPE,
+    LONGEST_NAME_BYTES,
+    MOST_CELLS,
+    Cells,
+    Decoder,
+    Grid,
+    Remark,
+    check_cells,
+    make_grid,
+    percent,
+)
+from rose2_logs.model.occupancy import UNKNOWN
+
+# foxglove.PackedElementField.NumericType
+_NUMERIC_TYPES = {1: "u1", 2: "i1", 3: "<u2", 4: "<i2", 5: "<u4", 6: "<i4", 7: "<f4", 8: "<f8"}
+_OCCUPANCY_FIELD = "occupancy"
+
+
+def grid_decoder(schema: bytes, most_cells: int = MOST_CELLS) -> Decoder:
+    """Return the decoder of ``foxglove.Grid`` messages.
+
+    Integers are percent with -1 (unsigned: all bits set) as unknown, like in a ROS occupancy grid; floating
+    point numbers are probabilities in 0..1 with NaN or a negative number as unknown.
+
+    Parameters
+    ----------
+    schema : bytes
+        A serialized google.protobuf.FileDescriptorSet.
+    most_cells : int
+        Cells of the largest map that is read.
+
+    Raises
+    ------
+    InvalidMapError
+        If the schema cannot be read; the returned function raises it where a message is no occupancy grid.
+    """
+    from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
+    from google.protobuf.message import DecodeError
+
+    pool = descriptor_pool.DescriptorPool()
+    try:
+        files = {file.name: file for file in descriptor_pb2.FileDescriptorSet.FromString(schema).file}
+        for name in list(files):
+            _add_with_imports(pool, files, name)
+        message_class: Any = message_factory.GetMessageClass(pool.FindMessageTypeByName(FOXGLOVE_GRID_TYPE))
+    except (DecodeError, KeyError, TypeError, ValueError, RecursionError) as error:
+        raise InvalidMapError(
+            f"the protobuf schema of {FOXGLOVE_GRID_TYPE} cannot be read: {error}"
+        ) from error
+
+    def decode(data: memoryview) -> Grid | None:
+        try:
+            return _grid(message_class.FromString(bytes(data)), most_cells)
+        except DecodeError as error:
+            raise InvalidMapError(f"it cannot be decoded as {FOXGLOVE_GRID_TYPE}: {error}") from error
+        except (AttributeError, TypeError, ValueError, OverflowError) as error:
+            # By a schema of that name, but with other fields.
+            raise InvalidMapError(f"its schema is not that of {FOXGLOVE_GRID_TYPE}: {error}") from error
+
+    return decode
+
+
+def _add_with_imports(pool: Any, files: dict[str, Any], name: str) -> None:
+    """Add one file of the schema to the pool after those it imports; each one once."""
+    file = files.pop(name, None)
+    if file is not None:
+        for imported in file.dependency:
+            _add_with_imports(pool, files, imported)
+        pool.Add(file)
+
+
+def _grid(message: Any, most_cells: int) -> Grid | None:
+    remarks: list[Remark] = []
+    if len(message.frame_id) > LONGEST_NAME_BYTES:
+        raise InvalidMapError(f"its frame_id is longer than {LONGEST_NAME_BYTES} bytes")
+    # Of one that is no number neither equals the other; that is told below.
+    if message.cell_size.x != message.cell_size.y and not math.isnan(message.cell_size.x):
+        raise InvalidMapError(
+            f"its cells are {message.cell_size.x} x {message.cell_size.y} m; only square ones can be read"
+        )
+    position, turn = message.pose.position, message.pose.orientation
+    pose = (position.x, position.y, position.z, turn.x, turn.y, turn.z, turn.w)
+    stamp_ns = message.timestamp.seconds * 10**9 + message.timestamp.nanos
+    values = _channel(message)
+    check_cells(values.shape[0], values.shape[1], most_cells)
+    cells = _occupancy(values, remarks)
+    return make_grid(stamp_ns, message.frame_id, message.cell_size.x, pose, cells, remarks)
+
+
+def _channel(message: Any) -> NDArray[Any]:
+    """View the occupancy channel (H, W) in the packed cells."""
+    fields = {field.name: field for field in message.fields}
+    if len(fields) > 1:
+        fields = {name: field for name, field in fields.items() if name == _OCCUPANCY_FIELD}
+    if len(fields) != 1:
+        names = ", ".join(field.name for field in message.fields) or "none"
+        raise InvalidMapError(
+            f"its channels are {names}; one channel, or one named {_OCCUPANCY_FIELD}, is needed"
+        )
+    (field,) = fields.values()
+    if field.type not in _NUMERIC_TYPES:
+        raise InvalidMapError(f"its channel {field.name} has the unknown number type {field.type}")
+    dtype = np.dtype(_NUMERIC_TYPES[field.type])
+    data, columns, cell = message.data, message.column_count, message.cell_stride
+    rows = len(data) // message.row_stride if message.row_stride else 0
+    # The last bytes that the strides reach must exist; ndarray checks the same, but says it less clearly.
+    if (
+        rows * message.row_stride != len(data)
+        or columns * cell > message.row_stride
+        or field.offset + dtype.itemsize > max(cell, 1)
+    ):
+        raise InvalidMapError(
+            f"{columns} columns of {cell} bytes in rows of {message.row_stride} bytes, channel at "
+            f"{field.offset}, do not fit its {len(data)} bytes of data"
+        )
+    return np.ndarray((rows, columns), dtype, data, field.offset, (message.row_stride, cell))
+
+
+def _occupancy(values: NDArray[Any], remarks: list[Remark]) -> Cells:
+    if values.dtype.kind == "f":
+        if values.size and np.nanmax(values, initial=0) > 1:
+            raise InvalidMapError(
+                "its occupancy is floating point but exceeds 1; probabilities 0..1 are expected"
+            )
+        known = values >= 0
+        return np.where(known, np.round(np.where(known, values, 0) * 100), UNKNOWN).astype(np.int8)
+    if values.dtype.itemsize == 1:
+        return percent(np.ascontiguousarray(values).view(np.int8), remarks)
+    known = (values >= 0) & (values <= 100)
+    return np.where(known, values, UNKNOWN).astype(np.int8)

@@ -1,0 +1,255 @@
+"""A log as the rest of the tool sees it: what it holds, and its distinct maps in the order of log time."""
+
+from __future__ import annotations
+
+import dataclasses
+import logging
+from collections import deque
+from collections.abc import Iterator
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+
+from rose2_logs.config.selection import Selection, Times
+from rose2_logs.errors import InvalidMapError, LogError, NoMapTopicError
+from rose2_logs.io.map_stream import MapStream, Oddities, ReadCounts
+from rose2_logs.io.messages import Patch, Remark, is_patch_type
+from rose2_logs.io.poses import RobotPath
+from rose2_logs.io.source import DamagedMessageError, LoggedMap, LogInfo, MessageSource, TopicInfo
+from rose2_logs.model.occupancy import OccupancySnapshot
+from rose2_logs.system.warnings import notice
+
+__all__ = ["LogInfo", "LogReader", "ReadCounts", "Selection", "TopicInfo", "choose_topic"]
+
+logger = logging.getLogger(__name__)
+
+# Compared without the leading slash, which old ROS 1 bags leave out.
+PREFERRED_TOPIC = "map"
+# Patches of a map travel on the map's topic with this suffix: the convention of costmap_2d and nav2.
+PATCH_SUFFIX = "_updates"
+# Message types named in the error about a log without maps: it stays one readable line.
+MOST_LISTED = 6
+
+
+class LogReader:
+    """The distinct maps of one topic of a log; a context manager that closes its files.
+
+    Attributes
+    ----------
+    info : LogInfo
+        What the log holds.
+    topic : str
+        The map topic that is read.
+    source : MessageSource
+        The open log.
+    counts : ReadCounts
+        About the latest call of `snapshots`.
+    """
+
+    def __init__(self, source: MessageSource, topic: str | None, selection: Selection) -> None:
+        self.info = source.info
+        self.topic = choose_topic(source.info, topic)
+        self.counts = ReadCounts()
+        self.source = source
+        self._selection = selection
+        self._first_failure: str | None = None
+        self._topics = [self.topic] + [
+            item.name
+            for item in self.info.topics
+            if item.name == self.topic + PATCH_SUFFIX and is_patch_type(item.message_type)
+        ]
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Release the log's files."""
+        self.source.close()
+
+    def snapshots(self) -> Iterator[OccupancySnapshot]:
+        """Yield the selected maps in the order of log time.
+
+        A map equal to the one before is dropped and counted, one that is damaged or contradicts itself told,
+        left out and counted. One map at a time is held, and the times of the topic's messages.
+
+        Raises
+        ------
+        LogError
+            If no map of the topic lies in the time range, or none can be read.
+        """
+        times = self._times_in_range()
+        chosen = self._selection.thin(np.unique(times))
+        taken = int(np.isin(times, chosen).sum())
+        self.counts = ReadCounts(messages=len(times), skipped=len(times) - taken)
+        snapshot = None
+        for snapshot in self._read(chosen, self.counts, self._selection.min_change_m2, tell=True):
+            yield snapshot
+        if snapshot is None:
+            raise self._no_map(self.counts)
+
+    def first(self) -> OccupancySnapshot:
+        """Return the first map in the time range (index 0), whatever else is selected.
+
+        Raises
+        ------
+        LogError
+            As `snapshots`.
+        """
+        counts = ReadCounts()
+        snapshot = next(self._read(np.unique(self._times_in_range()), counts), None)
+        if snapshot is None:
+            raise self._no_map(counts)
+        return snapshot
+
+    def last(self) -> OccupancySnapshot:
+        """Return the last map in the time range, whatever else is selected.
+
+        Its index is -1, counted from the end, because the maps before it are not read.
+
+        Raises
+        ------
+        LogError
+            As `snapshots`.
+        """
+        counts = ReadCounts()
+        # From the end back: a log may end with messages that are damaged or hold no cells.
+        for time in np.unique(self._times_in_range())[::-1]:
+            # Of several of one time, as in logs without times, it is the last one too.
+            latest = deque(self._read(np.array([time]), counts), maxlen=1)
+            if latest:
+                return dataclasses.replace(latest[0], index=-1)
+        raise self._no_map(counts)
+
+    def robot_path(self, frame_id: str) -> RobotPath:
+        """Follow the robot through the selected time.
+
+        Parameters
+        ----------
+        frame_id : str
+            Frame of the map, in which its poses are wanted.
+        """
+        return RobotPath(self.source, frame_id, self._selection.start_ns)
+
+    def _read(
+        self, chosen: Times, counts: ReadCounts, min_change_m2: float | None = None, *, tell: bool = False
+    ) -> Iterator[OccupancySnapshot]:
+        """Yield the distinct maps as they stand at the `chosen` times (sorted); `tell` what is odd."""
+        wanted = set(chosen.tolist())
+        stream = MapStream(self.topic, counts, min_change_m2)
+        oddities = Oddities()
+        for message in self.source.read(self._topics, self._needed(chosen)):
+            is_wanted = message.log_time_ns in wanted
+            remarks: tuple[Remark, ...] = ()
+            try:
+                decoded = message.decode()
+                if isinstance(decoded, Patch) and stream.is_empty:
+                    remarks = (Remark("patch_without_map", "a patch without a map before it; left out"),)
+                else:
+                    remarks = oddities.of(decoded, message.log_time_ns)
+                stream.apply(decoded)
+            except LogError as error:
+                is_damaged = isinstance(error, DamagedMessageError)
+                counts.damaged += is_wanted and is_damaged
+                counts.invalid += is_wanted and not is_damaged
+                if message.topic == self.topic:
+                    stream.forget()
+                self._first_failure = self._first_failure or f"{self._place(message)}: {error}"
+                kind = "damaged_message" if is_damaged else "invalid_map"
+                self._tell(message, Remark(kind, f"{error}; it is left out"), tell)
+                continue
+            for remark in remarks:
+                self._tell(message, remark, tell)
+            if is_wanted and (snapshot := stream.snapshot(message.log_time_ns)) is not None:
+                yield snapshot
+
+    def _place(self, message: LoggedMap) -> str:
+        total = len(self.source.log_times(message.topic))
+        return f"{self.info.path}: message {message.number} of {total} on {message.topic}"
+
+    def _tell(self, message: LoggedMap, remark: Remark, tell: bool) -> None:
+        if tell:
+            text = f"{self._place(message)}: {remark.text}"
+            notice(logger, remark.kind, text, file=message.file, topic=message.topic, index=message.number)
+
+    def _needed(self, chosen: Times) -> Times:
+        """Times of the messages that the maps at the `chosen` times are made of.
+
+        Without patches each map is a message. With patches it is the last grid and all patches since.
+        """
+        if len(self._topics) == 1 or not len(chosen):
+            return chosen
+        grids, patches = (np.unique(self.source.log_times(topic)) for topic in self._topics)
+        last_grid = np.searchsorted(grids, chosen, "right") - 1
+        begins = np.where(last_grid >= 0, grids[last_grid], chosen) if len(grids) else chosen
+        # A patch is needed if some chosen map is made of it: its grid began before, the map stands after it.
+        following = np.searchsorted(chosen, patches, "left")
+        inside = following < len(chosen)
+        patches, following = patches[inside], following[inside]
+        return np.unique(np.concatenate([chosen, begins, patches[begins[following] <= patches]]))
+
+    def _times_in_range(self) -> Times:
+        times = np.sort(np.concatenate([self.source.log_times(topic) for topic in self._topics]))
+        if not len(times):
+            raise LogError(f"{self.info.path}: there is no message on {self.topic}; choose another topic")
+        in_range = self._selection.in_range(times)
+        if not len(in_range):
+            begin_ns = times[0] if self.info.start_ns is None else self.info.start_ns
+            first_s, last_s = ((int(each) - int(begin_ns)) / 1e9 for each in (times[0], times[-1]))
+            raise LogError(
+                f"{self.info.path}: no message on {self.topic} lies in the time range; "
+                f"they lie from {first_s:.1f} to {last_s:.1f} s into the log"
+            )
+        return in_range
+
+    def _no_map(self, counts: ReadCounts) -> LogError:
+        where = f"no message on {self.topic} in the time range holds a map"
+        if self._first_failure is None:
+            text = f"{self.info.path}: {where}; choose another topic or time range"
+            return LogError(text, file=self.info.path, topic=self.topic)
+        why = [f"{counts.damaged} messages are damaged"] if counts.damaged else []
+        why += [f"{counts.invalid} maps contradict themselves"] if counts.invalid else []
+        kind = InvalidMapError if counts.invalid else LogError
+        text = f"{self._first_failure}; {where}: {', '.join(why)}"
+        return kind(text, file=self.info.path, topic=self.topic)
+
+
+def choose_topic(info: LogInfo, asked: str | None = None) -> str:
+    """Choose the map topic: the one asked for, else ``/map``, else the only one with messages.
+
+    Raises
+    ------
+    NoMapTopicError
+        If there is none, or there are several and none was asked for; the text lists them.
+    """
+    where = str(info.path) if info.whole else f"{info.path}: is damaged; of what can be read of it"
+    maps = {topic.name: topic for topic in info.topics if topic.is_map}
+    listed = ", ".join(maps)
+    if asked is not None:
+        for name in maps:
+            if name.lstrip("/") == asked.lstrip("/"):
+                return name
+        has = f"its map topics are {listed}" if maps else "it has no map topics"
+        raise NoMapTopicError(f"{info.path}: {asked} is not a topic with occupancy grids; {has}")
+    if not maps:
+        others = ", ".join(sorted({topic.message_type for topic in info.topics})[:MOST_LISTED]) or "nothing"
+        raise NoMapTopicError(
+            f"{where}: no topic holds occupancy grids (nav_msgs/OccupancyGrid); it holds {others}; "
+            "record the topic of the mapping node, often /map, as well"
+        )
+    filled = {name: topic for name, topic in maps.items() if topic.message_count != 0}
+    if not filled:
+        raise NoMapTopicError(f"{where}: no message was recorded on the map topics {listed}")
+    for name in filled:
+        if name.lstrip("/") == PREFERRED_TOPIC:
+            return name
+    if len(filled) > 1:
+        raise NoMapTopicError(
+            f"{info.path}: several topics hold maps, choose one: {', '.join(filled)} (--topic)"
+        )
+    return next(iter(filled))

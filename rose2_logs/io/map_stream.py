@@ -1,0 +1,194 @@
+"""Successive map messages to distinct maps: patches applied, repeats and small changes dropped."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rose2_logs.errors import InvalidMapError
+from rose2_logs.io.messages import Cells, Grid, Patch, Remark
+from rose2_logs.model.occupancy import UNKNOWN, BoolArray, OccupancySnapshot
+
+
+@dataclass
+class ReadCounts:
+    """What became of the map messages in the time range; filled while the snapshots are read.
+
+    Once all are read, `messages` is the number of snapshots plus repeats, skipped, damaged and invalid.
+
+    Attributes
+    ----------
+    messages : int
+        Map messages, grids and patches, of the topic in the time range.
+    repeats : int
+        Read, but equal to the map before.
+    skipped : int
+        Not taken by the selection, or without a map: a grid of no cells, a patch before any grid.
+    updates_applied : int
+        Patches written into the grid before them, taken or not.
+    damaged : int
+        Cannot be read any more: checksum or compression wrong.
+    invalid : int
+        Contradict themselves, or reach out of the map before them.
+    """
+
+    messages: int = 0
+    repeats: int = 0
+    skipped: int = 0
+    updates_applied: int = 0
+    damaged: int = 0
+    invalid: int = 0
+
+
+class MapStream:
+    """The map as it stands after each message, and what of it is new.
+
+    Parameters
+    ----------
+    topic : str
+        Name for the snapshots.
+    counts : ReadCounts
+        Filled along the way.
+    min_change_m2 : float, optional
+        Least change of the known area since the last snapshot.
+    """
+
+    def __init__(self, topic: str, counts: ReadCounts, min_change_m2: float | None = None) -> None:
+        self._topic = topic
+        self._counts = counts
+        self._min_change_m2 = min_change_m2
+        self._map: Grid | None = None
+        self._cells_are_shared = True
+        self._seen: Grid | None = None
+        self._yielded: Grid | None = None
+        self._index = 0
+        self._repeats = 0
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether there is no map: none came yet, or the last one was lost."""
+        return self._map is None
+
+    def forget(self) -> None:
+        """Have no map until the next whole one: the one that came was lost, and patches are for it."""
+        self._map = None
+
+    def apply(self, message: Grid | Patch | None) -> None:
+        """Bring the map up to date; None and a patch without a grid before it leave no map.
+
+        Raises
+        ------
+        InvalidMapError
+            If a patch reaches out of the grid.
+        """
+        if not isinstance(message, Patch):
+            self._map = message
+            self._cells_are_shared = True
+            return
+        if self._map is None:
+            return
+        height, width = message.cells.shape
+        rows, columns = self._map.cells.shape
+        top, left = message.row, message.column
+        if top < 0 or left < 0 or top + height > rows or left + width > columns:
+            raise InvalidMapError(
+                f"the patch of {width} x {height} cells at column {left}, row {top} "
+                f"reaches out of the map of {columns} x {rows}"
+            )
+        # Cells that came from a message or went out in a snapshot are left as they are.
+        cells = self._map.cells.copy() if self._cells_are_shared else self._map.cells
+        cells[top : top + height, left : left + width] = message.cells
+        self._map = Grid(message.stamp_ns, self._map.geometry, cells)
+        self._cells_are_shared = False
+        self._counts.updates_applied += 1
+
+    def snapshot(self, log_time_ns: int) -> OccupancySnapshot | None:
+        """Return the map as it stands, or None (and count why) if there is none or it is not new enough."""
+        now = self._map
+        if now is None:
+            self._counts.skipped += 1
+            return None
+        if self._seen is not None and _equal(now, self._seen):
+            self._counts.repeats += 1
+            self._repeats += 1
+            return None
+        self._seen = now
+        self._cells_are_shared = True
+        if (
+            self._min_change_m2
+            and self._yielded is not None
+            and known_area_change_m2(self._yielded, now) < self._min_change_m2
+        ):
+            self._counts.skipped += 1
+            return None
+        taken = OccupancySnapshot(
+            self._index, log_time_ns, now.stamp_ns, self._topic, now.cells, now.geometry, self._repeats
+        )
+        self._yielded = now
+        self._index += 1
+        self._repeats = 0
+        return taken
+
+
+def _equal(one: Grid, other: Grid) -> bool:
+    return one.geometry == other.geometry and np.array_equal(one.cells, other.cells)
+
+
+def known_area_change_m2(before: Grid, now: Grid) -> float:
+    """Area that is known in one of two maps only, in square metres.
+
+    Grids of equal resolution, yaw and frame are laid over each other to the nearest cell; between others
+    nothing can be compared and the change is infinite.
+    """
+    old, new = before.geometry, now.geometry
+    if (old.resolution_m, old.yaw_rad, old.frame_id) != (new.resolution_m, new.yaw_rad, new.frame_id):
+        return float("inf")
+    column, row = (
+        np.round(old.world_to_grid(np.array(new.origin_xy_m)) / old.resolution_m).astype(int).tolist()
+    )
+    shared = _overlap(before.cells, row, column, new.shape) & _overlap(now.cells, -row, -column, old.shape)
+    known = np.count_nonzero(before.cells != UNKNOWN) + np.count_nonzero(now.cells != UNKNOWN)
+    return float((known - 2 * np.count_nonzero(shared)) * new.cell_area_m2)
+
+
+def _overlap(cells: Cells, row: int, column: int, shape: tuple[int, int]) -> BoolArray:
+    """Known cells in that part of a grid that a grid of `shape` covers from (row, column) on."""
+    top, left = max(row, 0), max(column, 0)
+    bottom, right = max(row + shape[0], top), max(column + shape[1], left)
+    known: BoolArray = cells[top:bottom, left:right] != UNKNOWN
+    return known
+
+
+BACK_NS = 10**9
+"""Stamps may go back by the time that maps wait for each other; by more, a clock was set."""
+
+
+class Oddities:
+    """Looks at the maps of a topic as they come."""
+
+    def __init__(self) -> None:
+        self._stamp_ns: int | None = None
+        self._frame: str | None = None
+
+    def of(self, message: Grid | Patch | None, log_time_ns: int) -> tuple[Remark, ...]:
+        """Tell what is odd about a map or a patch with its log time, and what changed since the last one."""
+        if message is None:
+            return (Remark("no_cells", "a map without cells; left out"),)
+        remarks = list(message.remarks)
+        before, self._stamp_ns = self._stamp_ns, message.stamp_ns
+        # Of what carries no time at all, as saved maps, that is known.
+        if message.stamp_ns == 0 and log_time_ns != 0:
+            remarks.append(Remark("stamp_zero", "its stamp is zero; only its log time is known"))
+        elif before is not None and message.stamp_ns < before - BACK_NS:
+            remarks.append(
+                Remark("stamp_back", f"its stamp goes back by {(before - message.stamp_ns) / 1e9:.1f} s")
+            )
+        if isinstance(message, Grid):
+            frame, self._frame = self._frame, message.geometry.frame_id
+            if frame is not None and frame != self._frame:
+                text = (
+                    f"its frame changes from {frame!r} to {self._frame!r}; rooms are followed by coordinates"
+                )
+                remarks.append(Remark("frame_changes", text))
+        return tuple(remarks)

@@ -1,0 +1,352 @@
+"""One MCAP file: its channels, where the messages of a channel lie, and the bytes of each.
+
+The index comes from the file's summary; a file that has none, or was cut off, is scanned once, record by
+record, over everything that is whole.
+"""
+
+from __future__ import annotations
+
+import logging
+import struct
+from collections import Counter, OrderedDict
+from collections.abc import Collection, Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import IO, Any
+
+from mcap.exceptions import McapError
+from mcap.opcode import Opcode
+from mcap.records import Attachment, ChunkIndex, Header, Metadata, Schema
+from mcap.records import Channel as McapChannel
+
+from rose2_logs.config.parameters import ReadingParameters
+from rose2_logs.errors import LogError
+from rose2_logs.io.checked_file import CheckedFile
+from rose2_logs.io.decompression import REMEDY
+from rose2_logs.io.log_file import LATEST_NS, LogFile, Place, StoredMessage, check_count
+from rose2_logs.io.mcap.records import (
+    INDEX,
+    INDEX_ENTRY,
+    MAGIC,
+    MESSAGE,
+    RECORD,
+    Record,
+    channel_of,
+    chunk_records,
+    parsed,
+    read_exactly,
+    read_summary,
+    records_in,
+)
+from rose2_logs.io.source import DamagedMessageError
+from rose2_logs.system.warnings import notice
+
+logger = logging.getLogger(__name__)
+
+# Chunks that overlap in time are read in turns; two are kept so that each is decompressed once.
+_CHUNKS_KEPT = 2
+# What parsing raises on bytes that are not what they should be; ValueError is also TooLargeError.
+DAMAGE = (McapError, ValueError, KeyError, EOFError, struct.error)
+
+
+class McapFile(LogFile):
+    """An open MCAP file.
+
+    Parameters
+    ----------
+    path : Path
+    limits : ReadingParameters
+        How much it may claim.
+
+    Raises
+    ------
+    LogError
+        If the file cannot be opened or is no MCAP file, or holds more map messages than may be.
+    """
+
+    def __init__(self, path: Path, limits: ReadingParameters) -> None:
+        self.path = path
+        self.limits = limits
+        self.channels = {}
+        self._schemas: dict[int, Schema] = {}
+        self.message_counts = Counter()
+        self.start_ns = self.end_ns = None
+        self._chunks: OrderedDict[int, memoryview] = OrderedDict()
+        self._scanned: list[Place] = []
+        try:
+            self._stream = CheckedFile(path)
+        except OSError as error:
+            raise LogError(f"{path}: cannot be opened: {error.strerror}", file=path) from error
+        try:
+            if self._stream.read(len(MAGIC)) != MAGIC:
+                raise LogError(f"{path}: is not an MCAP file, it does not begin as one", file=path)
+            index_damage = ""
+            try:
+                self.summary = read_summary(self._stream, limits.chunk_max_bytes)
+            except DAMAGE as error:
+                self.summary, index_damage = None, str(error)
+            self.indexed = self.summary is not None
+            if self.summary is None:
+                self._scan()
+                if self.whole and index_damage:
+                    text = f"{path}: its index is damaged or cut off ({index_damage}); all before it was read"
+                    notice(logger, "damaged_index", text, file=path)
+            else:
+                self._take_summary()
+        except BaseException:
+            self._stream.close()
+            raise
+
+    def close(self) -> None:
+        """Close the file."""
+        self._stream.close()
+        self._chunks.clear()
+
+    @property
+    def stream(self) -> IO[bytes]:
+        """The open file, for copying chunks."""
+        return self._stream
+
+    def places(self, channel_ids: Collection[int]) -> list[Place]:
+        """Where the messages of some channels lie, in the order of log time."""
+        if self.summary is None:
+            return sorted(place for place in self._scanned if place.channel_id in channel_ids)
+        places: list[Place] = []
+        for chunk in self.summary.chunks:
+            if wanted := set(channel_ids) & set(chunk.message_index_offsets):
+                places += self._places_in(chunk, wanted)
+                check_count(self.path, len(places), self.limits.map_max_messages)
+        return sorted(places)
+
+    def _places_in(self, chunk: ChunkIndex, channel_ids: set[int]) -> list[Place]:
+        """Places in one chunk, by its message index, or by the chunk itself where that is damaged."""
+        begin = chunk.chunk_start_offset
+        try:
+            return [
+                Place(time, begin, offset, channel)
+                for channel in channel_ids
+                for time, offset in self._message_index(chunk, channel)
+                if time <= LATEST_NS
+            ]
+        except DAMAGE:
+            pass
+        found = []
+        try:
+            for record in records_in(self._chunk(begin)):
+                if record.opcode == Opcode.MESSAGE:
+                    channel, _, time, _ = MESSAGE.unpack_from(record.content)
+                    if channel in channel_ids and time <= LATEST_NS:
+                        found.append(Place(time, begin, record.offset, channel))
+        except DAMAGE as error:
+            self._tell_damaged(begin, error)
+        return found
+
+    def _tell_damaged(self, begin: int, error: Exception) -> None:
+        text = f"{self.path}: the chunk at byte {begin} is damaged ({error}); its messages are left out"
+        notice(logger, "damaged_chunk", text, file=self.path)
+
+    def _message_index(self, chunk: ChunkIndex, channel_id: int) -> list[tuple[int, int]]:
+        """Log time and offset of each message of a channel in a chunk, from the index behind that.
+
+        Read exactly: in a large log there are thousands.
+        """
+        self._stream.seek(chunk.message_index_offsets[channel_id])
+        opcode, _, channel, length = INDEX.unpack(self._stream.read(INDEX.size))
+        if opcode != Opcode.MESSAGE_INDEX or channel != channel_id:
+            raise ValueError("no message index where the summary says")
+        if length > chunk.message_index_length:
+            raise ValueError("the message index is longer than the place for it")
+        entries = list(INDEX_ENTRY.iter_unpack(self._stream.read(length)))
+        most = min(chunk.uncompressed_size, self.limits.chunk_max_bytes)
+        if any(offset >= most for _, offset in entries):
+            raise ValueError("the message index points behind the chunk")
+        return entries
+
+    def payload(self, place: Place) -> memoryview:
+        """Return the data of one message.
+
+        Raises
+        ------
+        DamagedMessageError
+            If it is not where the index says, or a checksum or a compressed chunk is wrong.
+        """
+        try:
+            if place.offset < 0:
+                record = memoryview(self._record(place.record))
+            else:
+                chunk = self._chunk(place.record)
+                opcode, length = RECORD.unpack_from(chunk, place.offset)
+                begin = place.offset + RECORD.size
+                record = chunk[begin : begin + length]
+                if opcode != Opcode.MESSAGE or len(record) != length:
+                    raise ValueError("there is no message where the index says")
+            channel_id, _, log_time_ns, _ = MESSAGE.unpack_from(record)
+            if (channel_id, log_time_ns) != (place.channel_id, place.log_time_ns):
+                raise ValueError("there is another message where the index says")
+        except DAMAGE as error:
+            raise DamagedMessageError(f"damaged ({error})") from error
+        return record[MESSAGE.size :]
+
+    def messages(self, channel_ids: Collection[int] | None = None) -> Iterator[StoredMessage]:
+        """Yield every message that is whole: of some channels chunk by chunk, or all in the file's order."""
+        if channel_ids is None:
+            yield from self._all_messages()
+        elif self.summary is None:
+            yield from (each for each in self._all_messages() if each.channel.id in channel_ids)
+        else:
+            for chunk in sorted(self.summary.chunks, key=lambda each: each.message_start_time):
+                if set(channel_ids) & set(chunk.message_index_offsets):
+                    with suppress(*DAMAGE):
+                        found = self.messages_in(chunk)
+                        yield from (each for each in found if each.channel.id in channel_ids)
+
+    def _all_messages(self) -> Iterator[StoredMessage]:
+        for record in self._records():
+            if record.opcode == Opcode.CHUNK:
+                try:
+                    held = records_in(chunk_records(record.content, self.limits.chunk_max_bytes))
+                except DAMAGE as error:
+                    if self.indexed:  # else it was told when the file was scanned
+                        self._tell_damaged(record.offset, error)
+                    continue
+            else:
+                held = iter([record])
+            with suppress(*DAMAGE):
+                for each in held:
+                    if each.opcode == Opcode.MESSAGE:
+                        yield self._stored(each)
+
+    def _stored(self, record: Record) -> StoredMessage:
+        channel_id, sequence, log_time_ns, publish_time_ns = MESSAGE.unpack_from(record.content)
+        data = record.content[MESSAGE.size :]
+        return StoredMessage(self.channels[channel_id], log_time_ns, publish_time_ns, sequence, data)
+
+    def header(self) -> Header:
+        """Return the file's profile and the library that wrote it; empty where they are damaged."""
+        try:
+            header: Header = parsed(Header, memoryview(self._record(len(MAGIC))))
+        except DAMAGE:
+            return Header(profile="", library="")
+        return header
+
+    def attachments(self) -> Iterator[Attachment]:
+        """Yield the attachments that the summary names, as far as they are whole."""
+        return self._named(Attachment, [] if self.summary is None else self.summary.attachments)
+
+    def metadata(self) -> Iterator[Metadata]:
+        """Yield the metadata records that the summary names, as far as they are whole."""
+        return self._named(Metadata, [] if self.summary is None else self.summary.metadata)
+
+    def _named(self, kind: Any, offsets: list[int]) -> Iterator[Any]:
+        for offset in offsets:
+            try:
+                yield parsed(kind, memoryview(self._record(offset)))
+            except DAMAGE as error:
+                text = f"{self.path}: the {kind.__name__.lower()} at byte {offset} is left out ({error})"
+                notice(logger, "damaged_record", text, file=self.path)
+
+    def messages_in(self, chunk: ChunkIndex) -> list[StoredMessage]:
+        """Messages of one chunk by log time; raises what `DAMAGE` lists where they cannot be read."""
+        content = memoryview(self._record(chunk.chunk_start_offset))
+        records = records_in(chunk_records(content, self.limits.chunk_max_bytes))
+        found = [self._stored(record) for record in records if record.opcode == Opcode.MESSAGE]
+        return sorted(found, key=lambda message: message.log_time_ns)
+
+    def _take_summary(self) -> None:
+        assert self.summary is not None
+        self.channels = self.summary.channels
+        statistics = self.summary.statistics
+        if statistics.message_count:
+            self.message_counts.update(statistics.channel_message_counts)
+            self.start_ns = min(statistics.message_start_time, LATEST_NS)
+            self.end_ns = min(statistics.message_end_time, LATEST_NS)
+
+    def _records(self, is_scan: bool = False) -> Iterator[Record]:
+        """Yield the records of the data section, one in memory at a time, as far as the file is whole.
+
+        A scan is told of the end, and of messages outside chunks it gets the head only.
+        """
+        size = self._stream.seek(0, 2)
+        begin = len(MAGIC)
+        while True:
+            self._stream.seek(begin)
+            head = self._stream.read(RECORD.size)
+            opcode, length = RECORD.unpack(head) if len(head) == RECORD.size else (0, size)
+            end = begin + RECORD.size + length
+            if end > size or opcode == 0:
+                if is_scan:
+                    self.whole = False
+                    text = (
+                        f"{self.path}: cut off or damaged after {begin} bytes; what is whole before is read"
+                    )
+                    notice(logger, "cut_off", text, file=self.path)
+                if opcode == Opcode.CHUNK and length <= self.limits.chunk_max_bytes:
+                    yield Record(begin, opcode, memoryview(self._stream.read(length)))
+                return
+            if opcode in (Opcode.DATA_END, Opcode.FOOTER):
+                return
+            if opcode in (Opcode.MESSAGE, Opcode.CHUNK, Opcode.SCHEMA, Opcode.CHANNEL):
+                needed = min(length, MESSAGE.size) if is_scan and opcode == Opcode.MESSAGE else length
+                # What is too large stays empty, which is damage to all who look into it.
+                content = self._stream.read(needed if needed <= self.limits.chunk_max_bytes else 0)
+                yield Record(begin, opcode, memoryview(content))
+            begin = end
+
+    def _scan(self) -> None:
+        """Index the file record by record, as far as it is whole."""
+        size = self._stream.seek(0, 2)
+        for record in self._records(is_scan=True):
+            try:
+                if record.opcode != Opcode.CHUNK:
+                    self._take(record, record.offset, -1)
+                    continue
+                for inner in records_in(chunk_records(record.content, self.limits.chunk_max_bytes)):
+                    self._take(inner, record.offset, inner.offset)
+            except DAMAGE as error:
+                if record.offset + RECORD.size + len(record.content) == size and not self.whole:
+                    continue  # the end of what was cut off
+                self.whole = False
+                text = (
+                    f"{self.path}: what is at byte {record.offset} is damaged ({error}); what is whole of it "
+                    "is read"
+                )
+                notice(logger, "damaged_chunk", text, file=self.path)
+
+    def _take(self, record: Record, place: int, offset: int) -> None:
+        if record.opcode == Opcode.MESSAGE:
+            self._add(record.content, place, offset)
+        elif record.opcode == Opcode.SCHEMA:
+            schema = parsed(Schema, record.content)
+            self._schemas[schema.id] = schema
+        elif record.opcode == Opcode.CHANNEL:
+            channel = parsed(McapChannel, record.content)
+            self.channels[channel.id] = channel_of(channel, self._schemas.get(channel.schema_id))
+
+    def _add(self, head: memoryview, record: int, offset: int) -> None:
+        channel_id, _, log_time_ns, _ = MESSAGE.unpack_from(head)
+        if channel_id not in self.channels or log_time_ns > LATEST_NS:
+            raise ValueError("a message without a channel or of an impossible time")
+        self.message_counts[channel_id] += 1
+        self.start_ns = log_time_ns if self.start_ns is None else min(self.start_ns, log_time_ns)
+        self.end_ns = log_time_ns if self.end_ns is None else max(self.end_ns, log_time_ns)
+        if self.channels[channel_id].is_wanted:
+            self._scanned.append(Place(log_time_ns, record, offset, channel_id))
+            check_count(self.path, len(self._scanned), self.limits.map_max_messages)
+
+    def _chunk(self, begin: int) -> memoryview:
+        """Uncompressed records of the chunk at a file offset, its checksum verified."""
+        if begin in self._chunks:
+            self._chunks.move_to_end(begin)
+            return self._chunks[begin]
+        self._chunks[begin] = records = chunk_records(self._record(begin), self.limits.chunk_max_bytes)
+        if len(self._chunks) > _CHUNKS_KEPT:
+            self._chunks.popitem(last=False)
+        return records
+
+    def _record(self, begin: int) -> bytes:
+        """Content of the record at a file offset."""
+        self._stream.seek(begin)
+        opcode, length = RECORD.unpack(read_exactly(self._stream, RECORD.size))
+        if length > self.limits.chunk_max_bytes:
+            raise ValueError(f"it claims {length} bytes; {REMEDY}")
+        return self._stream.read(length) if opcode == Opcode.CHUNK else read_exactly(self._stream, length)

@@ -1,0 +1,365 @@
+"""Occupancy grids and their patches from message bytes: CDR of ROS 2, the serialization of ROS 1, protobuf.
+
+Generic deserializers make Python objects of the cells one by one, which takes seconds for a large map. Here
+the few fields before the cells are unpacked by hand and the cells stay a view of the message's bytes.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rose2_logs.config.parameters import ReadingParameters
+from rose2_logs.errors import InvalidMapError
+from rose2_logs.model.occupancy import UNKNOWN, GridGeometry
+
+Cells = NDArray[np.int8]
+
+GRID_TYPES = ("nav_msgs/OccupancyGrid", "nav2_msgs/Costmap")
+PATCH_TYPES = ("map_msgs/OccupancyGridUpdate", "nav2_msgs/CostmapUpdate")
+FOXGLOVE_GRID_TYPE = "foxglove.Grid"
+
+
+MOST_CELLS = ReadingParameters().map_max_cells
+MOST_TILT_RAD = math.radians(5.0)
+"""A map that is tilted less out of the plane has its lengths right to half a percent."""
+UNIT_TOLERANCE = 0.01
+"""Quaternions whose length differs by less from 1 were rounded."""
+LONGEST_NAME_BYTES = 1024
+"""Of frames; more is damage."""
+PADDING_BYTES = 8
+"""Less than this may follow the last field: some writers fill up to the largest alignment."""
+
+
+class Remark(NamedTuple):
+    """What is odd about a map that can be read all the same: kind and text."""
+
+    kind: str
+    text: str
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """A whole map: stamp in nanoseconds, geometry, cells (H, W) int8 in {-1, 0..100}, what is odd."""
+
+    stamp_ns: int
+    geometry: GridGeometry
+    cells: Cells
+    remarks: tuple[Remark, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Patch:
+    """New values of a rectangle of the map before: stamp, first row and column, cells (h, w) int8."""
+
+    stamp_ns: int
+    row: int
+    column: int
+    cells: Cells
+    remarks: tuple[Remark, ...] = ()
+
+
+Decoder = Callable[[memoryview], Grid | Patch | None]
+
+
+def ros_type(name: str) -> str:
+    """Give a ROS message type the one spelling used here: ``package/Type``, without ``/msg/``."""
+    return name.replace("/msg/", "/")
+
+
+def is_patch_type(message_type: str) -> bool:
+    """Whether messages of this type are patches of a map."""
+    return ros_type(message_type) in PATCH_TYPES
+
+
+def is_map_type(message_type: str, encoding: str) -> bool:
+    """Whether messages of this type and encoding are whole maps that `decoder` can read."""
+    if encoding == "protobuf":
+        return message_type == FOXGLOVE_GRID_TYPE
+    return encoding in ("cdr", "ros1") and ros_type(message_type) in GRID_TYPES
+
+
+def decoder(
+    message_type: str, encoding: str, schema: bytes = b"", most_cells: int = MOST_CELLS
+) -> Decoder | None:
+    """Return the function that decodes map messages of one kind.
+
+    Parameters
+    ----------
+    message_type : str
+        ROS message type in either spelling, or protobuf message name.
+    encoding : str
+        ``cdr``, ``ros1`` or ``protobuf``.
+    schema : bytes
+        The schema stored in the log; needed for protobuf only.
+    most_cells : int
+        Cells of the largest map that is read.
+
+    Returns
+    -------
+    callable or None
+        From the message's bytes to a Grid, a Patch, or None for a grid of no cells; raises InvalidMapError.
+        None if such messages are neither maps nor patches, or cannot be read.
+    """
+    if is_map_type(message_type, encoding) and encoding == "protobuf":
+        from rose2_logs.io.foxglove_grid import grid_decoder
+
+        return grid_decoder(schema, most_cells)
+    decode = {
+        "nav_msgs/OccupancyGrid": _occupancy_grid,
+        "map_msgs/OccupancyGridUpdate": _occupancy_grid_update,
+        "nav2_msgs/Costmap": _costmap,
+        "nav2_msgs/CostmapUpdate": _costmap_update,
+    }.get(ros_type(message_type))
+    if decode is None or encoding not in ("cdr", "ros1"):
+        return None
+    open_fields = CdrFields if encoding == "cdr" else Ros1Fields
+    return lambda data: decode(open_fields(data, most_cells))
+
+
+class Fields:
+    """The fields of a serialized message, taken one after the other; strings and arrays have a 4-byte count.
+
+    Raises InvalidMapError where the message ends before its fields do.
+    """
+
+    byte_order = "<"
+    start = 0
+    largest_alignment = 1
+
+    def __init__(self, data: memoryview, most_cells: int = MOST_CELLS) -> None:
+        self._data = data
+        self._place = self.start
+        self._most_cells = most_cells
+        self.remarks: list[Remark] = []
+
+    def numbers(self, code: str, count: int = 1) -> tuple[float, ...]:
+        """Take `count` numbers of one `struct` type."""
+        alignment = min(struct.calcsize(code), self.largest_alignment)
+        self._place += -(self._place - self.start) % alignment
+        layout = f"{self.byte_order}{count}{code}"
+        try:
+            values = struct.unpack_from(layout, self._data, self._place)
+        except struct.error as error:
+            raise InvalidMapError(
+                f"the message ends after {len(self._data)} bytes, before its fields"
+            ) from error
+        self._place += struct.calcsize(layout)
+        return values
+
+    def integers(self, code: str, count: int = 1) -> tuple[int, ...]:
+        """Take `count` integers of one `struct` type."""
+        return tuple(int(value) for value in self.numbers(code, count))
+
+    def octets(self, what: str) -> memoryview:
+        """Take a string or an array of bytes, without a copy."""
+        (count,) = self.integers("I")
+        left = len(self._data) - self._place
+        if count > left:
+            raise InvalidMapError(f"its {what} says {count} bytes, but the message has only {left} more")
+        self._place += count
+        return self._data[self._place - count : self._place]
+
+    def string(self, what: str) -> str:
+        """Take a string; CDR ends it with a zero byte, which goes."""
+        octets = self.octets(what)
+        if len(octets) > LONGEST_NAME_BYTES:
+            raise InvalidMapError(f"its {what} is {len(octets)} bytes long, more than {LONGEST_NAME_BYTES}")
+        return bytes(octets).rstrip(b"\0").decode("utf-8", errors="replace")
+
+    def cells(self, rows: int, columns: int) -> NDArray[np.uint8]:
+        """Take the last field: the cells (rows, columns), a byte each."""
+        data = self.octets("data")
+        if rows * columns != len(data):
+            raise InvalidMapError(f"it says {columns} x {rows} cells, but its data has {len(data)}")
+        check_cells(rows, columns, self._most_cells)
+        if (left := len(self._data) - self._place) >= PADDING_BYTES:
+            self.remarks.append(
+                Remark("more_bytes", f"{left} bytes follow its last field; is its definition another one?")
+            )
+        return np.frombuffer(data, np.uint8).reshape(rows, columns)
+
+    def occupancy(self, rows: int, columns: int) -> Cells:
+        """Take the last field as occupancy: -1, 0..100."""
+        return percent(self.cells(rows, columns).view(np.int8), self.remarks)
+
+    def time_ns(self) -> int:
+        """Take a time as nanoseconds."""
+        seconds, nanoseconds = self.integers("i")[0], self.integers("I")[0]
+        return seconds * 10**9 + nanoseconds
+
+    def header(self) -> tuple[int, str]:
+        """Take a std_msgs/Header: stamp in nanoseconds and frame."""
+        return self.time_ns(), self.string("frame_id")
+
+
+# Second byte of the encapsulation header -> byte order, largest alignment (XCDR 1 and 2, plain).
+_CDR_KINDS = {0: (">", 8), 1: ("<", 8), 6: (">", 4), 7: ("<", 4)}
+
+
+class CdrFields(Fields):
+    """CDR as ROS 2 writes it: four bytes that tell the byte order, then fields aligned to their own size."""
+
+    start = 4
+
+    def __init__(self, data: memoryview, most_cells: int = MOST_CELLS) -> None:
+        super().__init__(data, most_cells)
+        if len(data) < self.start or data[0] != 0 or data[1] not in _CDR_KINDS:
+            raise InvalidMapError(
+                f"it does not begin as CDR, but with the bytes {bytes(data[:4]).hex(' ')!r}"
+            )
+        self.byte_order, self.largest_alignment = _CDR_KINDS[data[1]]
+
+
+class Ros1Fields(Fields):
+    """ROS 1: little endian, without gaps; the header has a sequence number, times are unsigned."""
+
+    def time_ns(self) -> int:
+        """Take a time as nanoseconds."""
+        seconds, nanoseconds = self.integers("I", 2)
+        return seconds * 10**9 + nanoseconds
+
+    def header(self) -> tuple[int, str]:
+        """Take a std_msgs/Header: stamp in nanoseconds and frame."""
+        self.integers("I")
+        return super().header()
+
+
+def check_cells(rows: int, columns: int, most_cells: int) -> None:
+    """Refuse a map of more cells than may be.
+
+    Raises
+    ------
+    InvalidMapError
+        With the remedy.
+    """
+    if rows * columns > most_cells:
+        raise InvalidMapError(
+            f"it has {columns} x {rows} cells, the most that are read is {most_cells}; if it is real, "
+            "raise --set reading.map_max_cells"
+        )
+
+
+def percent(values: Cells, remarks: list[Remark]) -> Cells:
+    """Occupancy as -1, 0..100; any other value counts as unknown, as map savers take it, with a remark."""
+    if values.size == 0 or (values.min() >= UNKNOWN and values.max() <= 100):
+        return values
+    odd = (values < UNKNOWN) | (values > 100)
+    count = np.count_nonzero(odd)
+    remarks.append(Remark("odd_values", f"{count} cells hold values outside -1..100 and count as unknown"))
+    return np.where(odd, np.int8(UNKNOWN), values)
+
+
+def _cost_table() -> Cells:
+    """Occupancy per cost: 0 free, 1..252 to 1..98, 253 (inscribed) 99, 254 (lethal) 100, 255 unknown.
+
+    nav2 publishes its costmaps as occupancy grids by the same table.
+    """
+    table = np.empty(256, np.int8)
+    table[0], table[253], table[254], table[255] = 0, 99, 100, UNKNOWN
+    table[1:253] = 1 + (97 * (np.arange(1, 253) - 1)) // 251
+    return table
+
+
+_OCCUPANCY_OF_COST = _cost_table()
+
+
+def flat_yaw_of(quaternion: tuple[float, float, float, float], remarks: list[Remark]) -> float:
+    """Rotation about z, in radians, of a quaternion x, y, z, w; one of another length than 1 gets a remark.
+
+    Raises
+    ------
+    InvalidMapError
+        If it is not made of finite numbers, or tilts the map out of the plane.
+    """
+    x, y, z, w = quaternion
+    if not all(math.isfinite(part) for part in quaternion):
+        raise InvalidMapError(
+            f"the orientation of its origin ({x}, {y}, {z}, {w}) is not made of finite numbers"
+        )
+    length = math.hypot(*quaternion)
+    if abs(length - 1) > UNIT_TOLERANCE:
+        remarks.append(
+            Remark("quaternion", f"the orientation of its origin has the length {length:g}, not 1")
+        )
+    if length == 0 or math.isinf(length):
+        return 0.0
+    x, y, z, w = x / length, y / length, z / length, w / length
+    tilt = math.acos(min(max(w * w + z * z - x * x - y * y, -1.0), 1.0))
+    if tilt > MOST_TILT_RAD:
+        raise InvalidMapError(
+            f"its origin is tilted by {math.degrees(tilt):.0f} degrees out of the plane; only flat maps can "
+            "be read"
+        )
+    return yaw_of(x, y, z, w)
+
+
+def yaw_of(x: float, y: float, z: float, w: float) -> float:
+    """Rotation about z, in radians, of a quaternion of any length; all zeros, as left unset, mean none."""
+    # No division by the length: it drops out of the two arguments.
+    return math.atan2(2 * (w * z + x * y), w * w + x * x - y * y - z * z)
+
+
+def _resolution(single: float) -> float:
+    """Undo the writer's rounding to single precision: 0.05, not 0.0500000007."""
+    return float(str(np.float32(single)))
+
+
+def make_grid(
+    stamp_ns: int,
+    frame_id: str,
+    resolution_m: float,
+    pose: tuple[float, ...],
+    cells: Cells,
+    remarks: list[Remark],
+) -> Grid | None:
+    """Put a grid together; `pose` is x, y, z and the quaternion x, y, z, w. None if there are no cells."""
+    if cells.size == 0:
+        return None
+    x, y, _, *quaternion = pose
+    height, width = cells.shape
+    yaw_rad = flat_yaw_of((quaternion[0], quaternion[1], quaternion[2], quaternion[3]), remarks)
+    geometry = GridGeometry(resolution_m, (x, y), yaw_rad, frame_id, (height, width))
+    return Grid(stamp_ns, geometry, cells, tuple(remarks))
+
+
+def _occupancy_grid(fields: Fields) -> Grid | None:
+    stamp_ns, frame_id = fields.header()
+    fields.time_ns()  # map_load_time
+    (resolution,) = fields.numbers("f")
+    width, height = fields.integers("I", 2)
+    pose = fields.numbers("d", 7)
+    cells = fields.occupancy(height, width)
+    return make_grid(stamp_ns, frame_id, _resolution(resolution), pose, cells, fields.remarks)
+
+
+def _occupancy_grid_update(fields: Fields) -> Patch:
+    stamp_ns, _ = fields.header()
+    x, y = fields.integers("i", 2)
+    width, height = fields.integers("I", 2)
+    return Patch(stamp_ns, y, x, fields.occupancy(height, width), tuple(fields.remarks))
+
+
+def _costmap(fields: Fields) -> Grid | None:
+    stamp_ns, frame_id = fields.header()
+    fields.time_ns()  # map_load_time
+    fields.time_ns()  # update_time
+    fields.string("layer")
+    (resolution,) = fields.numbers("f")
+    width, height = fields.integers("I", 2)
+    pose = fields.numbers("d", 7)
+    cells = _OCCUPANCY_OF_COST[fields.cells(height, width)]
+    return make_grid(stamp_ns, frame_id, _resolution(resolution), pose, cells, fields.remarks)
+
+
+def _costmap_update(fields: Fields) -> Patch:
+    stamp_ns, _ = fields.header()
+    x, y, width, height = fields.integers("I", 4)
+    cells = _OCCUPANCY_OF_COST[fields.cells(height, width)]
+    return Patch(stamp_ns, y, x, cells, tuple(fields.remarks))

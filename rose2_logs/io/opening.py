@@ -1,0 +1,372 @@
+"""From a path to what reads it: told by how a file begins, else by its name."""
+
+from __future__ import annotations
+
+import glob
+import logging
+import shutil
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path, PurePosixPath
+from typing import TYPE_CHECKING, Any
+
+from rose2_logs.config.parameters import ReadingParameters
+from rose2_logs.config.selection import Selection
+from rose2_logs.errors import LogError
+from rose2_logs.io.discovery import (
+    ANNOTATED_ENDING,
+    BAG_DESCRIPTION,
+    COMPRESSED_ENDING,
+    IMAGE_ENDINGS,
+    MAP_ENDINGS,
+    STORAGE_ENDINGS,
+    ZSTD_MAGIC,
+    is_bag,
+    is_storage,
+    load_yaml,
+)
+from rose2_logs.io.log import LogReader
+from rose2_logs.io.source import LogInfo, MessageSource
+from rose2_logs.system.warnings import notice
+
+if TYPE_CHECKING:
+    from rose2_logs.io.file_log import FileLog, OpenFile
+
+logger = logging.getLogger(__name__)
+
+LogPath = str | Path | Sequence[str | Path]
+
+EVERYTHING = Selection()
+DEFAULT_LIMITS = ReadingParameters()
+DISK_LEFT_BYTES = 1 << 30
+"""Of the disk with the temporary folder, left free when a bag is decompressed there."""
+_MOST_NAMED = 3
+"""Files that a warning names."""
+_FORMATS = (
+    "an .mcap file, a ROS 1 .bag, a ROS 2 bag directory or .db3, a map_server .yaml or a folder of those"
+)
+_MAGIC = {b"\x89MCAP0\r\n": ".mcap", b"#ROSBAG ": ".bag", b"SQLite f": ".db3"}
+
+
+def open_log(
+    path: LogPath,
+    *,
+    topic: str | None = None,
+    selection: Selection = EVERYTHING,
+    limits: ReadingParameters = DEFAULT_LIMITS,
+) -> LogReader:
+    """Open a log for reading its maps.
+
+    Parameters
+    ----------
+    path : str, Path or a sequence of them
+        An ``.mcap`` file, a ROS 1 ``.bag``, a ROS 2 bag directory, a ``.db3`` file, a map_server ``.yaml``
+        (one snapshot), a folder of such maps, a pattern like ``maps/*.yaml`` (natural order), or several
+        files of one kind, which are read as one log.
+    topic : str, optional
+        The map topic; by default ``/map``, else the only one.
+    selection : Selection
+        Which of its maps to take.
+    limits : ReadingParameters
+        How much it may claim before it is refused.
+
+    Returns
+    -------
+    LogReader
+        To be closed, or used as a context manager.
+
+    Raises
+    ------
+    NoMapTopicError
+        If the log has no map topic, or several, none of them ``/map``, and none is named.
+    LogError
+        If the log cannot be opened.
+    """
+    source = open_source(path, limits)
+    try:
+        return LogReader(source, topic, selection)
+    except BaseException:
+        source.close()
+        raise
+
+
+def inspect_log(path: LogPath, limits: ReadingParameters = DEFAULT_LIMITS) -> LogInfo:
+    """Tell what a log holds, also one without any map.
+
+    Parameters
+    ----------
+    path, limits
+        As for `open_log`.
+
+    Raises
+    ------
+    LogError
+        If the log cannot be opened.
+    """
+    source = open_source(path, limits)
+    source.close()
+    return source.info
+
+
+def open_source(path: LogPath, limits: ReadingParameters = DEFAULT_LIMITS) -> MessageSource:
+    """Open a log for looking at several of its topics; to be closed.
+
+    Parameters
+    ----------
+    path, limits
+        As for `open_log`.
+
+    Raises
+    ------
+    LogError
+        If the log cannot be opened.
+    """
+    try:
+        return _open_source(path, limits)
+    except OSError as error:
+        where = error.filename or path
+        raise LogError(f"{where}: cannot be read: {error.strerror or error}", file=str(where)) from error
+
+
+def _open_source(path: LogPath, limits: ReadingParameters) -> MessageSource:
+    if not isinstance(path, (str, Path)):
+        files = [Path(each) for each in path]
+        if not files:
+            raise LogError("no log was given")
+        return _open_files(files[0], files, limits) if len(files) > 1 else _open_source(files[0], limits)
+    log = Path(path)
+    if log.is_dir():
+        return _open_directory(log, limits)
+    if not log.exists():
+        found = [Path(each) for each in glob.glob(str(path))]  # noqa: PTH207 (may be absolute)
+        if not found:
+            raise LogError(f"{path}: there is no such file or directory", file=str(path))
+        return _open_files(log, _in_natural_order(found), limits)
+    return _open_files(log, [log], limits)
+
+
+def _open_files(
+    log: Path, files: list[Path], limits: ReadingParameters, *, is_bag: bool = False
+) -> MessageSource:
+    """Open files of one kind as one log."""
+    if missing := [file for file in files if not file.is_file()]:
+        what = "is not a file; several logs are read as one only if all are files"
+        raise LogError(f"{missing[0]}: {what}", file=missing[0])
+    kinds = _kinds(files)
+    if len(kinds) > 1:
+        raise LogError(
+            f"{log}: files of different kinds ({', '.join(sorted(kinds))}) cannot be one log", file=log
+        )
+    match kinds.pop():
+        case ".yaml":
+            from rose2_logs.io.saved_maps import MapFilesSource
+
+            return MapFilesSource(log, files, limits)
+        case "image":
+            from rose2_logs.io.saved_maps import MapFilesSource
+
+            return MapFilesSource(log, [_yaml_beside(file) for file in files], limits)
+        case kind:
+            return _open_storage(log, files, kind, limits, is_bag=is_bag)
+
+
+def _open_storage(
+    log: Path, files: list[Path], kind: str, limits: ReadingParameters, *, is_bag: bool
+) -> FileLog:
+    """Open MCAP files, bags or databases; compressed ones are decompressed beside the log first."""
+    from rose2_logs.io.file_log import FileLog
+
+    open_file, name, bag_name = _formats()[kind]
+    size = sum(each.stat().st_size for each in (log.iterdir() if log.is_dir() else files) if each.is_file())
+    scratch = tempfile.TemporaryDirectory(prefix="rose2_logs_") if any(map(_is_packed, files)) else None
+    try:
+        if scratch is not None:
+            files = [
+                _decompressed(file, Path(scratch.name, str(number))) if _is_packed(file) else file
+                for number, file in enumerate(files)
+            ]
+        return FileLog(
+            log,
+            files,
+            open_file,
+            limits,
+            format_name=bag_name if is_bag else name,
+            size_bytes=size,
+            on_close=(lambda: None) if scratch is None else scratch.cleanup,
+        )
+    except BaseException:
+        if scratch is not None:
+            scratch.cleanup()
+        raise
+
+
+def _formats() -> dict[str, tuple[OpenFile, str, str]]:
+    """How each kind of file is opened, and its name, alone and as a ROS 2 bag."""
+    from rose2_logs.io.mcap.index import McapFile
+    from rose2_logs.io.rosbag1.index import BagFile
+    from rose2_logs.io.rosbag2.index import SqliteFile
+
+    return {
+        ".mcap": (McapFile, "MCAP", "ROS 2 bag (mcap)"),
+        ".bag": (BagFile, "ROS 1 bag", "ROS 1 bag"),
+        ".db3": (SqliteFile, "ROS 2 database (sqlite3)", "ROS 2 bag (sqlite3)"),
+    }
+
+
+def _kinds(files: list[Path]) -> set[str]:
+    """Kinds of files by how they begin, else by their names; of several, those that tell none do not count.
+
+    Raises
+    ------
+    LogError
+        If none tells its kind.
+    """
+    kinds, failures = set(), []
+    for file in files:
+        try:
+            kinds.add(_kind(file))
+        except LogError as error:
+            failures.append(error)
+    if not kinds:
+        raise failures[0]
+    return kinds
+
+
+def _kind(file: Path) -> str:
+    """Kind of a file by how it begins, else by its name."""
+    with file.open("rb") as stream:
+        begin = stream.read(8)
+    if begin in _MAGIC:
+        return _MAGIC[begin]
+    name = file.name.lower()
+    if _is_packed(file) and begin.startswith(ZSTD_MAGIC):
+        return PurePosixPath(name.removesuffix(COMPRESSED_ENDING)).suffix
+    suffix = file.suffix.lower()
+    if suffix in MAP_ENDINGS:
+        return ".yaml"
+    if suffix in IMAGE_ENDINGS:
+        return "image"
+    if _is_packed(file) or name.endswith(STORAGE_ENDINGS):
+        what = "is empty" if not begin else f"does not begin as {suffix} files do"
+        raise LogError(f"{file}: {what}; was it copied whole?", file=file)
+    raise LogError(f"{file}: is not a kind of log that can be read; give {_FORMATS}", file=file)
+
+
+def _is_packed(file: Path) -> bool:
+    """Whether a file is that of a ROS 2 bag compressed file by file."""
+    name = file.name.lower()
+    return name.endswith(COMPRESSED_ENDING) and name.removesuffix(COMPRESSED_ENDING).endswith(STORAGE_ENDINGS)
+
+
+def _yaml_beside(image: Path) -> Path:
+    for suffix in MAP_ENDINGS:
+        if (beside := image.with_suffix(suffix)).exists():
+            return beside
+    raise LogError(
+        f"{image}: needs {image.stem}.yaml beside it with its resolution and origin (map_server's format)",
+        file=image,
+    )
+
+
+def _in_natural_order(files: list[Path]) -> list[Path]:
+    from rose2_logs.io.saved_maps import natural_order
+
+    return sorted(files, key=natural_order)
+
+
+def _open_directory(log: Path, limits: ReadingParameters) -> MessageSource:
+    """Open a ROS 2 bag, also one whose recorder died before it was described, or a folder of saved maps."""
+    from rose2_logs.io.saved_maps import is_map_file
+
+    if (log / BAG_DESCRIPTION).exists():
+        return _open_files(log, _files_of_bag(log), limits, is_bag=True)
+    if files := _stored_in(log):
+        _tell_what_is_one_log(log, files)
+        return _open_files(log, files, limits)
+    inside = sorted(each for each in log.iterdir() if each.is_file())
+    # One with an image of its name is a map even if it cannot be read, which is told then.
+    images = {each.stem for each in inside if each.suffix.lower() in IMAGE_ENDINGS}
+    described = [each for each in inside if each.suffix.lower() in MAP_ENDINGS]
+    if maps := [each for each in described if each.stem in images or is_map_file(each)]:
+        return _open_files(log, _in_natural_order(maps), limits)
+    raise LogError(
+        f"{log}: holds neither a bag ({BAG_DESCRIPTION}) nor saved maps; give {_FORMATS}; "
+        "rose2-logs batch takes folders of many logs",
+        file=log,
+    )
+
+
+def _stored_in(log: Path) -> list[Path]:
+    """Files of the first kind of storage that a folder holds; annotated logs only if there are no others."""
+    inside = [each for each in log.iterdir() if each.is_file()]
+    inside = [each for each in inside if not each.name.endswith(ANNOTATED_ENDING)] or inside
+    for suffix in STORAGE_ENDINGS:
+        endings = (suffix, suffix + COMPRESSED_ENDING)
+        if files := [each for each in inside if each.name.lower().endswith(endings)]:
+            return _in_natural_order(files)
+    return []
+
+
+def _tell_what_is_one_log(log: Path, files: list[Path]) -> None:
+    """Say what is taken for one run where no description says so: it may be several, or not all of it."""
+    names = [file.name for file in files]
+    inside = [each.name for each in log.iterdir() if each.is_file()]
+    stored = {name for name in inside if is_storage(name.removesuffix(COMPRESSED_ENDING))}
+    others = sorted(stored.difference(names))
+    if not others and (len(names) == 1 or is_bag(names, log.resolve().name)):
+        return
+    told = f"{names[0]} is" if len(names) == 1 else f"{len(names)} files from {names[0]} on are"
+    left_out = f", {', '.join(others[:_MOST_NAMED])} left out" if others else ""
+    text = (
+        f"{log}: has no {BAG_DESCRIPTION}; its {told} read as one log{left_out}: name the file that is meant"
+    )
+    notice(logger, "files_as_one", text, file=log)
+
+
+def _files_of_bag(log: Path) -> list[Path]:
+    """Files of a ROS 2 bag by its description; those that are missing are said to be."""
+    path = log / BAG_DESCRIPTION
+    try:
+        named = [log / PurePosixPath(name).name for name in _described_files(path)]
+    except LogError as error:
+        if not (files := _stored_in(log)):
+            raise
+        notice(logger, "description", f"{error}; the files beside it are read", file=path)
+        return files
+    files = [file for file in named if file.is_file()]
+    for missing in [file for file in named if not file.is_file()]:
+        text = f"{missing}: is missing, but {path} names it"
+        if not files:
+            raise LogError(text, file=missing)
+        notice(logger, "file_missing", f"{text}; the other files are read", file=missing)
+    if not files:
+        raise LogError(f"{path}: names no file; run `ros2 bag reindex` on {log}", file=path)
+    return files
+
+
+def _described_files(path: Path) -> list[str]:
+    try:
+        described: Any = load_yaml(path)["rosbag2_bagfile_information"]
+        return [str(name) for name in described["relative_file_paths"] or []]
+    except (KeyError, TypeError, LogError) as error:
+        raise LogError(
+            f"{path}: does not describe a ROS 2 bag; run `ros2 bag reindex` on {path.parent}", file=path
+        ) from error
+
+
+def _decompressed(file: Path, directory: Path) -> Path:
+    from zstandard import ZstdError
+
+    from rose2_logs.io.decompression import TooLargeError, decompress_file
+
+    # A folder of its own: files of one name may come from several places.
+    directory.mkdir()
+    target = directory / file.stem
+    try:
+        decompress_file(file, target, max(shutil.disk_usage(directory).free - DISK_LEFT_BYTES, 0))
+    except (ZstdError, ValueError, OSError) as error:
+        text = f"{file}: cannot be decompressed: {error}"
+        if not target.exists() or not target.stat().st_size or isinstance(error, TooLargeError):
+            raise LogError(text, file=file) from error
+        notice(logger, "cut_off", f"{text}; what is whole before is read", file=file)
+    return target

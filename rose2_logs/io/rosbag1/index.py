@@ -1,0 +1,318 @@
+"""One ROS 1 bag: its channels, where the messages of a channel lie, and the bytes of each.
+
+The index is the bag's own; a bag that has none because its recorder died, or whose index is damaged, is
+scanned once, chunk by chunk, over everything that is whole.
+"""
+
+from __future__ import annotations
+
+import io
+import logging
+import struct
+from collections import Counter, OrderedDict
+from collections.abc import Callable, Collection, Iterator
+from contextlib import suppress
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rose2_logs.config.parameters import ReadingParameters
+from rose2_logs.errors import LogError
+from rose2_logs.io.checked_file import CheckedFile
+from rose2_logs.io.log_file import Channel, LogFile, Place, StoredMessage, check_count
+from rose2_logs.io.rosbag1.records import (
+    BAG_HEADER,
+    CHUNK,
+    CHUNK_INFO,
+    CONNECTION,
+    INDEX_DTYPE,
+    INDEX_ENTRY_BYTES,
+    INDEX_HEAD_BYTES,
+    MAGIC,
+    MESSAGE,
+    Head,
+    IndexRows,
+    chunk_data,
+    chunk_info,
+    connection_of,
+    heads_in,
+    number,
+    read_head,
+    time_ns,
+)
+from rose2_logs.io.source import DamagedMessageError
+from rose2_logs.system.warnings import notice
+
+logger = logging.getLogger(__name__)
+
+# What parsing raises on bytes that are not what they should be; ValueError is also TooLargeError.
+_DAMAGE = (ValueError, KeyError, EOFError, struct.error)
+# Messages of a scanned chunk that are put into an array at once: as tuples they take ten times the memory.
+_ENTRIES_AT_ONCE = 65_536
+# Chunks that are kept while messages are read by time, as far as they are no larger together: those of a bag
+# that was written topic by topic come in turns, and each would be decompressed for every message. Those of a
+# recorder have 0.8 MB.
+_CHUNKS_KEPT_BYTES = 16 << 20
+
+
+class BagFile(LogFile):
+    """An open ROS 1 bag.
+
+    Parameters
+    ----------
+    path : Path
+    limits : ReadingParameters
+        How much it may claim.
+
+    Raises
+    ------
+    LogError
+        If the file cannot be opened or is no bag of version 2.0, or holds more map messages than may be.
+    """
+
+    def __init__(self, path: Path, limits: ReadingParameters) -> None:
+        self.path = path
+        self.limits = limits
+        # Maps are read once each, and one behind the other.
+        self._latest = _Chunks(self._read_chunk, 0)
+        try:
+            self._stream = io.BufferedReader(CheckedFile(path))
+            self._size = path.stat().st_size
+        except OSError as error:
+            raise LogError(f"{path}: cannot be opened: {error.strerror}", file=path) from error
+        try:
+            self._open()
+        except BaseException:
+            self._stream.close()
+            raise
+        self.message_counts = Counter(dict(zip(*self._counted(), strict=True)))
+        times = self._index["time"]
+        self.start_ns = int(times.min()) if len(times) else None
+        self.end_ns = int(times.max()) if len(times) else None
+
+    def _open(self) -> None:
+        if self._stream.read(len(MAGIC)) != MAGIC:
+            raise LogError(f"{self.path}: is not a ROS 1 bag of version 2.0", file=self.path)
+        self.channels: dict[int, Channel] = {}
+        parts: list[NDArray[np.void]] = []
+        try:
+            head = read_head(self._stream, len(MAGIC))
+            if head.op != BAG_HEADER:
+                raise ValueError("its first record is not a bag's header")
+            if head.fields.get("encryptor"):
+                raise LogError(f"{self.path}: is encrypted; decrypt it first", file=self.path)
+            index_begin = number(head.fields, "index_pos")
+            self.indexed = index_begin > 0
+            if self.indexed:
+                self._read_index(index_begin, parts)
+        except _DAMAGE:
+            self.indexed = False
+        if not self.indexed:
+            self.channels, parts = {}, []
+            self._scan(parts)
+        self._index = np.concatenate([np.empty(0, INDEX_DTYPE), *parts])
+
+    def close(self) -> None:
+        """Close the file."""
+        self._stream.close()
+        self._latest = _Chunks(self._read_chunk, 0)
+
+    def places(self, channel_ids: Collection[int]) -> list[Place]:
+        """Where the messages of some channels lie, in the order of log time."""
+        chosen = self._index[np.isin(self._index["connection"], list(channel_ids))]
+        check_count(self.path, len(chosen), self.limits.map_max_messages)
+        return sorted(Place(*each) for each in chosen.tolist())
+
+    def payload(self, place: Place) -> memoryview:
+        """Return the data of one message.
+
+        Raises
+        ------
+        DamagedMessageError
+            If it is not where the index says, or its chunk is damaged.
+        """
+        try:
+            return self._payload(place, self._latest)
+        except _DAMAGE as error:
+            raise DamagedMessageError(f"damaged ({error})") from error
+
+    def _read_chunk(self, begin: int) -> bytes:
+        head = read_head(self._stream, begin)
+        return bytes(chunk_data(self._stream, head, self.limits.chunk_max_bytes))
+
+    def _payload(self, place: Place, chunks: _Chunks) -> memoryview:
+        records = chunks.records(place.record)
+        stream = BytesIO(records)
+        head = read_head(stream, place.offset)
+        while head.op == CONNECTION:  # may stand before its first message
+            head = read_head(stream, head.end)
+        if (
+            head.op != MESSAGE
+            or number(head.fields, "conn") != place.channel_id
+            or time_ns(head.fields, "time") != place.log_time_ns
+        ):
+            raise ValueError("there is another message where the index says")
+        data = memoryview(records)[head.data_begin : head.end]
+        if len(data) != head.data_length:
+            raise EOFError("it ends within the message")
+        return data
+
+    def messages(self, channel_ids: Collection[int] | None = None) -> Iterator[StoredMessage]:
+        """Yield every message that is whole, of some channels or of all, by log time."""
+        sequence: Counter[int] = Counter()
+        chunks = _Chunks(self._read_chunk, _CHUNKS_KEPT_BYTES)
+        index = self._index
+        if channel_ids is not None:
+            index = index[np.isin(index["connection"], list(channel_ids))]
+        for entry in index[np.argsort(index["time"], kind="stable")]:
+            place = Place(*entry.item())
+            with suppress(*_DAMAGE):
+                data = self._payload(place, chunks)
+                channel, time = self.channels[place.channel_id], place.log_time_ns
+                yield StoredMessage(channel, time, time, sequence[place.channel_id], data)
+                sequence[place.channel_id] += 1
+
+    def _counted(self) -> tuple[list[int], list[int]]:
+        connections, counts = np.unique(self._index["connection"], return_counts=True)
+        return connections.tolist(), counts.tolist()
+
+    def _read_index(self, begin: int, parts: list[NDArray[np.void]]) -> None:
+        """Take the index at the end of the bag, and of each chunk the one behind it."""
+        infos: dict[int, dict[int, int]] = {}
+        while begin < self._size:
+            try:
+                head = read_head(self._stream, begin)
+            except _DAMAGE:
+                if not infos:
+                    raise
+                break  # what is behind the index
+            if head.op == CONNECTION:
+                self._take_connection(head, self._data(head))
+            elif head.op == CHUNK_INFO:
+                place, counts = chunk_info(head, self._data(head))
+                if place in infos:
+                    raise ValueError("a chunk is described twice")
+                infos[place] = counts
+            else:
+                raise ValueError("a record that does not belong into the index")
+            begin = head.end
+        self._check_index(infos)
+        rows = IndexRows()
+        for place, counts in infos.items():
+            try:
+                self._read_chunk_index(place, counts, rows)
+            except _DAMAGE as error:
+                self._recover_chunk(place, sum(counts.values()), error, parts)
+        parts.append(rows.places())
+
+    def _check_index(self, infos: dict[int, dict[int, int]]) -> None:
+        """Compare what the index tells with what the bag's header says."""
+        fields = read_head(self._stream, len(MAGIC)).fields
+        if len(infos) != number(fields, "chunk_count") or len(self.channels) != number(fields, "conn_count"):
+            raise ValueError("the index is not whole")
+
+    def _read_chunk_index(self, place: int, counts: dict[int, int], rows: IndexRows) -> None:
+        head = read_head(self._stream, place)
+        if head.op != CHUNK:
+            raise ValueError("there is no chunk where the index says")
+        self._stream.seek(head.end)
+        length = len(counts) * INDEX_HEAD_BYTES + sum(counts.values()) * INDEX_ENTRY_BYTES
+        if head.end + length > self._size:
+            raise EOFError("it ends within the index of a chunk")
+        rows.take(self._stream.read(length), counts, place)
+
+    def _recover_chunk(self, place: int, count: int, why: Exception, parts: list[NDArray[np.void]]) -> None:
+        """Do without the index behind a chunk; if there is no chunk either, tell what is lost."""
+        with suppress(*_DAMAGE):
+            head = read_head(self._stream, place)
+            if head.op == CHUNK:
+                self._scan_chunk(head, parts)
+                return
+        self.whole = False
+        text = f"{self.path}: the chunk at byte {place} is damaged ({why}); its {count} messages are left out"
+        notice(logger, "damaged_chunk", text, file=self.path)
+
+    def _scan(self, parts: list[NDArray[np.void]]) -> None:
+        """Index the bag chunk by chunk, as far as it is whole."""
+        begin = len(MAGIC)
+        reason = ""
+        while begin < self._size:
+            try:
+                head = read_head(self._stream, begin)
+            except _DAMAGE as error:
+                reason = str(error)
+                break
+            if head.op == CHUNK:
+                self._scan_chunk(head, parts)
+            elif head.op == CONNECTION and head.end <= self._size:
+                with suppress(*_DAMAGE):
+                    self._take_connection(head, self._data(head))
+            begin = head.end
+        if begin > self._size or begin == len(MAGIC):
+            reason = reason or "a record is not whole"
+        if reason:
+            self.whole = False
+            text = f"{self.path}: cut off or damaged ({reason}) after {min(begin, self._size)} bytes; "
+            notice(logger, "cut_off", text + "what is whole before is read", file=self.path)
+        else:
+            text = f"{self.path}: was not closed, or its index is damaged; all that is there was read"
+            notice(logger, "damaged_index", text, file=self.path)
+
+    def _scan_chunk(self, chunk: Head, parts: list[NDArray[np.void]]) -> None:
+        found: list[tuple[int, int, int, int]] = []
+        try:
+            records = chunk_data(self._stream, chunk, self.limits.chunk_max_bytes)
+            for head in heads_in(records):
+                if head.op == CONNECTION:
+                    self._take_connection(head, bytes(records[head.data_begin : head.end]))
+                elif head.op == MESSAGE:
+                    time, connection = time_ns(head.fields, "time"), number(head.fields, "conn")
+                    if connection in self.channels:
+                        found.append((time, chunk.begin, head.begin, connection))
+                    if len(found) == _ENTRIES_AT_ONCE:
+                        parts.append(np.array(found, INDEX_DTYPE))
+                        found.clear()
+        except _DAMAGE as error:
+            self.whole = False
+            text = f"{self.path}: the chunk at byte {chunk.begin} is damaged ({error}); "
+            notice(logger, "damaged_chunk", text + "what is whole of it is read", file=self.path)
+        if found:
+            parts.append(np.array(found, INDEX_DTYPE))
+
+    def _take_connection(self, head: Head, data: bytes) -> None:
+        channel = connection_of(head, data)
+        self.channels.setdefault(channel.id, channel)
+
+    def _data(self, head: Head) -> bytes:
+        if head.end > self._size:
+            raise EOFError("it ends within a record")
+        self._stream.seek(head.data_begin)
+        return self._stream.read(head.data_length)
+
+
+class _Chunks:
+    """Uncompressed records of chunks by file offset: the latest, and of others as many as may be kept."""
+
+    def __init__(self, read: Callable[[int], bytes], kept_bytes: int) -> None:
+        self._read = read
+        self._most_bytes = kept_bytes
+        self._kept: OrderedDict[int, bytes] = OrderedDict()
+        self._bytes = 0
+
+    def records(self, begin: int) -> bytes:
+        if begin in self._kept:
+            self._kept.move_to_end(begin)
+            return self._kept[begin]
+        if self._bytes > self._most_bytes:
+            self._drop()
+        records = self._read(begin)
+        self._kept[begin] = records
+        self._bytes += len(records)
+        while self._bytes > self._most_bytes and len(self._kept) > 1:
+            self._drop()
+        return records
+
+    def _drop(self) -> None:
+        self._bytes -= len(self._kept.popitem(last=False)[1])

@@ -1,0 +1,1 @@
+"""The data model: occupancy grids, rooms, what an analysis found, floor plans."""

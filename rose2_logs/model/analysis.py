@@ -1,0 +1,103 @@
+"""What stage A returns: dominant directions, structure score, clean map."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from shapely.geometry import Polygon
+
+from rose2_logs.model.occupancy import BoolArray, CellValues, FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Structure:
+    """The regular structure of one map (paper, section III-A).
+
+    Attributes
+    ----------
+    directions_rad : (D,) float
+        Directions of walls in [0, pi), world frame, strongest first.
+    strengths : (D,) float
+        Share of the spectrum's energy that each direction holds.
+    threshold : float
+        Cells with at least this score make the clean map.
+    scores, clean_cells : CellValues
+        What `score` and `clean` hold, of the occupied cells alone.
+    spectrum : (S, S) uint8
+        Picture of the spectrum in the grid's frame, see `rose.spectrum.spectrum_picture`.
+    """
+
+    directions_rad: FloatArray
+    strengths: FloatArray
+    threshold: float
+    scores: CellValues[np.float32]
+    clean_cells: CellValues[np.bool_]
+    spectrum: NDArray[np.uint8]
+
+    @property
+    def score(self) -> NDArray[np.float32]:
+        """Structure score (H, W) of each occupied cell in [0, 1]; 0 elsewhere."""
+        return self.scores.whole()
+
+    @property
+    def clean(self) -> BoolArray:
+        """The clean map (H, W): occupied cells that belong to the structure."""
+        return self.clean_cells.whole()
+
+
+@dataclass(frozen=True, eq=False)
+class Walls:
+    """The walls of one map (paper, section III-B). All lengths in metres, world frame.
+
+    Attributes
+    ----------
+    segments_m : (N, 4) float
+        Line segments x0, y0, x1, y1.
+    segment_direction : (N,) int
+        Index of each segment's dominant direction.
+    segment_cluster : (N,) int
+        Index of each segment's wall cluster, which is that of its representative line; -1 for none.
+    lines_m : (L, 4) float
+        Representative lines x0, y0, x1, y1 as far as they divide the map.
+    line_direction : (L,) int
+        Index of each line's dominant direction.
+    line_weight : (L,) float
+        Share of each line that walls cover, in [0, 1].
+    """
+
+    segments_m: FloatArray
+    segment_direction: NDArray[np.int32]
+    segment_cluster: NDArray[np.int32]
+    lines_m: FloatArray
+    line_direction: NDArray[np.int32]
+    line_weight: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class FloorPlan:
+    """The plane cut into faces by the representative lines (paper, section III-C). World metres.
+
+    Attributes
+    ----------
+    edges_m : (E, 4) float
+        Edges x0, y0, x1, y1.
+    edge_weight : (E,) float
+        Share of each edge that walls cover, in [0, 1].
+    edge_faces : (E, 2) int
+        The faces at both sides of each edge; -1 where there is none.
+    faces : tuple of F shapely Polygon
+        The faces.
+    face_inside : (F,) bool
+        Faces that belong to the building as far as it was seen.
+    room_of_face : (F,) int
+        Room number 1..R of each face, 0 for none.
+    """
+
+    edges_m: FloatArray
+    edge_weight: FloatArray
+    edge_faces: NDArray[np.int32]
+    faces: tuple[Polygon, ...]
+    face_inside: NDArray[np.bool_]
+    room_of_face: NDArray[np.int32]

@@ -1,0 +1,173 @@
+"""The explored part of a map, at the resolution it is analysed at, and the way back to canvas and world."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry.base import BaseGeometry
+
+from rose2_logs.config.parameters import OccupancyParameters
+from rose2_logs.model.occupancy import (
+    BoolArray,
+    CellValues,
+    FloatArray,
+    GridGeometry,
+    Scalar,
+    classify,
+    known_window,
+)
+
+NEIGHBOURS = ((0, -1), (0, 1), (-1, 0), (1, 0), (-1, -1), (-1, 1), (1, -1), (1, 1))
+"""Where a coarse cell without a room looks for one: cells with a common side first."""
+
+
+@dataclass(frozen=True, eq=False)
+class ExploredPart:
+    """The smallest window of a canvas that holds its known cells, with blocks of cells taken as one.
+
+    Attributes
+    ----------
+    geometry : GridGeometry
+        Of the whole canvas.
+    window : (slice, slice)
+        Rows and columns of the canvas.
+    factor : int
+        Cells along a block's side; 1 leaves the map as it is.
+    free, occupied : (H, W) bool
+        Masks of blocks: occupied where any of its cells is, else free where at least half of its cells are.
+    known_free, known_occupied : (h, w) bool
+        Free and occupied cells of the window.
+    """
+
+    geometry: GridGeometry
+    window: tuple[slice, slice]
+    factor: int
+    free: BoolArray
+    occupied: BoolArray
+    known_free: BoolArray
+    known_occupied: BoolArray
+
+    @classmethod
+    def of(
+        cls, cells: NDArray[np.int8], geometry: GridGeometry, parameters: OccupancyParameters
+    ) -> ExploredPart:
+        """Take the explored part of a canvas (H, W) of occupancy in percent, -1 for unknown."""
+        # Cells of neither kind may surround the others; masks of a large canvas are not held for them.
+        known = known_window(cells >= 0)
+        free, occupied = classify(cells[known], parameters)
+        window = known_window(free | occupied)
+        free, occupied = free[window].copy(), occupied[window].copy()
+        window = _within(known, window)
+        factor = block_side(geometry.resolution_m, free.size, parameters)
+        if factor == 1:
+            return cls(geometry, window, 1, free, occupied, free, occupied)
+        any_occupied: BoolArray = np.any(_blocks(occupied, factor), axis=(1, 3))
+        mostly_free = 2 * np.count_nonzero(_blocks(free, factor), axis=(1, 3)) >= factor**2
+        return cls(geometry, window, factor, mostly_free & ~any_occupied, any_occupied, free, occupied)
+
+    @property
+    def resolution_m(self) -> float:
+        """Side of a block in metres."""
+        return self.geometry.resolution_m * self.factor
+
+    @property
+    def free_area_m2(self) -> float:
+        """Area of the canvas's free cells in square metres."""
+        return float(np.count_nonzero(self.known_free)) * self.geometry.cell_area_m2
+
+    def points(self, xy_m: FloatArray) -> FloatArray:
+        """World positions of points (..., 2) of the window's frame."""
+        corner = np.array([self.window[1].start, self.window[0].start]) * self.geometry.resolution_m
+        return self.geometry.grid_to_world(xy_m + corner)
+
+    def segments(self, ends_m: FloatArray) -> FloatArray:
+        """World ends (N, 4) of segments of the window's frame."""
+        return self.points(ends_m.reshape(-1, 2, 2)).reshape(-1, 4)
+
+    def shape(self, geometry: BaseGeometry) -> BaseGeometry:
+        """Shapely geometry in the world."""
+        return shapely.transform(geometry, self.points)
+
+    def occupied_cells(self) -> NDArray[np.int32]:
+        """Row and column (N, 2) on the canvas of its occupied cells."""
+        row, column = np.nonzero(self.known_occupied)
+        cells = np.empty((len(row), 2), np.int32)
+        cells[:, 0], cells[:, 1] = row + self.window[0].start, column + self.window[1].start
+        return cells
+
+    def values_at(self, cells: NDArray[np.int32], values: NDArray[Scalar]) -> CellValues[Scalar]:
+        """Values of blocks (H, W) as values of cells (N, 2) of the canvas."""
+        row, column = (cells - (self.window[0].start, self.window[1].start)).T // self.factor
+        return CellValues(self.geometry.shape, cells, values[row, column])
+
+    def labels(self, labels: NDArray[np.int32]) -> NDArray[np.int32]:
+        """Labels of blocks as labels of the canvas's free cells.
+
+        A free cell in a block without a label, beside a wall that is thinner than a block, takes that of a
+        neighbouring block.
+        """
+        full = np.zeros(self.geometry.shape, np.int32)
+        if self.factor > 1:
+            padded = np.pad(labels, 1)
+            height, width = labels.shape
+            labels = labels.copy()
+            for down, right in NEIGHBOURS:
+                beside = padded[1 + down : 1 + down + height, 1 + right : 1 + right + width]
+                np.copyto(labels, beside, where=labels == 0)
+        part = full[self.window]
+        part[self.known_free] = self._unblocked(labels)[self.known_free]
+        return full
+
+    def _unblocked(self, values: NDArray[Scalar]) -> NDArray[Scalar]:
+        if self.factor == 1:
+            return values
+        height, width = self.known_free.shape
+        return values.repeat(self.factor, axis=0).repeat(self.factor, axis=1)[:height, :width]
+
+
+def block_side(resolution_m: float, cells: int, parameters: OccupancyParameters) -> int:
+    """Cells along the side of the blocks that a map is analysed in.
+
+    Parameters
+    ----------
+    resolution_m : float
+        Side of a cell.
+    cells : int
+        Number of cells of the explored part.
+    """
+    finer = int(parameters.working_resolution_m / resolution_m * (1 + 1e-9))
+    larger = int(np.ceil(np.sqrt(cells / parameters.analysed_max_cells)))
+    return max(1, finer, larger)
+
+
+def coarser_for_its_size(
+    geometry: GridGeometry, analysed_resolution_m: float, parameters: OccupancyParameters
+) -> str | None:
+    """Say that a map was analysed coarser than it is because it is large; None if it was not."""
+    usual = max(geometry.resolution_m, parameters.working_resolution_m) * (1 + 1e-9)
+    if analysed_resolution_m <= usual:
+        return None
+    return (
+        f"more than {parameters.analysed_max_cells} explored cells: analysed at "
+        f"{analysed_resolution_m:.3g} m instead of {geometry.resolution_m:.3g} m; "
+        "occupancy.analysed_max_cells sets the limit"
+    )
+
+
+def _within(outer: tuple[slice, slice], inner: tuple[slice, slice]) -> tuple[slice, slice]:
+    """Rows and columns of a canvas of a window's window."""
+    rows, columns = (
+        slice(whole.start + part.start, whole.start + part.stop)
+        for whole, part in zip(outer, inner, strict=True)
+    )
+    return rows, columns
+
+
+def _blocks(mask: BoolArray, side: int) -> BoolArray:
+    """View (H, side, W, side) of a mask filled up to whole blocks."""
+    height, width = (-mask.shape[0] % side), (-mask.shape[1] % side)
+    padded = np.pad(mask, ((0, height), (0, width)))
+    return padded.reshape(padded.shape[0] // side, side, padded.shape[1] // side, side)

@@ -1,0 +1,310 @@
+"""Occupancy grids and the only conversion between cells and world coordinates."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Generic, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rose2_logs.config.parameters import OccupancyParameters
+from rose2_logs.errors import InvalidMapError
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.int_]
+Scalar = TypeVar("Scalar", bound=np.generic)
+UNKNOWN = -1
+SMALLEST_CELL_M, LARGEST_CELL_M = 1e-4, 100.0
+"""Sides of cells that maps are made of, in metres: a laser's noise is above, a building below."""
+FARTHEST_ORIGIN_M = 1e8
+"""No place on earth lies farther from the origin of its frame, in metres, in no projection."""
+COUNTED_AT_ONCE = 2**16
+"""Cells whose labels are counted at once."""
+
+
+@dataclass(frozen=True)
+class GridGeometry:
+    """Where a grid lies in the world.
+
+    The *grid frame* has its origin at the outer corner of cell (0, 0), x along the columns and y along the
+    rows, in metres. The *world* is the frame ``frame_id`` of the map message (REP 105).
+
+    Attributes
+    ----------
+    resolution_m : float
+        Side of a cell.
+    origin_xy_m : (float, float)
+        World position of the grid frame's origin.
+    yaw_rad : float
+        Rotation of the grid frame in the world, counter-clockwise.
+    frame_id : str
+        Name of the world frame.
+    shape : (int, int)
+        Rows and columns (H, W); row 0 lies at the origin.
+    """
+
+    resolution_m: float
+    origin_xy_m: tuple[float, float]
+    yaw_rad: float
+    frame_id: str
+    shape: tuple[int, int]
+
+    def __post_init__(self) -> None:
+        if not SMALLEST_CELL_M <= self.resolution_m <= LARGEST_CELL_M:
+            raise InvalidMapError(
+                f"the map's resolution is {self.resolution_m:g} m; it must be positive, from "
+                f"{SMALLEST_CELL_M:g} to {LARGEST_CELL_M:g} m"
+            )
+        if not np.all(np.isfinite([*self.origin_xy_m, self.yaw_rad])):
+            raise InvalidMapError(
+                f"the map's origin {self.origin_xy_m}, yaw {self.yaw_rad} is not made of finite numbers"
+            )
+        if max(map(abs, self.origin_xy_m)) > FARTHEST_ORIGIN_M:
+            raise InvalidMapError(
+                f"the map's origin {self.origin_xy_m} is farther than {FARTHEST_ORIGIN_M:g} m away"
+            )
+
+    def part(self, window: tuple[slice, slice], block: int = 1) -> GridGeometry:
+        """Return where a part of the grid lies: its rows and columns, in blocks of so many cells a side."""
+        rows, columns = window
+        x, y = self.grid_to_world(np.array([columns.start, rows.start]) * self.resolution_m).tolist()
+        shape = (-(-(rows.stop - rows.start) // block), -(-(columns.stop - columns.start) // block))
+        return replace(self, resolution_m=self.resolution_m * block, origin_xy_m=(x, y), shape=shape)
+
+    @property
+    def cell_area_m2(self) -> float:
+        """Area of one cell in square metres."""
+        return self.resolution_m**2
+
+    @property
+    def rotation(self) -> FloatArray:
+        """The (2, 2) matrix that turns grid-frame vectors into world vectors."""
+        c, s = np.cos(self.yaw_rad), np.sin(self.yaw_rad)
+        return np.array([[c, -s], [s, c]])
+
+    def grid_to_world(self, xy_m: FloatArray) -> FloatArray:
+        """Convert points (..., 2) from the grid frame to the world, metres to metres."""
+        world: FloatArray = np.asarray(xy_m, float) @ self.rotation.T + np.asarray(self.origin_xy_m)
+        return world
+
+    def world_to_grid(self, xy_m: FloatArray) -> FloatArray:
+        """Convert points (..., 2) from the world to the grid frame, metres to metres."""
+        grid: FloatArray = (np.asarray(xy_m, float) - np.asarray(self.origin_xy_m)) @ self.rotation
+        return grid
+
+    def cell_centres(self, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> FloatArray:
+        """World positions (..., 2) in metres of the centres of cells."""
+        return self.grid_to_world(
+            (np.stack([columns, rows], axis=-1) + 0.5).astype(float) * self.resolution_m
+        )
+
+    def world_to_cell(self, xy_m: FloatArray) -> NDArray[np.intp]:
+        """Cells (..., 2) as row, column that hold world points; they may lie outside the grid."""
+        cells = np.floor(self.world_to_grid(xy_m) / self.resolution_m).astype(np.intp)
+        return cells[..., ::-1]
+
+    def corners_m(self) -> FloatArray:
+        """World positions (4, 2) of the outer corners, counter-clockwise from the origin."""
+        height, width = self.shape[0] * self.resolution_m, self.shape[1] * self.resolution_m
+        return self.grid_to_world(np.array([[0, 0], [width, 0], [width, height], [0, height]], float))
+
+
+@dataclass(frozen=True, eq=False)
+class OccupancySnapshot:
+    """One map of a run.
+
+    Attributes
+    ----------
+    index : int
+        Number of the snapshot among the distinct maps taken from the log, from 0.
+    log_time_ns : int
+        When the message was recorded, nanoseconds since the epoch.
+    stamp_ns : int
+        The message's header stamp, nanoseconds.
+    topic : str
+        Topic (or file) that the map comes from.
+    cells : (H, W) int8, read-only
+        -1 unknown, 0..100 occupancy in percent; row 0 at the origin, as in the message.
+    geometry : GridGeometry
+        Where the grid lies in the world.
+    repeats_before : int
+        Identical maps that were received, and dropped, since the snapshot before.
+
+    Raises
+    ------
+    InvalidMapError
+        If `cells` has not the geometry's shape.
+    """
+
+    index: int
+    log_time_ns: int
+    stamp_ns: int
+    topic: str
+    cells: NDArray[np.int8]
+    geometry: GridGeometry
+    repeats_before: int = 0
+
+    def __post_init__(self) -> None:
+        if self.cells.shape != self.geometry.shape:
+            raise InvalidMapError(
+                f"map {self.index} of {self.topic}: data of shape {self.cells.shape} "
+                f"but its header says {self.geometry.shape}"
+            )
+        cells = self.cells.view()
+        cells.flags.writeable = False
+        object.__setattr__(self, "cells", cells)
+
+
+@dataclass(frozen=True, eq=False)
+class CellValues(Generic[Scalar]):
+    """Values of some cells of a canvas; those of the others are zero and not kept.
+
+    Attributes
+    ----------
+    shape : (int, int)
+        Of the canvas (H, W).
+    cells : (N, 2) int32
+        Row and column of each cell that has a value.
+    values : (N,)
+        Its value.
+    """
+
+    shape: tuple[int, int]
+    cells: NDArray[np.int32]
+    values: NDArray[Scalar]
+
+    def whole(self) -> NDArray[Scalar]:
+        """Values (H, W) of the whole canvas."""
+        canvas = np.zeros(self.shape, self.values.dtype)
+        canvas[self.cells[:, 0], self.cells[:, 1]] = self.values
+        return canvas
+
+
+def classify(cells: NDArray[np.int8], parameters: OccupancyParameters) -> tuple[BoolArray, BoolArray]:
+    """Masks of the free and of the occupied cells.
+
+    Parameters
+    ----------
+    cells : (H, W) int8
+        -1 unknown, 0..100 occupancy in percent.
+    parameters : OccupancyParameters
+        Cells above `occupied_min_percent` are occupied, known cells below `free_max_percent` are free
+        (map_server's convention).
+
+    Returns
+    -------
+    free, occupied : (H, W) bool
+        Cells between the two thresholds are in neither.
+    """
+    free = (cells >= 0) & (cells < parameters.free_max_percent)
+    occupied = cells > parameters.occupied_min_percent
+    return free, occupied
+
+
+def is_same_to_analysis(
+    before: OccupancySnapshot, now: OccupancySnapshot, parameters: OccupancyParameters
+) -> bool:
+    """Whether two maps have the same free, occupied and unknown cells at the same place: all that counts.
+
+    Maps that hold probabilities change at every scan, mostly without passing a threshold.
+    """
+    if before.geometry != now.geometry:
+        return False
+    changed = before.cells != now.cells
+    kind_before, kind_now = (
+        np.stack([*classify(cells[changed], parameters), cells[changed] == UNKNOWN])
+        for cells in (before.cells, now.cells)
+    )
+    return np.array_equal(kind_before, kind_now)
+
+
+def free_area_m2(snapshot: OccupancySnapshot, parameters: OccupancyParameters) -> float:
+    """Known free area of a map in square metres."""
+    free, _ = classify(snapshot.cells, parameters)
+    return float(free.sum()) * snapshot.geometry.cell_area_m2
+
+
+def known_window(known: BoolArray) -> tuple[slice, slice]:
+    """Rows and columns of the smallest part of a mask that holds all of it; the first cell if it is empty."""
+    rows, columns = np.flatnonzero(known.any(1)), np.flatnonzero(known.any(0))
+    if len(rows) == 0:
+        return slice(0, 1), slice(0, 1)
+    return slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)
+
+
+def distinct_labels(labels: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDArray[np.intp]]:
+    """Find the distinct values of a label image and where each comes first in reading order.
+
+    The same as ``numpy.unique`` with ``return_index``, but it sorts the runs of equal labels only.
+
+    Returns
+    -------
+    values : (K,) int64
+        Ascending.
+    first : (K,) int
+        Index into the flattened image.
+    """
+    flat = labels.ravel()
+    starts = np.flatnonzero(np.concatenate([[True], flat[1:] != flat[:-1]]))
+    values, index = np.unique(flat[starts], return_index=True)
+    return values.astype(np.int64), starts[index]
+
+
+def renumbered(labels: NDArray[np.int32], number: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Return ``number[labels]``, the image with new numbers, written over the old ones to save memory."""
+    for rows in np.array_split(labels, max(1, labels.size // COUNTED_AT_ONCE)):
+        rows[...] = number[rows]
+    return labels
+
+
+def roots(parent: NDArray[np.intp]) -> NDArray[np.intp]:
+    """What each of N regions (N,) belongs to after all joins.
+
+    Parameters
+    ----------
+    parent : (N,) int
+        The region that each was made part of; itself where it was not.
+    """
+    while not np.array_equal(above := parent[parent], parent):
+        parent = above
+    return parent
+
+
+def label_sizes(labels: NDArray[np.integer], count: int) -> NDArray[np.int64]:
+    """Number of cells (count + 1,) of each label 0..count of an image.
+
+    The same as ``numpy.bincount``, which would make a copy of the image in its own type.
+    """
+    sizes = np.zeros(count + 1, np.int64)
+    for rows in np.array_split(labels, max(1, labels.size // COUNTED_AT_ONCE)):
+        sizes += np.bincount(rows.ravel(), minlength=count + 1)
+    return sizes
+
+
+def straight_runs(
+    row: NDArray[np.integer], column: NDArray[np.integer], step: tuple[int, int]
+) -> tuple[NDArray[np.integer], NDArray[np.integer]]:
+    """Join cells that follow one another along a direction.
+
+    Parameters
+    ----------
+    row, column : (N,) int
+        The cells, each once.
+    step : (int, int)
+        From a cell to the next of its run: (0, 1), or 1 row with any number of columns.
+
+    Returns
+    -------
+    first, last : (K, 2) int
+        Row and column of the ends of each run; a lone cell is both.
+    """
+    down, right = step
+    place, line = (row, column - right * row) if down else (column, row)
+    order = np.lexsort((place, line))
+    cells = np.column_stack([row, column])[order]
+    is_first = np.ones(len(cells), bool)
+    is_first[1:] = (np.diff(line[order]) != 0) | (np.diff(place[order]) != 1)
+    is_last = np.append(is_first[1:], True)[: len(cells)]
+    return cells[is_first], cells[is_last]

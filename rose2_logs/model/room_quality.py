@@ -1,0 +1,126 @@
+"""What a map shows of each room's outline: how much of it is wall, and where the room goes on unseen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from rose2_logs.config.parameters import OccupancyParameters
+from rose2_logs.model.explored import ExploredPart
+from rose2_logs.model.occupancy import UNKNOWN, BoolArray, FloatArray, OccupancySnapshot, known_window
+from rose2_logs.model.rooms import RoomMap
+
+OUTLINE_STEP_M = 0.1
+"""Outlines are looked at every so many metres: two cells of usual maps."""
+UNSURE_BELOW = 0.7
+"""Rooms whose outline walls back less are unsure: doorways alone take an ordinary room to about 0.9."""
+UNSURE_SIGN = "?"
+"""Behind the number of an unsure room, wherever its name is drawn."""
+WALL_REACH_M = 0.2
+"""An outline is backed by occupied cells this near: it runs in the middle of walls of usual thickness."""
+
+
+def is_unsure(outline_wall_share: float | None) -> bool:
+    """Whether little of a room's outline is known to be wall; of what was not measured nothing is said."""
+    return outline_wall_share is not None and outline_wall_share < UNSURE_BELOW
+
+
+def unsure_sign(outline_wall_share: float | None) -> str:
+    """Return what stands behind the number of a room: the sign where it is unsure."""
+    return UNSURE_SIGN if is_unsure(outline_wall_share) else ""
+
+
+@dataclass(frozen=True, eq=False)
+class RoomEvidence:
+    """How sure the rooms of one map are.
+
+    Attributes
+    ----------
+    outline_wall_share : (R,) float
+        Share of each room's outline, with its predicted part, that occupied cells back; NaN for a room
+        without outline. Doorways are not backed, so an ordinary room stays a little below 1.
+    frontier_m : (R,) float
+        Length of each room's open frontier: cell sides between its free cells and unknown ones, metres.
+    """
+
+    outline_wall_share: FloatArray
+    frontier_m: FloatArray
+
+
+def room_evidence(
+    snapshot: OccupancySnapshot, rooms: RoomMap, parameters: OccupancyParameters
+) -> RoomEvidence:
+    """Measure how far the outlines of rooms are backed by walls, and their open frontier.
+
+    Parameters
+    ----------
+    snapshot : OccupancySnapshot
+        The map.
+    rooms : RoomMap
+        The rooms found in it, on its grid.
+    parameters : OccupancyParameters
+        Which cells are walls.
+    """
+    return RoomEvidence(_wall_shares(snapshot, rooms, parameters), _frontiers(snapshot, rooms))
+
+
+def _wall_shares(snapshot: OccupancySnapshot, rooms: RoomMap, parameters: OccupancyParameters) -> FloatArray:
+    explored = ExploredPart.of(snapshot.cells, snapshot.geometry, parameters)
+    near = _within(explored.occupied, WALL_REACH_M / explored.resolution_m)
+    grid = snapshot.geometry.part(explored.window, explored.factor)
+    shares = np.full(len(rooms), np.nan)
+    for number, polygon in enumerate(rooms.polygons):
+        points = _points_along(polygon, OUTLINE_STEP_M)
+        if len(points) == 0:
+            continue
+        row, column = np.moveaxis(grid.world_to_cell(points), -1, 0)
+        inside = (row >= 0) & (row < near.shape[0]) & (column >= 0) & (column < near.shape[1])
+        shares[number] = np.count_nonzero(near[row[inside], column[inside]]) / len(points)
+    return shares
+
+
+def _points_along(polygon: BaseGeometry, step_m: float) -> FloatArray:
+    """Points (N, 2) every so many metres along the rings of a shape, one ring after the other.
+
+    As shapely interpolates along its boundary, which looks for each point from the beginning.
+    """
+    corners, ring = shapely.get_coordinates(shapely.get_rings(shapely.get_parts(polygon)), return_index=True)
+    if len(corners) == 0:
+        return np.zeros((0, 2))
+    sides = corners[1:] - corners[:-1]
+    lengths = np.where(ring[1:] == ring[:-1], np.hypot(*sides.T), 0.0)
+    ends = np.cumsum(lengths)
+    distances = np.arange(0.0, ends[-1], step_m)
+    distances = distances[distances < ends[-1]]
+    side = np.searchsorted(ends, distances, "right")
+    share = (distances - (ends - lengths)[side]) / lengths[side]
+    points: FloatArray = corners[side] + share[:, None] * sides[side]
+    return points
+
+
+def _within(mask: BoolArray, reach_cells: float) -> BoolArray:
+    """Cells no further from one of a mask (H, W) than a number of cells."""
+    import cv2
+
+    distance = cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
+    return np.asarray(distance <= reach_cells)
+
+
+def _frontiers(snapshot: OccupancySnapshot, rooms: RoomMap) -> FloatArray:
+    """Length (R,) in metres of the sides that cells of each room share with unknown ones."""
+    known = known_window(rooms.labels > 0)
+    # What lies beyond the canvas is not known to be unknown, so only neighbours on it count.
+    window = tuple(slice(max(part.start - 1, 0), part.stop + 1) for part in known)
+    labels, unknown = rooms.labels[window], snapshot.cells[window] == UNKNOWN
+    sides = np.zeros(len(rooms) + 1, np.int64)
+    for here, beside in (
+        ((slice(1, None), slice(None)), (slice(None, -1), slice(None))),
+        ((slice(None), slice(1, None)), (slice(None), slice(None, -1))),
+    ):
+        for one, other in ((here, beside), (beside, here)):
+            open_to = labels[one][unknown[other]]
+            sides += np.bincount(open_to, minlength=len(sides))
+    return sides[1:].astype(np.float64) * snapshot.geometry.resolution_m

@@ -1,0 +1,136 @@
+"""RoomMap: the narrow waist that every segmenter returns; tracking and evaluation need nothing more."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from shapely.geometry import Polygon
+from shapely.geometry.base import BaseGeometry
+
+from rose2_logs.model.occupancy import FloatArray, GridGeometry, label_sizes
+
+LABEL_DEPTH_SHARE = 0.8
+"""A label stands at most this much less deep than its room is at most: along a corridor in the middle."""
+
+
+@dataclass(frozen=True, eq=False)
+class Doorway:
+    """A passage through which free space of two rooms is connected.
+
+    Attributes
+    ----------
+    rooms : (int, int)
+        The two room numbers, the smaller one first.
+    ends_m : (2, 2) float
+        The two ends of the passage, world metres.
+    """
+
+    rooms: tuple[int, int]
+    ends_m: FloatArray
+
+    @property
+    def width_m(self) -> float:
+        """Clear width of the passage in metres."""
+        return float(np.linalg.norm(self.ends_m[1] - self.ends_m[0]))
+
+
+@dataclass(frozen=True, eq=False)
+class RoomMap:
+    """The rooms of one map.
+
+    Attributes
+    ----------
+    geometry : GridGeometry
+        Where `labels` lies in the world.
+    labels : (H, W) int32, read-only
+        0 = no room, 1..R = the rooms: the segmented map.
+    polygons : tuple of R shapely Polygon or MultiPolygon
+        Shape of room i + 1 in world metres. From ROSE2 it includes the predicted, unseen part of the room;
+        from a baseline it is the outline of the labelled cells.
+    areas_m2 : (R,) float
+        Area of the labelled cells of each room.
+    doorways : tuple of Doorway
+        Passages between rooms.
+    """
+
+    geometry: GridGeometry
+    labels: NDArray[np.int32]
+    polygons: tuple[BaseGeometry, ...]
+    areas_m2: FloatArray
+    doorways: tuple[Doorway, ...] = ()
+
+    def __post_init__(self) -> None:
+        labels = self.labels.view()
+        labels.flags.writeable = False
+        object.__setattr__(self, "labels", labels)
+
+    @classmethod
+    def from_labels(cls, labels: NDArray[np.int32], geometry: GridGeometry) -> RoomMap:
+        """Rooms known by their cells alone, as tracking needs them: without shapes and doorways.
+
+        Parameters
+        ----------
+        labels : (H, W) int32
+            0 = none; a number that does not occur is a room without cells.
+        geometry : GridGeometry
+            Where they lie.
+        """
+        cells = label_sizes(labels, int(labels.max(initial=0)))[1:]
+        areas = cells.astype(np.float64) * geometry.cell_area_m2
+        return cls(geometry, labels, (Polygon(),) * len(cells), areas)
+
+    def __len__(self) -> int:
+        return len(self.polygons)
+
+    @property
+    def predicted_areas_m2(self) -> FloatArray:
+        """Area (R,) of each room's polygon in square metres."""
+        return np.array([polygon.area for polygon in self.polygons], float)
+
+    @cached_property
+    def label_points_m(self) -> FloatArray:
+        """World point (R, 2) for the name of each room, metres: well inside its cells, so where it was seen.
+
+        Of a room without cells it is a point of its polygon, NaN where that is empty.
+        """
+        import cv2
+        from scipy import ndimage
+
+        points = np.full((len(self), 2), np.nan)
+        for room, box in enumerate(ndimage.find_objects(self.labels, max_label=len(self)), start=1):
+            shape = self.polygons[room - 1]
+            if box is not None:
+                cells = np.pad((self.labels[box] == room).astype(np.uint8), 1)
+                depth = cv2.distanceTransform(cells, cv2.DIST_L2, cv2.DIST_MASK_3)[1:-1, 1:-1]
+                deep = np.argwhere(depth >= LABEL_DEPTH_SHARE * depth.max())
+                middle = [np.average(np.arange(len(n)) - 1, weights=n) for n in (cells.sum(1), cells.sum(0))]
+                row, column = deep[np.argmin(((deep - middle) ** 2).sum(axis=1))]
+                points[room - 1] = self.geometry.cell_centres(box[0].start + row, box[1].start + column)
+            elif not shape.is_empty:
+                points[room - 1] = shape.representative_point().coords[0]
+        return points
+
+    @cached_property
+    def outer_rings_m(self) -> tuple[list[FloatArray], ...]:
+        """Closed outer rings (K, 2) of each room's polygon in world metres."""
+        import shapely
+
+        parts, room = shapely.get_parts(np.array(self.polygons, object), return_index=True)
+        points, ring = shapely.get_coordinates(shapely.get_exterior_ring(parts), return_index=True)
+        rings = np.split(points, np.flatnonzero(np.diff(ring)) + 1)
+        found: tuple[list[FloatArray], ...] = tuple([] for _ in self.polygons)
+        for number, corners in zip(room[np.unique(ring)].tolist(), rings, strict=False):
+            found[number].append(corners)
+        return found
+
+    @property
+    def adjacency(self) -> tuple[tuple[int, int], ...]:
+        """Pairs of room numbers, smaller first, that at least one doorway connects; sorted."""
+        return tuple(sorted({doorway.rooms for doorway in self.doorways}))
+
+    def neighbours(self, room: int) -> tuple[int, ...]:
+        """Rooms that a doorway connects with `room`, ascending."""
+        return tuple(sorted({a + b - room for a, b in self.adjacency if room in (a, b)}))

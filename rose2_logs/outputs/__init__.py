@@ -1,0 +1,1 @@
+"""What a run becomes for people and programs; no output knows another."""

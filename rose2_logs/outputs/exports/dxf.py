@@ -1,0 +1,95 @@
+"""Floor plans as DXF for CAD programs, by ezdxf: metres, a layer for each kind of thing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from rose2_logs.drawing.palette import track_colour
+from rose2_logs.model.room_plan import RoomPlan, predicted_parts
+from rose2_logs.system.files import replacing
+
+if TYPE_CHECKING:
+    from ezdxf.layouts.layout import Modelspace
+
+VERSION = "R2010"
+"""Read by every CAD program in use, and the first release with true colours on all entities."""
+ROOMS, PREDICTED, DOORWAYS, WALLS, LABELS = "ROOMS", "PREDICTED", "DOORWAYS", "WALLS", "LABELS"
+LAYERS = {ROOMS: 7, PREDICTED: 8, DOORWAYS: 1, WALLS: 7, LABELS: 7}
+"""Layers and their colours by AutoCAD's index: 7 is black or white, 8 grey, 1 red."""
+TEXT_HEIGHT_M = 0.25
+"""Labels can be read on a print at 1:100 (2.5 mm)."""
+LABEL_RISE_M = 0.75 * TEXT_HEIGHT_M
+"""The middles of a label's two lines lie this far above and below its point: half a line apart."""
+HATCH_PATTERN, HATCH_SCALE = "ANSI31", 0.08
+"""Lines at 45 degrees about a quarter of a metre apart."""
+
+
+def write_dxf(plan: RoomPlan, path: Path) -> None:
+    """Write a plan.
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written.
+    """
+    from ezdxf import options, units  # type: ignore[attr-defined]
+    from ezdxf.filemanagement import new
+
+    # Otherwise the file would hold the time and random numbers: the same plan gives the same file.
+    fixed, options.write_fixed_meta_data_for_testing = options.write_fixed_meta_data_for_testing, True
+    try:
+        document = new(VERSION, units=units.M)
+        for name, colour in LAYERS.items():
+            document.layers.add(name, color=colour)
+        _draw(plan, document.modelspace())
+        # Of itself it lists the classes in the order of a set, which changes from run to run.
+        for name in sorted(document.entitydb.dxf_types_in_use()):
+            document.classes.add_class(name)
+        with replacing(path) as part:
+            document.saveas(part)
+    finally:
+        options.write_fixed_meta_data_for_testing = fixed
+
+
+def _draw(plan: RoomPlan, space: Modelspace) -> None:
+    from ezdxf import const
+    from ezdxf.colors import rgb2int
+    from ezdxf.enums import TextEntityAlignment
+
+    predicted = predicted_parts(plan)
+    for room in plan.rooms:
+        colour = rgb2int(track_colour(room.number))
+        for ring in _rings(room.shape):
+            space.add_lwpolyline(ring, close=True, dxfattribs={"layer": ROOMS, "true_color": colour})
+        unseen = predicted.get(room.number)
+        for part in [] if unseen is None else shapely.get_parts(unseen):
+            hatch = space.add_hatch(dxfattribs={"layer": PREDICTED, "true_color": colour})
+            hatch.set_pattern_fill(HATCH_PATTERN, scale=HATCH_SCALE)
+            for number, ring in enumerate(_rings(part)):
+                outer = const.BOUNDARY_PATH_EXTERNAL | const.BOUNDARY_PATH_OUTERMOST
+                inner = const.BOUNDARY_PATH_DEFAULT
+                hatch.paths.add_polyline_path(ring, is_closed=True, flags=inner if number else outer)
+                attributes = {"layer": PREDICTED, "true_color": colour}
+                space.add_lwpolyline(ring, close=True, dxfattribs=attributes)
+        if room.label_point_m is None:
+            continue
+        x, y = room.label_point_m
+        for text, rise in ((room.name, LABEL_RISE_M), (f"{room.area_m2:.1f} m2", -LABEL_RISE_M)):
+            label = space.add_text(text, height=TEXT_HEIGHT_M, dxfattribs={"layer": LABELS})
+            label.set_placement((x, y + rise), align=TextEntityAlignment.MIDDLE_CENTER)
+    for door in plan.doorways:
+        start, end = door.ends_m.tolist()
+        space.add_line(start, end, dxfattribs={"layer": DOORWAYS})
+    for start, end in [] if plan.walls_m is None else plan.walls_m.tolist():
+        space.add_line(start, end, dxfattribs={"layer": WALLS})
+
+
+def _rings(shape: BaseGeometry) -> list[list[tuple[float, float]]]:
+    """Corners of all rings of a shape, without their last, which is the first again."""
+    rings = shapely.get_rings(shapely.get_parts(np.array([shape], object)))
+    return [[(x, y) for x, y in shapely.get_coordinates(ring)[:-1].tolist()] for ring in rings]

@@ -1,0 +1,78 @@
+"""The formats by name, and the one way to write a plan in several of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from rose2_logs.drawing.plan import draw_plan
+from rose2_logs.drawing.svg import as_svg
+from rose2_logs.errors import ParameterError
+from rose2_logs.model.room_plan import RoomPlan
+from rose2_logs.outputs.exports.dxf import write_dxf
+from rose2_logs.outputs.exports.geojson import plan_geojson
+from rose2_logs.outputs.exports.graph import plan_graph
+from rose2_logs.outputs.exports.map_server import ENDINGS, write_labelled_map
+from rose2_logs.runs.summary import write_json
+from rose2_logs.system.files import replacing
+
+FORMATS: dict[str, tuple[str, ...]] = {
+    "geojson": (".floor_plan.geojson",),
+    "svg": (".floor_plan.svg",),
+    "dxf": (".floor_plan.dxf",),
+    "map_server": ENDINGS,
+    "graph": (".graph.json",),
+}
+"""Endings of the files of each format."""
+
+
+def planned_files(formats: Sequence[str], folder: Path, stem: str) -> list[Path]:
+    """Return the files that the formats are written to.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such format.
+    """
+    for name in formats:
+        if name not in FORMATS:
+            raise ParameterError(f"no format {name!r}; there are: {', '.join(FORMATS)}")
+    return [folder / f"{stem}{ending}" for name in dict.fromkeys(formats) for ending in FORMATS[name]]
+
+
+def write_plan(plan: RoomPlan, formats: Sequence[str], folder: Path, stem: str) -> list[Path]:
+    """Write a plan in some formats; files that are there are replaced.
+
+    Parameters
+    ----------
+    plan : RoomPlan
+    formats : sequence of str
+        Names among `FORMATS`.
+    folder : path
+        Where to; it is made.
+    stem : str
+        How the files' names begin.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such format.
+    OutputError
+        If a file cannot be written.
+    """
+    files = planned_files(formats, folder, stem)
+    writers: dict[str, Callable[[Path], object]] = {
+        "geojson": lambda path: write_json(path, plan_geojson(plan)),
+        "svg": lambda path: _write_text(path, as_svg(draw_plan(plan))),
+        "dxf": lambda path: write_dxf(plan, path),
+        "graph": lambda path: write_json(path, plan_graph(plan)),
+        "map_server": lambda path: write_labelled_map(plan, folder, stem),
+    }
+    for name in dict.fromkeys(formats):
+        writers[name](folder / f"{stem}{FORMATS[name][0]}")
+    return files
+
+
+def _write_text(path: Path, text: str) -> None:
+    with replacing(path) as part:
+        part.write_text(text, encoding="utf-8")

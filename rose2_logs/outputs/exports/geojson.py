@@ -1,0 +1,100 @@
+"""Floor plans as GeoJSON (RFC 7946), in metres."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from rose2_logs.model.analysis import Walls
+from rose2_logs.model.room_plan import RoomPlan, predicted_parts
+
+DECIMALS = 4
+"""Of coordinates in metres: a tenth of a millimetre."""
+CAVEAT = (
+    "x and y are metres in the frame of the robot's map, not longitude and latitude: programs that expect "
+    "degrees have to be told, as by an engineering or local coordinate system"
+)
+
+
+def plan_geojson(plan: RoomPlan, walls: Walls | None = None) -> dict[str, Any]:
+    """Return rooms, their unseen parts, doorways and walls as a feature collection.
+
+    Each feature's property ``kind`` is room, predicted, doorway, wall or line. The member ``map_frame``, none
+    of the standard's, names the frame and says that coordinates are metres. Rings turn as the standard asks.
+
+    Parameters
+    ----------
+    plan : RoomPlan
+    walls : Walls, optional
+        Tells more than the plan does: the walls' directions, the representative lines with their weight.
+    """
+    features = [
+        _feature(
+            room.shape,
+            f"room/{room.number}",
+            kind="room",
+            room=room.number,
+            name=room.name,
+            area_m2=room.area_m2,
+            predicted_area_m2=room.predicted_area_m2,
+            confidence=room.confidence,
+            frontier_m=room.frontier_m,
+            neighbours=list(room.neighbours),
+        )
+        for room in plan.rooms
+    ]
+    features += [
+        _feature(part, f"predicted/{number}", kind="predicted", room=number, area_m2=part.area)
+        for number, part in predicted_parts(plan).items()
+    ]
+    features += [
+        _feature(
+            shapely.LineString(door.ends_m),
+            f"doorway/{number}",
+            kind="doorway",
+            rooms=list(door.rooms),
+            width_m=door.width_m,
+        )
+        for number, door in enumerate(plan.doorways, start=1)
+    ]
+    if walls is not None:
+        features += _structure(walls)
+    elif plan.walls_m is not None:
+        features += [
+            _feature(shapely.LineString(ends), f"wall/{number}", kind="wall")
+            for number, ends in enumerate(plan.walls_m, start=1)
+        ]
+    return {
+        "type": "FeatureCollection",
+        "name": plan.title,
+        "map_frame": {"frame_id": plan.frame_id, "unit": "metre", "note": CAVEAT},
+        "features": features,
+    }
+
+
+def _structure(walls: Walls) -> list[dict[str, Any]]:
+    segments = zip(walls.segments_m.reshape(-1, 2, 2), walls.segment_direction.tolist(), strict=True)
+    lines = zip(
+        walls.lines_m.reshape(-1, 2, 2),
+        walls.line_direction.tolist(),
+        walls.line_weight.tolist(),
+        strict=True,
+    )
+    features = [
+        _feature(shapely.LineString(ends), f"wall/{number}", kind="wall", direction=direction)
+        for number, (ends, direction) in enumerate(segments, start=1)
+    ]
+    features += [
+        _feature(shapely.LineString(ends), f"line/{number}", kind="line", direction=direction, weight=weight)
+        for number, (ends, direction, weight) in enumerate(lines, start=1)
+    ]
+    return features
+
+
+def _feature(shape: BaseGeometry, identity: str, **properties: Any) -> dict[str, Any]:
+    turned = shapely.transform(shapely.orient_polygons(shape), lambda xy: np.round(xy, DECIMALS))
+    geometry = None if shape.is_empty else shapely.geometry.mapping(turned)
+    return {"type": "Feature", "id": identity, "properties": properties, "geometry": geometry}

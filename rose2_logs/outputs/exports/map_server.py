@@ -1,0 +1,137 @@
+"""Floor plans as a labelled map that map_server and Nav2 load: the rooms are the values of its cells."""
+
+from __future__ import annotations
+
+import logging
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from rose2_logs.drawing.image_files import write_label_image
+from rose2_logs.errors import OutputError
+from rose2_logs.model.occupancy import classify
+from rose2_logs.model.room_plan import PlanMap, RoomPlan
+from rose2_logs.system.files import replacing
+
+logger = logging.getLogger(__name__)
+
+ROOM_VALUES = 99
+"""An occupancy grid holds 0 for free and 100 for occupied; the values between are for rooms."""
+FREE, OCCUPIED, UNKNOWN_PIXEL = 0, 100, 255
+OCCUPIED_THRESH, FREE_THRESH = 0.65, 0.196
+"""Defaults of map_server, which must be there; in the mode `raw` they mean nothing."""
+ENDINGS = (".rooms.pgm", ".rooms.yaml", ".rooms.list.yaml", ".rooms.labels.png")
+"""The image, its description for map_server, what rooms its values are, and the rooms by their numbers."""
+
+
+def write_labelled_map(plan: RoomPlan, folder: Path, stem: str) -> tuple[Path, ...]:
+    """Write a plan's map with its rooms.
+
+    The description says ``mode: raw``, so that cells load with the values of the image: 0 free, 100 occupied,
+    255 unknown, 1 to 99 a room. Which room a value is stands in the list, with what else is known of it. More
+    rooms than that share values, so a second image of the same cells holds the numbers of the rooms, 0 where
+    there is none.
+
+    Returns
+    -------
+    tuple of Path
+        The files, as `ENDINGS`.
+
+    Raises
+    ------
+    OutputError
+        If the plan has no map, or a file cannot be written.
+    """
+    from PIL import Image
+
+    if plan.map is None:
+        raise OutputError(
+            f"{folder / stem}: no map to label, because the annotated MCAP is not there; analyze without "
+            "--no-mcap, or export another format"
+        )
+    values = room_values(plan)
+    if len(plan.rooms) > ROOM_VALUES:
+        logger.warning(
+            "%s: %d rooms share the %d values that a map of map_server has for them; %s has them apart",
+            folder / stem,
+            len(plan.rooms),
+            ROOM_VALUES,
+            f"{stem}{ENDINGS[3]}",
+        )
+    image, about, listing, labels = (folder / f"{stem}{ending}" for ending in ENDINGS)
+    pixels = labelled_pixels(plan.map, values)
+    with replacing(image) as part:
+        Image.fromarray(pixels).save(part, format="PPM")
+    geometry = plan.map.geometry
+    described = {
+        "image": image.name,
+        "mode": "raw",
+        "resolution": geometry.resolution_m,
+        "origin": [*geometry.origin_xy_m, geometry.yaw_rad],
+        "negate": 0,
+        "occupied_thresh": OCCUPIED_THRESH,
+        "free_thresh": FREE_THRESH,
+    }
+    _write_yaml(about, described)
+    _write_yaml(listing, _listing(plan, values, about.name, labels.name))
+    numbers = np.where(np.isin(plan.map.labels, list(values)), plan.map.labels, 0)
+    write_label_image(labels, np.flipud(numbers))
+    return image, about, listing, labels
+
+
+def room_values(plan: RoomPlan) -> dict[int, int]:
+    """Value of each room's cells, by its number."""
+    return {room.number: 1 + place % ROOM_VALUES for place, room in enumerate(plan.rooms)}
+
+
+def labelled_pixels(below: PlanMap, values: dict[int, int]) -> np.ndarray[Any, np.dtype[np.uint8]]:
+    """Pixels (H, W) uint8 of a map and its rooms, row 0 at the top."""
+    free, occupied = classify(below.cells, below.occupancy)
+    pixels = np.full(below.cells.shape, UNKNOWN_PIXEL, np.uint8)
+    pixels[free], pixels[occupied] = FREE, OCCUPIED
+    of_room = np.zeros(int(below.labels.max(initial=0)) + 1, np.uint8)
+    for number, value in values.items():
+        if number < len(of_room):
+            of_room[number] = value
+    labelled = of_room[below.labels]
+    return np.flipud(np.where(labelled > 0, labelled, pixels)).copy()
+
+
+def _listing(plan: RoomPlan, values: dict[int, int], map_name: str, labels_name: str) -> dict[str, Any]:
+    rooms = [
+        {
+            "value": values[room.number],
+            "room": room.number,
+            "name": room.name,
+            "area_m2": round(room.area_m2, 4),
+            "predicted_area_m2": round(room.predicted_area_m2, 4),
+            "confidence": None if room.confidence is None else round(room.confidence, 4),
+            "centre_m": None
+            if room.label_point_m is None
+            else [round(value, 4) for value in room.label_point_m],
+            "neighbours": list(room.neighbours),
+        }
+        for room in plan.rooms
+    ]
+    doorways = [
+        {
+            "rooms": list(door.rooms),
+            "width_m": round(door.width_m, 4),
+            "ends_m": np.round(door.ends_m, 4).tolist(),
+        }
+        for door in plan.doorways
+    ]
+    return {
+        "map": map_name,
+        "labels": labels_name,
+        "frame_id": plan.frame_id,
+        "rooms": rooms,
+        "doorways": doorways,
+    }
+
+
+def _write_yaml(path: Path, content: dict[str, Any]) -> None:
+    with replacing(path) as part:
+        part.write_text(yaml.safe_dump(content, sort_keys=False, allow_unicode=True), encoding="utf-8")

@@ -1,0 +1,1 @@
+"""The annotated MCAP, and the layouts of its viewers."""

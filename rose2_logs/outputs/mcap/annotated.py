@@ -1,0 +1,315 @@
+"""The input log with what was found added to it, as an MCAP that Foxglove, RViz and rosbag2 open."""
+
+from __future__ import annotations
+
+import json
+import logging
+from collections import deque
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from types import TracebackType
+from typing import IO, Any, Self
+
+from mcap.exceptions import McapError
+
+from rose2_logs.drawing.extent import Extent
+from rose2_logs.errors import OutputError
+from rose2_logs.io import open_source
+from rose2_logs.io.mcap.index import DAMAGE
+from rose2_logs.io.source import MessageSource
+from rose2_logs.outputs.mcap.bag_metadata import write_bag_metadata
+from rose2_logs.outputs.mcap.check import Tallies, checked_copy
+from rose2_logs.outputs.mcap.input import (
+    LATCHED_QOS,
+    CopiedChannel,
+    CopiedChunk,
+    CopiedLog,
+    CopiedMessage,
+    copied_log,
+)
+from rose2_logs.outputs.mcap.ros_messages import ROOMS_TYPE, MessageMaker
+from rose2_logs.outputs.mcap.viewer_layouts import MapScene, bag_metadata_path, write_layouts
+from rose2_logs.outputs.mcap.writer import McapWriter
+from rose2_logs.runs.sink import RunInfo
+from rose2_logs.system.files import part_of
+from rose2_logs.system.warnings import notice
+from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot
+
+logger = logging.getLogger(__name__)
+
+PREFIX = "/rose2/"
+GRID_TYPE = "nav_msgs/msg/OccupancyGrid"
+ADDED = {
+    "/rose2/segmented_map": GRID_TYPE,
+    "/rose2/clean_map": GRID_TYPE,
+    "/rose2/markers": "visualization_msgs/msg/MarkerArray",
+    "/rose2/rooms": ROOMS_TYPE,
+}
+"""Topics that are added, with their types."""
+ATTACHMENT = "rose2_parameters.json"
+METADATA = "rose2_logs"
+
+
+class AnnotatedMcap:
+    """Sink that copies the input log and adds the topics of `ADDED` with the source map's stamp and frame.
+
+    Messages, schemas, channels, attachments and metadata of an MCAP stay as they were, byte for byte; chunks
+    between those with a map are copied compressed as they are. A bag becomes an MCAP of the ros2 profile with
+    every message as CDR. The copy is read along with the run, so that messages stand by log time and the log
+    is never held in memory. Of saved maps, which are no messages yet, each map is written to the map topic.
+
+    Parameters
+    ----------
+    path : path
+        Where to; written beside and renamed when whole.
+    info : RunInfo
+        The run.
+    source : MessageSource, optional
+        The log if it is open already, which it then stays.
+    is_bag : bool
+        Whether to describe the file in a ``metadata.yaml``, so that its folder is a bag of ROS 2.
+
+    In the end the file is read back, and what it holds is held against what was read and added.
+
+    Attributes
+    ----------
+    copied : dict
+        For each channel the number and the hash of its messages in the input and in the output, once whole.
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written or is not what was to be written, or the input holds ``/rose2/`` topics
+        already, or messages that no bag of ROS 2 can hold.
+    LogError
+        If the input cannot be copied.
+    """
+
+    def __init__(
+        self, path: Path, info: RunInfo, source: MessageSource | None = None, *, is_bag: bool = False
+    ) -> None:
+        self._path = path
+        self._part = part_of(path)
+        self._info = info
+        self._source = source
+        self._is_bag = is_bag
+        self._extent = Extent()
+        self._frame_id = ""
+        self._file: IO[bytes] | None = None
+        self.copied: dict[str, Any] = {}
+
+    def __enter__(self) -> Self:
+        self._opened_source: MessageSource | None = None
+        if self._source is None:
+            self._opened_source = self._source = open_source(self._info.log_path)
+        try:
+            self._log: CopiedLog = copied_log(self._source)
+            with self._writing():
+                self._path.parent.mkdir(parents=True, exist_ok=True)
+                self._file = self._part.open("wb")
+                self._begin(self._file)
+        except BaseException:
+            self._clean_up()
+            raise
+        return self
+
+    def _begin(self, file: IO[bytes]) -> None:
+        log, info = self._log, self._info
+        library = f"rose2_logs {info.versions.get('rose2-logs', '')}".strip()
+        library = f"{log.library}; {library}" if log.library else library
+        self._writer = McapWriter(file, log.profile, library)
+        self._channels: dict[int, int] = {}
+        self._schemas: dict[int | tuple[str, str, bytes], int] = {}
+        self._input, self._own = Tallies(), Tallies()
+        self._items = self._input.watched(log.messages())
+        self._waiting: CopiedMessage | CopiedChunk | None = None
+        # The messages of a chunk that was taken apart; they come before all else.
+        self._opened: deque[CopiedMessage] = deque()
+        self._maker = MessageMaker(info.parameters.occupancy)
+        self._sequence = 0
+        map_metadata: dict[str, str] = {}
+        for channel in log.channels():
+            self._register(channel)
+            if channel.topic == info.topic:
+                map_metadata = channel.metadata
+        for attachment in log.attachments():
+            self._writer.add_attachment(
+                attachment.create_time,
+                attachment.log_time,
+                attachment.name,
+                attachment.media_type,
+                attachment.data,
+            )
+        for record in log.metadata():
+            self._writer.add_metadata(record.name, record.metadata)
+        # The quality of service of the source's map, in its distribution's spelling.
+        qos = map_metadata.get("offered_qos_profiles", "[]")
+        self._qos = qos if qos.strip() not in ("", "[]") else LATCHED_QOS
+        self._added = {topic: self._add_channel(topic, kind) for topic, kind in ADDED.items()}
+        self._own_map = None if log.channels() or log.profile != "ros2" else self._map_channel()
+        self._writer.add_metadata(
+            METADATA, {name: str(value) for name, value in (info.versions | info.provenance).items()}
+        )
+
+    def _map_channel(self) -> int | None:
+        return self._add_channel(self._info.topic, GRID_TYPE) if not self._has_messages() else None
+
+    def _has_messages(self) -> bool:
+        self._waiting = next(self._items, None)
+        return self._waiting is not None
+
+    def write(self, frame: TrackedSnapshot) -> None:
+        """Copy the input up to the map's log time, then add what was found in the map."""
+        time_ns = frame.snapshot.log_time_ns
+        self._extent.add(frame)
+        self._frame_id = frame.analysis.geometry.frame_id
+        with self._writing():
+            self._copy_until(time_ns)
+            made = {
+                "/rose2/segmented_map": self._maker.segmented_map(frame),
+                "/rose2/clean_map": self._maker.clean_map(frame),
+                "/rose2/markers": self._maker.markers(frame),
+                "/rose2/rooms": self._maker.rooms(frame),
+            }
+            if self._own_map is not None:
+                self._add(self._own_map, time_ns, self._maker.source_map(frame))
+            for topic, data in made.items():
+                if data is not None:
+                    self._add(self._added[topic], time_ns, data)
+            self._sequence += 1
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        if kind is not None:
+            self._clean_up()
+            return
+        try:
+            with self._writing():
+                self._copy_until(None)
+                text = json.dumps(self._info.parameters.resolved(), indent=2)
+                self._writer.add_attachment(0, 0, ATTACHMENT, "application/json", text.encode())
+                self._writer.finish()
+                if self._file is not None:
+                    self._file.close()
+                self.copied = self._checked()
+                self._part.replace(self._path)
+                self._describe()
+        finally:
+            self._clean_up()
+
+    def _describe(self) -> None:
+        """Write what opens the file: layouts of viewers, and the bag's description."""
+        extent = self._extent
+        scene = MapScene(self._frame_id, self._info.topic, extent.low_m, extent.high_m, self._qos)
+        write_layouts(self._path, scene)
+        if self._is_bag:
+            write_bag_metadata(self._path, bag_metadata_path(self._path))
+
+    def _checked(self) -> dict[str, Any]:
+        # Channels that hold no message went over too.
+        read = {number: self._input[key] for key, number in self._channels.items()}
+        return checked_copy(self._part, str(self._path), read, self._own, self._input.closed_chunks)
+
+    def _copy_until(self, time_ns: int | None) -> None:
+        """Copy what was logged up to a time; a chunk that goes on after it is taken apart."""
+        while True:
+            if self._waiting is None:
+                self._waiting = self._opened.popleft() if self._opened else next(self._items, None)
+            item = self._waiting
+            if item is None or (time_ns is not None and item.log_time > time_ns):
+                return
+            self._waiting = None
+            if isinstance(item, CopiedMessage):
+                self._add_message(item)
+            elif time_ns is None or item.end_time <= time_ns:
+                self._copy_chunk(item)
+            else:
+                try:
+                    self._opened.extend(item.messages())
+                except DAMAGE:
+                    # Nothing of it can be told apart any more; it stays what it is.
+                    self._copy_chunk(item)
+
+    def _copy_chunk(self, chunk: CopiedChunk) -> None:
+        """Copy a chunk as it is, or message by message where the index behind it is damaged."""
+        try:
+            self._writer.copy_chunk(chunk.stream, chunk.index)
+            return
+        except ValueError:
+            pass
+        try:
+            messages = chunk.messages()
+        except DAMAGE as error:
+            begin = chunk.index.chunk_start_offset
+            text = f"{self._info.log_path}: the chunk at byte {begin} is damaged ({error}); it is not copied"
+            notice(logger, "not_copied", text, file=self._info.log_path)
+            self._input.leave_out(chunk)
+            return
+        for message in messages:
+            self._add_message(message)
+
+    def _add_message(self, message: CopiedMessage) -> None:
+        self._writer.add_message(
+            self._register(message.channel),
+            message.log_time,
+            message.data,
+            message.publish_time,
+            message.sequence,
+        )
+
+    def _register(self, channel: CopiedChannel) -> int:
+        if channel.key not in self._channels:
+            if channel.topic.startswith(PREFIX):
+                raise OutputError(
+                    f"{self._info.log_path}: holds {channel.topic} already; analyse the log it was made from"
+                )
+            if self._is_bag and channel.message_encoding != "cdr":
+                raise OutputError(
+                    f"{self._info.log_path}: {channel.topic} holds {channel.message_encoding or 'unknown'} "
+                    "messages, which no bag of ROS 2 can hold; leave --bag out"
+                )
+            schema = (channel.schema_name, channel.schema_encoding, channel.schema_data)
+            # The chunks that are copied name channels and schemas by their ids.
+            self._channels[channel.key] = self._writer.register_channel(
+                channel.topic,
+                channel.message_encoding,
+                self._schema(*schema, channel.schema_id) if any(schema) else 0,
+                channel.metadata,
+                channel.key,
+            )
+        return self._channels[channel.key]
+
+    def _schema(self, name: str, encoding: str, data: bytes, copied_id: int | None = None) -> int:
+        content = (name, encoding, data)
+        key = content if copied_id is None else copied_id
+        if key not in self._schemas:
+            made = self._writer.register_schema(name, encoding, data, copied_id)
+            self._schemas[key] = self._schemas[content] = made
+        return self._schemas[key]
+
+    def _add_channel(self, topic: str, kind: str) -> int:
+        schema = self._schema(kind, "ros2msg", self._maker.definition(kind))
+        return self._writer.register_channel(topic, "cdr", schema, {"offered_qos_profiles": self._qos})
+
+    def _add(self, channel: int, time_ns: int, data: bytearray) -> None:
+        self._own[channel].add(time_ns, time_ns, self._sequence, data)
+        self._writer.add_message(channel, time_ns, data, time_ns, self._sequence)
+
+    def _clean_up(self) -> None:
+        """Close both files; what has not been renamed by now is removed."""
+        if self._opened_source is not None:
+            self._opened_source.close()
+        if self._file is not None:
+            # Closing writes what waits: where the disk is full, that fails once more, and hides why it began.
+            with suppress(OSError):
+                self._file.close()
+        self._part.unlink(missing_ok=True)
+
+    @contextmanager
+    def _writing(self) -> Iterator[None]:
+        try:
+            yield
+        except (OSError, McapError) as error:
+            raise OutputError(f"{self._path}: cannot be written: {error}") from error

@@ -1,0 +1,75 @@
+"""``metadata.yaml`` of rosbag2, which makes a folder with an MCAP a bag that ``ros2 bag play`` takes."""
+
+from __future__ import annotations
+
+from copy import deepcopy
+from pathlib import Path
+from typing import Any
+
+import yaml
+from mcap.reader import make_reader
+
+from rose2_logs.errors import OutputError
+from rose2_logs.system.files import replacing
+
+VERSION = 5
+"""Of the format, that of Humble, which all later releases read."""
+
+
+def write_bag_metadata(log: Path, path: Path) -> None:
+    """Describe an MCAP of the ros2 profile that lies in the folder of the description.
+
+    Parameters
+    ----------
+    log : path
+        The MCAP, whole.
+    path : path
+        Where to.
+
+    Raises
+    ------
+    OutputError
+        If it cannot be written, or the MCAP has no summary.
+    """
+    with log.open("rb") as file:
+        summary = make_reader(file).get_summary()
+    if summary is None or summary.statistics is None:
+        raise OutputError(f"{path}: cannot be written: {log.name} has no summary")
+    statistics = summary.statistics
+    topics: dict[str, dict[str, Any]] = {}
+    for number, channel in sorted(summary.channels.items()):
+        if channel.schema_id not in summary.schemas:
+            continue  # without a type there is nothing that ROS could play
+        count = statistics.channel_message_counts.get(number, 0)
+        if channel.topic in topics:
+            topics[channel.topic]["message_count"] += count
+            continue
+        topics[channel.topic] = {
+            "topic_metadata": {
+                "name": channel.topic,
+                "type": summary.schemas[channel.schema_id].name,
+                "serialization_format": channel.message_encoding,
+                "offered_qos_profiles": channel.metadata.get("offered_qos_profiles", ""),
+            },
+            "message_count": count,
+        }
+    duration_ns = statistics.message_end_time - statistics.message_start_time
+    contents = {
+        "starting_time": {"nanoseconds_since_epoch": statistics.message_start_time},
+        "duration": {"nanoseconds": duration_ns},
+        "message_count": statistics.message_count,
+    }
+    described = {
+        "version": VERSION,
+        "storage_identifier": "mcap",
+        "relative_file_paths": [log.name],
+        **contents,
+        "topics_with_message_count": list(topics.values()),
+        "compression_format": "",
+        "compression_mode": "",
+        # A copy, which YAML would else write as a reference to the first.
+        "files": [{"path": log.name, **deepcopy(contents)}],
+    }
+    with replacing(path) as part:
+        text = yaml.safe_dump({"rosbag2_bagfile_information": described}, sort_keys=False)
+        part.write_text(text, encoding="utf-8")

@@ -1,0 +1,366 @@
+"""ROS 2 messages that the annotated MCAP writes, and their definitions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
+
+import cv2
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from rose2_logs.config.parameters import OccupancyParameters
+from rose2_logs.drawing.palette import track_colour
+from rose2_logs.model.occupancy import UNKNOWN, FloatArray, classify
+from rose2_logs.model.room_quality import unsure_sign
+from rose2_logs.outputs.mcap.cdr import CdrWriter
+from rose2_logs.tracking.track_history import evidence_of
+from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot
+
+if TYPE_CHECKING:
+    from rosbags.typesys.store import Typestore
+    from shapely.geometry.base import BaseGeometry
+
+ROOMS_TYPE = "rose2_msgs/msg/Rooms"
+ROOMS_DEFINITION = """\
+# The rooms of one map snapshot, found by rose2_logs.
+std_msgs/Header header      # stamp and frame of the map
+float64 coverage            # known free area over that of the run's last map, 0..1
+rose2_msgs/Room[] rooms
+"""
+ROOM_DEFINITION = """\
+uint32 track                # identity of the room over the run, never used again
+float64 area                # m2 of its known free cells
+float64 predicted_area      # m2 of its shape, the unseen part included
+geometry_msgs/Point label_point
+geometry_msgs/Polygon[] outline   # outer rings of its shape
+uint32[] neighbours         # tracks of the rooms that a doorway connects it with
+"""
+WRITTEN_TYPES = ("nav_msgs/msg/OccupancyGrid", "visualization_msgs/msg/MarkerArray", ROOMS_TYPE)
+HIGHEST_VALUE = 98
+"""`/rose2/segmented_map` holds 1 + (track - 1) % 98 for a room: between free 0 and occupied 100."""
+FILL_OPACITY = 0.45
+LABEL_HEIGHT_M = 0.5
+OUTLINE_WIDTH_M = 0.06
+LINE_WIDTH_M = 0.03
+MARKER_LAYERS = ("rooms", "lines", "walls", "outlines", "doorways", "labels")
+"""Namespaces of markers, the lowest first."""
+LAYER_STEP_M = 0.01
+DEFAULT_OCCUPANCY = OccupancyParameters()
+TOUCH_M = 1e-3
+"""How much wider a shape is drawn that cannot be triangulated as it is: far below a cell."""
+ADD, DELETE_ALL = 0, 3
+LINE_LIST, TEXT, TRIANGLES = 5, 9, 11
+NO_TURN = (0.0, 0.0, 0.0, 1.0)
+"""Quaternion x, y, z, w."""
+
+
+def ros2_typestore(extra: Mapping[str, Any] | None = None, wanted: Iterable[str] | None = None) -> Typestore:
+    """Build a store with the ROS 2 types, what a log defines besides, and the rooms message.
+
+    Parameters
+    ----------
+    extra : mapping of type name to fields, optional
+        Definitions of a bag; ROS 2's own Header wins over that of ROS 1.
+    wanted : iterable of str, optional
+        Types that are enough, with all that they are made of: each takes its time.
+    """
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+    ros2 = get_typestore(Stores.ROS2_HUMBLE)
+    store = get_typestore(Stores.EMPTY)
+    own: dict[str, Any] = {}
+    own.update(get_types_from_msg(ROOM_DEFINITION, "rose2_msgs/msg/Room"))
+    own.update(get_types_from_msg(ROOMS_DEFINITION, ROOMS_TYPE))
+    definitions = {**ros2.fielddefs, **(extra or {}), **own}
+    definitions["std_msgs/msg/Header"] = ros2.fielddefs["std_msgs/msg/Header"]
+    store.register(definitions if wanted is None else _needed(definitions, wanted))
+    return store
+
+
+def _needed(definitions: Mapping[str, Any], wanted: Iterable[str]) -> dict[str, Any]:
+    """Those of some definitions that the wanted types are made of."""
+    found: dict[str, Any] = {}
+    left = list(wanted)
+    while left:
+        name = left.pop()
+        if name in definitions and name not in found:
+            found[name] = definitions[name]
+            left += [_type_name(kind) for _, kind in definitions[name][1]]
+    return found
+
+
+def _type_name(kind: Any) -> str:
+    """Name of a field's type, or of the elements of an array; of types without fields it does not matter."""
+    _, inner = kind
+    # A name, or for an array the kind of its elements and their number, or for a number its name and size.
+    return (
+        inner if isinstance(inner, str) else inner[0] if isinstance(inner[0], str) else _type_name(inner[0])
+    )
+
+
+class MessageMaker:
+    """Makes the serialised messages of a snapshot.
+
+    Parameters
+    ----------
+    occupancy : OccupancyParameters
+        Which cells are free and which are occupied.
+    """
+
+    def __init__(self, occupancy: OccupancyParameters = DEFAULT_OCCUPANCY) -> None:
+        self._store = ros2_typestore(wanted=WRITTEN_TYPES)
+        self._triangles = Triangles()
+        # What the segmented map holds outside of rooms for each value of a cell, as an unsigned byte.
+        values = np.arange(256, dtype=np.uint8).view(np.int8)
+        free, occupied = classify(values, occupancy)
+        self._unroomed = np.where(occupied, np.int8(100), np.where(free, np.int8(0), np.int8(UNKNOWN)))
+
+    def definition(self, message_type: str) -> bytes:
+        """Text of a type's definition with all it is made of, as MCAP's ros2msg schema."""
+        return self._store.generate_msgdef(message_type, ros_version=2)[0].encode()
+
+    def source_map(self, frame: TrackedSnapshot) -> bytearray:
+        """Make the map itself, for inputs that are no log of messages."""
+        return _grid(frame, frame.snapshot.cells)
+
+    def segmented_map(self, frame: TrackedSnapshot) -> bytearray:
+        """Make the segmented map: rooms as 1..98, occupied 100, other free cells 0, all others -1."""
+        values = np.array([0, *(1 + (track - 1) % HIGHEST_VALUE for track in frame.track_ids)], np.int8)
+        labels = frame.analysis.rooms.labels
+        # A probability, as some maps hold, would look like a room.
+        known = np.ascontiguousarray(frame.snapshot.cells).view(np.uint8)
+        cells = cv2.LUT(known, self._unroomed.view(np.uint8)).view(np.int8)
+        np.copyto(cells, values.take(labels, mode="clip"), where=labels > 0)
+        return _grid(frame, cells)
+
+    def clean_map(self, frame: TrackedSnapshot) -> bytearray | None:
+        """Make the clean map: 100 where structure, 0 where free or clutter, -1 unknown; None without one."""
+        structure = frame.analysis.structure
+        if structure is None:
+            return None
+        known = np.minimum(frame.snapshot.cells, np.int8(0))
+        np.copyto(known, np.int8(100), where=structure.clean)
+        return _grid(frame, known)
+
+    def rooms(self, frame: TrackedSnapshot) -> bytearray:
+        """Make the rooms message, by ascending track."""
+        rooms, tracks = frame.analysis.rooms, frame.track_ids
+        message = CdrWriter()
+        message.header(frame.snapshot.stamp_ns, frame.analysis.geometry.frame_id)
+        message.numbers("d", frame.coverage)
+        message.numbers("I", len(rooms))
+        points = np.nan_to_num(rooms.label_points_m).tolist()
+        for track, number in sorted(zip(tracks, range(1, len(rooms) + 1), strict=True)):
+            shape = rooms.polygons[number - 1]
+            message.numbers("I", track)
+            message.numbers("d", float(rooms.areas_m2[number - 1]), shape.area, *points[number - 1], 0.0)
+            rings = rooms.outer_rings_m[number - 1]
+            message.numbers("I", len(rings))
+            for ring in rings:
+                # The last corner of a ring repeats the first; a ROS polygon closes by itself.
+                message.points(ring[:-1], np.float32)
+            neighbours = sorted(tracks[other - 1] for other in rooms.neighbours(number))
+            message.sequence(np.array(neighbours, np.uint32))
+        return message.message()
+
+    def markers(self, frame: TrackedSnapshot) -> bytearray:
+        """Make the markers: all old ones deleted, then fills, outlines, labels, walls, lines, doorways."""
+        analysis, rooms = frame.analysis, frame.analysis.rooms
+        made = [Marker("", 0, TRIANGLES, action=DELETE_ALL)]
+        points = np.nan_to_num(rooms.label_points_m).tolist()
+        corners = self._triangles.corners_of(rooms.polygons)
+        for track, number in sorted(zip(frame.track_ids, range(len(rooms)), strict=True)):
+            red, green, blue = (value / 255 for value in track_colour(track))
+            fill, line = (red, green, blue, FILL_OPACITY), (red * 0.7, green * 0.7, blue * 0.7, 1.0)
+            x, y = points[number]
+            sign = unsure_sign(evidence_of(frame, number)[0])
+            made += [
+                Marker("rooms", track, TRIANGLES, corners[number], fill),
+                Marker(
+                    "outlines",
+                    track,
+                    LINE_LIST,
+                    ring_segments(rooms.outer_rings_m[number]),
+                    line,
+                    OUTLINE_WIDTH_M,
+                ),
+                Marker(
+                    "labels",
+                    track,
+                    TEXT,
+                    colour=(0.0, 0.0, 0.0, 1.0),
+                    width_m=LABEL_HEIGHT_M,
+                    text=f"{track}{sign}\n{rooms.areas_m2[number]:.0f} m2",
+                    position_m=(x, y),
+                ),
+            ]
+        if analysis.walls is not None:
+            walls, lines = analysis.walls.segments_m.reshape(-1, 2), analysis.walls.lines_m.reshape(-1, 2)
+            made.append(Marker("walls", 0, LINE_LIST, walls, (0.1, 0.1, 0.1, 1.0), OUTLINE_WIDTH_M))
+            made.append(Marker("lines", 0, LINE_LIST, lines, (0.2, 0.4, 0.9, 0.35), LINE_WIDTH_M))
+        doors = np.array([door.ends_m for door in rooms.doorways]).reshape(-1, 2)
+        made.append(Marker("doorways", 0, LINE_LIST, doors, (0.9, 0.3, 0.1, 1.0), OUTLINE_WIDTH_M))
+        # One above the other, so that none flickers through another or through the map.
+        heights = {name: LAYER_STEP_M * (layer + 1) for layer, name in enumerate(MARKER_LAYERS)}
+        message = CdrWriter()
+        message.numbers("I", len(made))
+        shared = SharedFields.of(frame.snapshot.stamp_ns, analysis.geometry.frame_id)
+        for marker in made:
+            marker.write(message, shared, heights.get(marker.ns, 0.0))
+        return message.message()
+
+
+class SharedFields(NamedTuple):
+    """What all markers of a map have in common, as it stands in the message from an aligned place on.
+
+    Attributes
+    ----------
+    header : bytes
+        Stamp and frame.
+    after_points : bytes
+        Colours and texture, of which there are none, up to the text.
+    after_text : bytes
+        The mesh, of which there is none.
+    """
+
+    header: bytes
+    after_points: bytes
+    after_text: bytes
+
+    @classmethod
+    def of(cls, stamp_ns: int, frame_id: str) -> Self:
+        """Write the fields."""
+        header, after_points, after_text = CdrWriter(), CdrWriter(), CdrWriter()
+        header.header(stamp_ns, frame_id)
+        after_points.numbers("I", 0)  # colors
+        after_points.string("")  # texture_resource
+        after_points.header(stamp_ns, frame_id)  # texture: an empty picture
+        after_points.string("")
+        after_points.numbers("I", 0, 0)  # data of the texture, uv_coordinates
+        after_text.string("")  # mesh_resource
+        after_text.string("")  # mesh_file: its name and data
+        after_text.numbers("I", 0)
+        after_text.numbers("B", 0)  # mesh_use_embedded_materials
+        return cls(*(bytes(each.fields()) for each in (header, after_points, after_text)))
+
+
+@dataclass(frozen=True, eq=False)
+class Marker:
+    """What differs between the markers of a map: the fields of a visualization_msgs/Marker.
+
+    Attributes
+    ----------
+    ns, number : str, int
+        Namespace and id.
+    kind : int
+        Its type.
+    points_m : (N, 2) float
+        World metres.
+    colour : (float, float, float, float)
+        Red, green, blue, opacity in [0, 1].
+    width_m : float
+        Scale: the width of lines, the height of text.
+    action : int
+        To add it or to delete all.
+    text : str
+        What it says.
+    position_m : (float, float)
+        Where the text stands.
+    """
+
+    ns: str
+    number: int
+    kind: int
+    points_m: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
+    colour: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+    width_m: float = 1.0
+    action: int = ADD
+    text: str = ""
+    position_m: tuple[float, float] = (0.0, 0.0)
+
+    def write(self, message: CdrWriter, shared: SharedFields, height_m: float) -> None:
+        """Append the marker, so high above the map."""
+        width_m = self.width_m
+        message.written(shared.header, 4)
+        message.string(self.ns)
+        message.numbers("i", self.number, self.kind, self.action)
+        message.numbers("d", *self.position_m, height_m, *NO_TURN, width_m, width_m, width_m)
+        message.numbers("f", *self.colour)
+        message.numbers("i", 0, 0)  # lifetime: for ever
+        message.numbers("B", 0)  # frame_locked
+        message.points(self.points_m)
+        message.written(shared.after_points, 4)
+        message.string(self.text)
+        message.written(shared.after_text, 4)
+
+
+def _grid(frame: TrackedSnapshot, cells: NDArray[np.int8]) -> bytearray:
+    """Make a nav_msgs/OccupancyGrid with the stamp and the geometry of the map."""
+    geometry, stamp_ns = frame.analysis.geometry, frame.snapshot.stamp_ns
+    message = CdrWriter()
+    message.header(stamp_ns, geometry.frame_id)
+    message.time(stamp_ns)  # map_load_time
+    message.numbers("f", geometry.resolution_m)
+    message.numbers("I", geometry.shape[1], geometry.shape[0])
+    half = geometry.yaw_rad / 2
+    message.numbers("d", *geometry.origin_xy_m, 0.0, 0.0, 0.0, float(np.sin(half)), float(np.cos(half)))
+    message.sequence(cells.astype(np.int8, copy=False).ravel())
+    return message.message()
+
+
+class Triangles:
+    """Fills shapes with triangles; what it found for those of the map before, it gives again.
+
+    Many a part of a shape is that of the map before, and large ones take long.
+    """
+
+    def __init__(self) -> None:
+        self._known: dict[bytes, FloatArray] = {}
+
+    def corners_of(self, shapes: Sequence[BaseGeometry]) -> list[FloatArray]:
+        """Corners (3 K, 2) of the triangles of each shape, world metres."""
+        parts, shape = shapely.get_parts(np.array(shapes, object), return_index=True)
+        keys = shapely.to_wkb(parts).tolist()
+        new = {key: number for number, key in enumerate(keys) if key not in self._known}
+        found = self._known | dict(zip(new, _triangulated(parts[list(new.values())]), strict=True))
+        self._known = {key: found[key] for key in keys}
+        corners: list[list[FloatArray]] = [[np.zeros((0, 2))] for _ in shapes]
+        for number, key in zip(shape.tolist(), keys, strict=True):
+            corners[number].append(found[key])
+        return [np.concatenate(each) for each in corners]
+
+
+def _triangulated(parts: NDArray[np.object_]) -> list[FloatArray]:
+    """Corners (3 K, 2) of the triangles of each polygon.
+
+    GEOS fails on some outlines of cells in which a ring touches itself at a corner; a hair wider they touch
+    along a line instead, and it does not.
+    """
+    try:
+        found = shapely.constrained_delaunay_triangles(parts)
+    except shapely.errors.GEOSException:
+        if len(parts) > 1:
+            return [corners for part in parts for corners in _triangulated(np.array([part]))]
+        wider = shapely.buffer(parts, TOUCH_M, join_style="mitre")
+        found = shapely.constrained_delaunay_triangles(wider)
+    triangles, part = shapely.get_parts(found, return_index=True)
+    corners = shapely.get_coordinates(triangles).reshape(-1, 4, 2)[:, :3]
+    ends = np.cumsum(np.bincount(part, minlength=len(parts)))
+    return [each.reshape(-1, 2) for each in np.split(corners, ends[:-1])] if len(parts) else []
+
+
+def outer_rings(shape: BaseGeometry) -> list[FloatArray]:
+    """Closed outer rings (K, 2) of the polygons of a shape, world metres."""
+    parts = shapely.get_parts(shape)
+    rings = shapely.get_exterior_ring(parts[shapely.get_type_id(parts) == shapely.GeometryType.POLYGON])
+    points, ring = shapely.get_coordinates(rings, return_index=True)
+    return np.split(points, np.flatnonzero(np.diff(ring)) + 1) if len(points) else []
+
+
+def ring_segments(rings: Sequence[FloatArray]) -> FloatArray:
+    """Ends (2 N, 2) of the segments that closed rings are made of, world metres."""
+    ends = [np.repeat(ring, 2, axis=0)[1:-1] for ring in rings]
+    return np.concatenate([np.zeros((0, 2)), *ends])

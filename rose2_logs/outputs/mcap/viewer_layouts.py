@@ -1,0 +1,282 @@
+"""How Foxglove and RViz2 open an annotated log: a layout and a configuration with everything in sight."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from rose2_logs.model.occupancy import FloatArray
+from rose2_logs.outputs.mcap.ros_messages import MARKER_LAYERS
+from rose2_logs.system.files import replacing
+
+MARGIN = 1.1
+"""Of what is in sight, over the rooms themselves."""
+RVIZ_VIEW_PX = (1100, 850)
+"""Width and height of RViz's view of the world in the window that the configuration asks for."""
+RVIZ_WINDOW_PX = (1500, 950)
+FOXGLOVE_ASPECT = 1.3
+"""Width over height of Foxglove's large panel in a window of usual shape."""
+MAP_ALPHA = 0.7
+TRANSIENT_LOCAL, VOLATILE = "Transient Local", "Volatile"
+RELIABLE, BEST_EFFORT = "Reliable", "Best Effort"
+
+
+@dataclass(frozen=True, eq=False)
+class MapScene:
+    """What is to be seen.
+
+    Attributes
+    ----------
+    frame_id : str
+        Frame of the map.
+    map_topic : str
+        Where the map is sent.
+    low_m, high_m : (2,) float
+        Corners of the part of the world to look at, metres.
+    qos : str
+        Quality of service that all these topics are offered with, in rosbag2's spelling.
+    """
+
+    frame_id: str
+    map_topic: str
+    low_m: FloatArray
+    high_m: FloatArray
+    qos: str
+
+    @property
+    def centre_m(self) -> tuple[float, float]:
+        """Middle of what is in sight."""
+        x, y = ((self.low_m + self.high_m) / 2).tolist()
+        return x, y
+
+    def height_m(self, aspect: float) -> float:
+        """Height of the least view of some width over height that shows everything."""
+        width, height = self.high_m - self.low_m
+        return MARGIN * float(max(width / aspect, height, 1.0))
+
+
+def foxglove_path(log: Path) -> Path:
+    """Where the layout of an annotated log stands."""
+    return log.with_suffix(".foxglove.json")
+
+
+def rviz_path(log: Path) -> Path:
+    """Where the configuration for an annotated log stands."""
+    return log.with_suffix(".rviz")
+
+
+def bag_metadata_path(log: Path) -> Path:
+    """Where rosbag2 looks for the description of the bag that an annotated log makes."""
+    return log.with_name("metadata.yaml")
+
+
+def write_layouts(log: Path, scene: MapScene) -> None:
+    """Write layout and configuration beside an annotated log.
+
+    Raises
+    ------
+    OutputError
+        If one cannot be written.
+    """
+    with replacing(foxglove_path(log)) as part:
+        part.write_text(json.dumps(foxglove_layout(scene), indent=2) + "\n", encoding="utf-8")
+    with replacing(rviz_path(log)) as part:
+        part.write_text(yaml.safe_dump(rviz_config(scene), sort_keys=False), encoding="utf-8")
+
+
+def foxglove_layout(scene: MapScene) -> dict[str, Any]:
+    """Make a layout: rooms over the map, the clean map, coverage and number of rooms, the robot's frames."""
+    rooms = {
+        scene.map_topic: {"visible": True, "colorMode": "map", "alpha": MAP_ALPHA},
+        "/rose2/markers": {
+            "visible": True,
+            "namespaces": {name: {"visible": True} for name in MARKER_LAYERS},
+        },
+        "/rose2/segmented_map": {"visible": False},
+        "/rose2/clean_map": {"visible": False, "colorMode": "map"},
+    }
+    clean = {
+        "/rose2/clean_map": {"visible": True, "colorMode": "map"},
+        scene.map_topic: {"visible": False},
+        "/rose2/segmented_map": {"visible": False},
+        "/rose2/markers": {"visible": False},
+    }
+    return {
+        "configById": {
+            "3D!rooms": _foxglove_world("Rooms", scene, rooms),
+            "3D!clean": _foxglove_world("Clean map", scene, clean),
+            "Plot!coverage": _foxglove_plot("Coverage", "/rose2/rooms.coverage"),
+            "Plot!rooms": _foxglove_plot("Number of rooms", "/rose2/rooms.rooms.length"),
+        },
+        "globalVariables": {},
+        "userNodes": {},
+        "playbackConfig": {"speed": 1},
+        "layout": {
+            "direction": "row",
+            "splitPercentage": 70,
+            "first": "3D!rooms",
+            "second": {
+                "direction": "column",
+                "splitPercentage": 50,
+                "first": "3D!clean",
+                "second": {
+                    "direction": "column",
+                    "splitPercentage": 50,
+                    "first": "Plot!coverage",
+                    "second": "Plot!rooms",
+                },
+            },
+        },
+    }
+
+
+def _foxglove_world(title: str, scene: MapScene, topics: dict[str, Any]) -> dict[str, Any]:
+    x, y = scene.centre_m
+    return {
+        "foxglovePanelTitle": title,
+        "cameraState": {
+            # Seen straight from above, without perspective; the distance is the height of what is in sight.
+            "perspective": False,
+            "phi": 0,
+            "thetaOffset": 0,
+            "distance": scene.height_m(FOXGLOVE_ASPECT),
+            "target": [0, 0, 0],
+            "targetOffset": [x, y, 0],
+            "targetOrientation": [0, 0, 0, 1],
+            "fovy": 45,
+            "near": 0.5,
+            "far": 5000,
+        },
+        "followMode": "follow-none",
+        "followTf": scene.frame_id,
+        "scene": {"labelScaleFactor": 1, "transforms": {"showLabel": False, "axisScale": 0.5}},
+        "transforms": {},
+        "topics": topics,
+        "layers": {},
+    }
+
+
+def _foxglove_plot(title: str, path: str) -> dict[str, Any]:
+    return {
+        "foxglovePanelTitle": title,
+        "title": title,
+        "paths": [{"value": path, "enabled": True, "timestampMethod": "receiveTime"}],
+        "xAxisVal": "timestamp",
+        "showLegend": False,
+        "isSynced": True,
+        "showXAxisLabels": True,
+        "showYAxisLabels": True,
+    }
+
+
+def rviz_config(scene: MapScene) -> dict[str, Any]:
+    """Make a configuration of RViz2: the maps, the markers over them, the frames, seen from above."""
+    x, y = scene.centre_m
+    width, height = RVIZ_VIEW_PX
+    displays = [
+        _rviz_map("Map", scene.map_topic, scene, is_on=True),
+        _rviz_map("Clean map", "/rose2/clean_map", scene, is_on=False),
+        _rviz_map("Segmented map", "/rose2/segmented_map", scene, is_on=False, colours="costmap"),
+        {
+            "Class": "rviz_default_plugins/MarkerArray",
+            "Name": "Rooms",
+            "Enabled": True,
+            "Namespaces": dict.fromkeys(MARKER_LAYERS, True),
+            "Topic": _rviz_topic("/rose2/markers", scene),
+            "Value": True,
+        },
+        {
+            "Class": "rviz_default_plugins/TF",
+            "Name": "Frames",
+            "Enabled": True,
+            "Marker Scale": 1,
+            "Show Arrows": False,
+            "Show Axes": True,
+            "Show Names": True,
+            "Value": True,
+        },
+    ]
+    return {
+        "Panels": [
+            {"Class": "rviz_common/Displays", "Name": "Displays"},
+            {"Class": "rviz_common/Views", "Name": "Views"},
+            {"Class": "rviz_common/Time", "Name": "Time"},
+        ],
+        "Visualization Manager": {
+            "Class": "",
+            "Displays": displays,
+            "Enabled": True,
+            "Global Options": {
+                "Background Color": "236; 236; 236",
+                "Fixed Frame": scene.frame_id,
+                "Frame Rate": 30,
+            },
+            "Name": "root",
+            "Tools": [
+                {"Class": f"rviz_default_plugins/{name}"}
+                for name in ("Interact", "MoveCamera", "Select", "FocusCamera", "Measure")
+            ],
+            "Value": True,
+            "Views": {
+                "Current": {
+                    "Class": "rviz_default_plugins/TopDownOrtho",
+                    "Name": "Current View",
+                    "Angle": 0,
+                    "Scale": height / scene.height_m(width / height),
+                    "Target Frame": "<Fixed Frame>",
+                    "Value": "TopDownOrtho (rviz_default_plugins)",
+                    "X": x,
+                    "Y": y,
+                },
+                "Saved": None,
+            },
+        },
+        "Window Geometry": {"Width": RVIZ_WINDOW_PX[0], "Height": RVIZ_WINDOW_PX[1]},
+    }
+
+
+def _rviz_map(name: str, topic: str, scene: MapScene, *, is_on: bool, colours: str = "map") -> dict[str, Any]:
+    return {
+        "Class": "rviz_default_plugins/Map",
+        "Name": name,
+        "Enabled": is_on,
+        "Alpha": MAP_ALPHA,
+        "Color Scheme": colours,
+        "Draw Behind": True,
+        "Topic": _rviz_topic(topic, scene),
+        "Update Topic": _rviz_topic(f"{topic}_updates", scene),
+        "Use Timestamp": False,
+        "Value": is_on,
+    }
+
+
+def _rviz_topic(topic: str, scene: MapScene) -> dict[str, Any]:
+    """Ask for what is offered: a subscriber that asks for more is not served."""
+    durability, reliability = offered(scene.qos)
+    return {
+        "Depth": 1,
+        "Durability Policy": durability,
+        "History Policy": "Keep Last",
+        "Reliability Policy": reliability,
+        "Value": topic,
+    }
+
+
+def offered(qos: str) -> tuple[str, str]:
+    """Durability and reliability of a topic, as RViz spells them, from rosbag2's list of its publishers.
+
+    Numbers, up to the release Iron, are those of rmw: 1 is transient local and reliable.
+    """
+    try:
+        profiles = yaml.safe_load(qos)
+    except yaml.YAMLError:
+        profiles = None
+    if not isinstance(profiles, list) or not all(isinstance(each, dict) for each in profiles):
+        profiles = []
+    durable = all(each.get("durability") in (1, "transient_local") for each in profiles)
+    reliable = all(each.get("reliability") in (1, "reliable") for each in profiles)
+    return TRANSIENT_LOCAL if durable else VOLATILE, RELIABLE if reliable else BEST_EFFORT

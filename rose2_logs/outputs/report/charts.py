@@ -1,0 +1,237 @@
+"""The report's curves, each over coverage and over time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rose2_logs.drawing.chart import Mark, Series, lane_chart, line_chart
+from rose2_logs.drawing.palette import state_colours
+from rose2_logs.model.occupancy import BoolArray, FloatArray, IntArray
+from rose2_logs.model.room_quality import UNSURE_SIGN, unsure_sign
+from rose2_logs.outputs.report.words import css, css_colour, duration
+from rose2_logs.runs.folder import RunResults
+
+BLUE, ORANGE, GREEN, VIOLET = "#2f7ed8", "#e07b1a", "#2a9d5c", "#8a5fd0"
+AREAS_MOST = 8
+"""Rooms whose area is drawn: the largest of the last map."""
+TRACK_COLUMNS = ["track", "shape_right_snapshot", "area_settled_snapshot", "outline_wall_share"]
+LANES_MOST = 80
+"""Rooms whose presence is drawn: those that were there in most maps."""
+
+
+@dataclass(frozen=True)
+class Chart:
+    """A chart twice, and what its curves are.
+
+    Attributes
+    ----------
+    title, meaning : str
+    legend : tuple of (str, str)
+        Names and CSS colours of the curves; empty where the chart names them itself.
+    over_coverage, over_time : str
+        SVG.
+    is_wide : bool
+        Whether it takes the page's width.
+    """
+
+    title: str
+    meaning: str
+    legend: tuple[tuple[str, str], ...]
+    over_coverage: str
+    over_time: str
+    is_wide: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class RunAxis:
+    """A horizontal axis along the run: its values at the maps, ascending, its name, its ends, its marks."""
+
+    x: FloatArray
+    label: str
+    ends: tuple[float, float] | None
+    marks: list[Mark]
+
+
+def run_charts(results: RunResults) -> list[Chart]:
+    """Draw everything that changes along a run."""
+    snapshots = results.snapshots
+    axes = run_axes(results)
+    numbers, present, areas = _rooms(results)
+
+    def chart(
+        title: str, meaning: str, series: Sequence[Series], y_range: tuple[float, float] | None = None
+    ) -> Chart:
+        drawn = [
+            line_chart(
+                axis.x,
+                series,
+                title=title,
+                x_label=axis.label,
+                marks=axis.marks,
+                x_range=axis.ends,
+                y_range=y_range,
+            )
+            for axis in axes
+        ]
+        return Chart(title, meaning, tuple((each.name, each.colour) for each in series), drawn[0], drawn[1])
+
+    def percent(name: str) -> FloatArray:
+        return 100 * snapshots[name].astype(float)
+
+    whole = (0.0, 100.0)
+    in_last = np.flatnonzero(present[:, -1])
+    largest = in_last[np.argsort(-areas[in_last, -1], kind="stable")[:AREAS_MOST]]
+    charts = [
+        chart(
+            "How much of the last layout was there",
+            "Share of the last layout in rooms that overlap their last shape by 0.8; mean overlap of all.",
+            [
+                Series("share of the layout, %", percent("final_share"), GREEN),
+                Series("mean overlap, %", percent("final_iou"), BLUE),
+            ],
+            whole,
+        ),
+        chart(
+            "How much the layout changed from map to map",
+            "Variation of information between the rooms of a map and of the one before; 0 is the same rooms.",
+            [Series("variation, bits", snapshots["variation_bits"].astype(float), VIOLET)],
+        ),
+        chart(
+            "Rooms and doorways",
+            "",
+            [
+                Series("rooms", snapshots["rooms"].astype(float), BLUE),
+                Series("doorways", snapshots["doorways"].astype(float), ORANGE),
+            ],
+        ),
+        chart(
+            "Area, m²",
+            "Known free floor, and the rooms with their predicted parts.",
+            [
+                Series("free", snapshots["free_area_m2"].astype(float), GREEN),
+                Series("rooms, seen", snapshots["rooms_area_m2"].astype(float), BLUE),
+                Series(
+                    "rooms with predicted parts", snapshots["rooms_predicted_area_m2"].astype(float), ORANGE
+                ),
+            ],
+        ),
+        _coverage_chart(axes[1], percent("coverage")),
+        chart(
+            "Area of the largest rooms, m²",
+            "As far as they were seen.",
+            [Series(f"Room {numbers[k]}", areas[k], css_colour(int(numbers[k]))) for k in largest],
+        )
+        if len(largest)
+        else None,
+    ]
+    return [each for each in charts if each is not None] + _lanes(results, axes, numbers, present)
+
+
+def _coverage_chart(axis: RunAxis, coverage: FloatArray) -> Chart:
+    """Coverage, which stands over time in any case."""
+    title = "Coverage over time, %"
+    series = Series("coverage", coverage, GREEN)
+    drawn = line_chart(
+        axis.x,
+        [series],
+        title=title,
+        x_label=axis.label,
+        marks=axis.marks,
+        x_range=axis.ends,
+        y_range=(0.0, 100.0),
+    )
+    return Chart(title, "Known free area over that of the last map.", (), drawn, drawn)
+
+
+def run_marks(results: RunResults) -> list[tuple[int, str, str]]:
+    """What the curves mark: at which map, in words, and its kind, ``final`` or ``shifted``."""
+    final = results.summary.get("layout", {}).get("final_since")
+    marks: list[tuple[int, str, str]] = []
+    if final is not None:
+        marks.append((final["snapshot"], f"layout final from here on, {duration(final['time_s'])}", "final"))
+    events = results.table("events", ["snapshot", "kind"]).to_pylist()
+    marks += [
+        (event["snapshot"], "the whole map shifted", "shifted")
+        for event in events
+        if event["kind"] == "shifted"
+    ]
+    return [mark for mark in marks if mark[0] in results.snapshots["snapshot"]]
+
+
+def run_axes(results: RunResults) -> tuple[RunAxis, RunAxis]:
+    """Coverage in percent, and time in minutes or seconds."""
+    snapshots = results.snapshots
+    time_s = snapshots["time_s"].astype(float)
+    in_minutes = time_s[-1] >= 300
+    time = time_s / 60 if in_minutes else time_s
+    # A map that covers less than one before it, as after a loop closure, does not draw the curve back.
+    coverage = 100 * np.maximum.accumulate(snapshots["coverage"].astype(float))
+    marks = run_marks(results)
+    places = {int(number): place for place, number in enumerate(snapshots["snapshot"])}
+
+    def axis(x: FloatArray, label: str, ends: tuple[float, float] | None) -> RunAxis:
+        return RunAxis(x, label, ends, [Mark(float(x[places[at]]), text, kind) for at, text, kind in marks])
+
+    lowest = min(float(np.floor(coverage[0] / 10) * 10), 90.0)
+    ends = (0.0, float(time[-1])) if time[-1] > 0 else None
+    return (
+        axis(coverage, "coverage, %", (lowest, 100.0)),
+        axis(time, "time, min" if in_minutes else "time, s", ends),
+    )
+
+
+def _rooms(results: RunResults) -> tuple[np.ndarray, BoolArray, FloatArray]:
+    """Tracks (R,), which maps show them (R, N), and their areas (R, N), NaN where they are not."""
+    table = results.table("rooms", ["snapshot", "track", "area_m2"])
+    snapshot, track, area = (table[name].to_numpy() for name in ("snapshot", "track", "area_m2"))
+    numbers, row = np.unique(track, return_inverse=True)
+    column = np.searchsorted(results.snapshots["snapshot"], snapshot)
+    areas = np.full((len(numbers), len(results.snapshots["snapshot"])), np.nan)
+    areas[row, column] = area
+    return numbers, np.isfinite(areas), areas
+
+
+def _lanes(
+    results: RunResults, axes: Sequence[RunAxis], numbers: np.ndarray, present: BoolArray
+) -> list[Chart]:
+    shown = np.sort(np.argsort(-present.sum(1), kind="stable")[:LANES_MOST])
+    if not len(shown):
+        return []
+    lives = {row["track"]: row for row in results.table("tracks", TRACK_COLUMNS).to_pylist()}
+    rows = [lives[int(number)] for number in numbers[shown]]
+    title = "When each room was there, and when it was right"
+    names = [f"{row['track']}{unsure_sign(row['outline_wall_share'])}" for row in rows]
+    colours = [{state: css(colour) for state, colour in state_colours(row["track"]).items()} for row in rows]
+    states = _states(results.snapshots["snapshot"], rows, present[shown])
+    draw: Callable[[RunAxis], str] = lambda axis: lane_chart(  # noqa: E731
+        axis.x,
+        states,
+        names,
+        colours,
+        title=title,
+        x_label=axis.label,
+        marks=axis.marks,
+        x_range=axis.ends,
+    )
+    left_out = len(numbers) - len(shown)
+    meaning = (
+        "A lane for each room, by its number: pale while it forms, stronger once its shape was right, full "
+        f"once its area has settled. {UNSURE_SIGN}: few walls back its last outline."
+    ) + (f" {left_out} rooms that were there only shortly are left out." if left_out else "")
+    legend = tuple(colours[0].items())
+    return [Chart(title, meaning, legend, draw(axes[0]), draw(axes[1]), is_wide=True)]
+
+
+def _states(snapshots: np.ndarray, rows: Sequence[dict[str, Any]], present: BoolArray) -> IntArray:
+    """State (R, N) of each room at each map: 1 forming, 2 shape right, 3 settled, 0 where it is not."""
+    never = np.inf
+    shaped, settled = (
+        np.array([never if row[name] is None else row[name] for row in rows], float)[:, None]
+        for name in ("shape_right_snapshot", "area_settled_snapshot")
+    )
+    states = np.where(snapshots >= settled, 3, np.where(snapshots >= shaped, 2, 1))
+    return np.where(present, states, 0)

@@ -1,0 +1,198 @@
+"""What the report says of a run in words: the figures at its head, and what is worth a look."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rose2_logs.model.room_plan import RoomPlan
+from rose2_logs.outputs.report.words import MISSING, date_of, duration, size
+from rose2_logs.runs.folder import RunResults
+from rose2_logs.system.text import percent
+
+LATE_COVERAGE = 0.95
+"""A layout that became final only beyond would likely have changed if the run had gone on."""
+FRONTIER_MIN_M = 2.0
+"""Open frontiers from this length on are told: a doorway's width and more."""
+PREDICTED_SHARE = 0.25
+"""Rooms of whose shape more than this share was not seen are told."""
+NAMED_MOST = 6
+"""Rooms named in one sentence."""
+NOT_FINAL = "not reached"
+
+
+@dataclass(frozen=True)
+class Tile:
+    """One figure at the head: what, how much, and a few words more."""
+
+    name: str
+    value: str
+    more: str = ""
+
+
+@dataclass(frozen=True)
+class Note:
+    """A sentence about what is worth a look; a warning or merely good to know."""
+
+    text: str
+    is_warning: bool = True
+
+
+def subtitle(results: RunResults) -> list[tuple[str, str]]:
+    """Log, time, topic and method, by name."""
+    summary, found = results.summary, results.summary["results"]
+    span = results.snapshots["time_s"][-1]
+    date = date_of(found.get("first_log_time_ns"))
+    began = f"{date}, " if date else ""
+    source = summary.get("input", {})
+    length = size(source["size_bytes"]) if "size_bytes" in source else ""
+    about = ", ".join(part for part in (source.get("format", ""), length) if part)
+    return [
+        ("Log", f"{summary['log']} ({about})" if about else str(summary["log"])),
+        ("Recorded", f"{began}{duration(span)} from the first to the last map"),
+        ("Map topic", f"{summary['topic']} in frame {results.snapshots['frame_id'][-1]}"),
+        ("Method", f"{summary['method']}, rose2-logs {summary['versions'].get('rose2-logs', '')}".strip()),
+    ]
+
+
+def tiles(results: RunResults, plan: RoomPlan) -> list[Tile]:
+    """Figures of the whole run."""
+    found, layout = results.summary["results"], results.summary.get("layout", {})
+    seen = sum(room.area_m2 for room in plan.rooms)
+    shapes = sum(room.predicted_area_m2 for room in plan.rooms)
+    final = layout.get("final_since")
+    sure = layout.get("outline_wall_share_median")
+    return [
+        Tile(
+            "Maps",
+            str(found["snapshots"]),
+            f"{percent(found['coverage_first'])} to {percent(found['coverage_last'])} coverage",
+        ),
+        Tile("Rooms at the end", str(found["rooms_last"]), f"{found['tracks']} followed over the run"),
+        Tile("Floor in rooms", f"{seen:.0f} m²", f"{shapes:.0f} m² with predicted parts"),
+        Tile("Doorways", str(len(plan.doorways)), "between rooms, last map"),
+        Tile("Layout final from", *_final(final, results.choose())),
+        Tile(
+            "Outlines backed by walls",
+            MISSING if sure is None else percent(sure),
+            "median of the last map's rooms",
+        ),
+    ]
+
+
+def is_last(final: dict[str, Any], last: int) -> bool:
+    """Whether a layout was final in the last map only, of several: so it may change again."""
+    return bool(final["snapshot"] == last > 0)
+
+
+def _final(final: dict[str, Any] | None, last: int) -> tuple[str, str]:
+    """Say from what map on the layout was final; if that is the last, it never was for sure."""
+    if final is None or is_last(final, last):
+        return NOT_FINAL, "it changed up to the last map"
+    moment = f"map {final['snapshot']}, {duration(final['time_s'])} into the run"
+    return f"{percent(final['coverage'])} coverage", moment
+
+
+def notes(results: RunResults, plan: RoomPlan) -> list[Note]:
+    """Tell what is not as it should be, or not sure."""
+    summary = results.summary
+    found, messages = summary["results"], summary.get("messages", {})
+    told: list[Note] = []
+    if found.get("invalid_maps"):
+        told.append(Note(f"{found['invalid_maps']} maps could not be analysed and were left out."))
+    if messages.get("damaged"):
+        told.append(Note(f"{messages['damaged']} messages of the log were damaged and were left out."))
+    if found["snapshots"] > 1:
+        told += _layout_notes(summary.get("layout", {}), results.choose())
+    told += _room_notes(plan)
+    told += _shift_notes(results)
+    if messages.get("skipped"):
+        taken = (
+            f"{messages['skipped']} of {messages['messages']} map messages were not taken, as was asked for."
+        )
+        told.append(Note(taken, is_warning=False))
+    row = results.row(results.choose())
+    if row["analysed_resolution_m"] > row["resolution_m"] * 1.001:
+        cells = f"{row['analysed_resolution_m']:g} m instead of {row['resolution_m']:g} m"
+        coarse = f"The maps were analysed in cells of {cells}."
+        told.append(Note(coarse, is_warning=False))
+    if results.annotated_log is None:
+        told.append(
+            Note(
+                "The pictures show shapes alone: the annotated MCAP, which holds the maps, is not there.",
+                False,
+            )
+        )
+    return sorted(told, key=lambda note: not note.is_warning)
+
+
+def _layout_notes(layout: dict[str, Any], last: int) -> list[Note]:
+    final = layout.get("final_since")
+    if _final(final, last)[0] == NOT_FINAL:
+        return [Note("The layout still changed up to the last map: take the rooms as preliminary.")]
+    if final is not None and final["coverage"] > LATE_COVERAGE:
+        late = (
+            f"The layout became final only at {percent(final['coverage'])} coverage: "
+            "with more exploration it might change again."
+        )
+        return [Note(late)]
+    return []
+
+
+def _room_notes(plan: RoomPlan) -> list[Note]:
+    told = []
+    unsure = sorted(
+        (room.confidence, room.name) for room in plan.rooms if room.confidence is not None and room.is_unsure
+    )
+    if unsure:
+        names = _listed([f"{name} ({percent(sure)})" for sure, name in unsure])
+        told.append(Note(f"Rooms with little wall around them, so unsure (?): {names}."))
+    open_ends = sorted(
+        (
+            (room.frontier_m, room.name)
+            for room in plan.rooms
+            if room.frontier_m is not None and room.frontier_m >= FRONTIER_MIN_M
+        ),
+        reverse=True,
+    )
+    if open_ends:
+        names = _listed([f"{name} ({length:.1f} m)" for length, name in open_ends])
+        told.append(Note(f"Rooms with open frontier, not explored to the end: {names}.", is_warning=False))
+    unseen = sorted(
+        (
+            (1 - room.area_m2 / room.predicted_area_m2, room.name)
+            for room in plan.rooms
+            if room.predicted_area_m2 > 0 and 1 - room.area_m2 / room.predicted_area_m2 > PREDICTED_SHARE
+        ),
+        reverse=True,
+    )
+    if unseen:
+        names = _listed([f"{name} ({percent(part)})" for part, name in unseen])
+        told.append(
+            Note(
+                f"Rooms of which a good part was not seen: predicted, or furniture: {names}.",
+                False,
+            )
+        )
+    return told
+
+
+def _shift_notes(results: RunResults) -> list[Note]:
+    events = results.table("events", ["snapshot", "kind", "shift_x_m", "shift_y_m"]).to_pylist()
+    shifts = [event for event in events if event["kind"] == "shifted"]
+    if not shifts:
+        return []
+    lengths = [float(np.hypot(event["shift_x_m"], event["shift_y_m"])) for event in shifts]
+    most = int(np.argmax(lengths))
+    text = (
+        f"The whole map shifted {len(shifts)} times, most by {lengths[most]:.2f} m at map "
+        f"{shifts[most]['snapshot']}: loop closures, or trouble of SLAM."
+    )
+    return [Note(text.replace("1 times, most by", "once, by"))] if len(shifts) == 1 else [Note(text)]
+
+
+def _listed(names: list[str]) -> str:
+    more = len(names) - NAMED_MOST
+    return ", ".join(names[:NAMED_MOST]) + (f" and {more} more" if more > 0 else "")

@@ -1,0 +1,175 @@
+"""Reports of all logs below a folder, and a page that lists them."""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+from dataclasses import dataclass
+from pathlib import Path
+from urllib.parse import quote
+
+from rose2_logs.drawing.pixels import as_pixels
+from rose2_logs.drawing.plan import PANEL, draw_plan
+from rose2_logs.drawing.svg import png_uri
+from rose2_logs.errors import LogError
+from rose2_logs.outputs.report import PANELS
+from rose2_logs.outputs.report.facts import is_last
+from rose2_logs.outputs.report.page import REPORT_NAME, render, write_page, write_report
+from rose2_logs.outputs.report.words import (
+    MISSING,
+    Cell,
+    Column,
+    Table,
+    count,
+    date_of,
+    duration,
+    number,
+    share,
+)
+from rose2_logs.runs.folder import RunResults, find_results
+from rose2_logs.system.files import refuse_existing
+
+PICTURES_MOST = 100
+"""Logs whose last layout is pictured on the page that lists them: about a megabyte."""
+PICTURE_PX = 320
+PICTURE = dataclasses.replace(PANEL, font=0.0)
+BATCH_FOLDER = "logs/"
+"""Where a batch has the results of its logs; their names are told without it."""
+BATCH_SUMMARY = "summary.csv"
+"""Where a batch tells what became of each log."""
+
+
+@dataclass(frozen=True)
+class ReportsWritten:
+    """The pages, the list of several last, and why results could not be read."""
+
+    pages: tuple[Path, ...]
+    failed: tuple[LogError, ...]
+
+
+@dataclass(frozen=True)
+class _Listed:
+    """A log on the page that lists them: its page, the address from there, name, picture, figures."""
+
+    page: Path
+    link: str
+    name: str
+    picture: str
+    row: tuple[Cell, ...]
+
+
+def write_reports(
+    folder: Path, out: Path | None = None, *, panels: int = PANELS, overwrite: bool = False
+) -> ReportsWritten:
+    """Write the report of a log, or of all logs below a folder with a page that lists them.
+
+    Parameters
+    ----------
+    folder : path
+        What `analyse_log` or a batch has written.
+    out : path, optional
+        The page of one log; of several the folder for their pages. By default each lies with its results.
+    panels, overwrite
+        As for `write_report`.
+
+    Returns
+    -------
+    ReportsWritten
+
+    Raises
+    ------
+    LogError
+        If there are no results, or those of the only log cannot be read.
+    OutputError
+        If there is a page already that may not be replaced, or one cannot be written.
+    """
+    found = find_results(folder)
+    if found == [folder]:
+        return ReportsWritten((write_report(folder, out, panels=panels, overwrite=overwrite),), ())
+    base = folder if out is None else out
+    names = [each.relative_to(folder).as_posix() for each in found]
+    pages = [base / (f"{name}/{REPORT_NAME}" if out is None else f"{name}.html") for name in names]
+    listing = base / REPORT_NAME
+    refuse_existing([listing, *pages], overwrite=overwrite)
+    written: list[_Listed] = []
+    failed: list[LogError] = []
+    for results_folder, name, page in zip(found, names, pages, strict=True):
+        try:
+            write_report(results_folder, page, panels=panels, overwrite=overwrite)
+            results, shown = RunResults(results_folder), name.removeprefix(BATCH_FOLDER)
+            picture = _picture(results) if len(written) < PICTURES_MOST else ""
+            written.append(
+                _Listed(page, quote(page.relative_to(base).as_posix()), shown, picture, _row(results, shown))
+            )
+        except LogError as error:
+            failed.append(error)
+    if written:
+        title = f"Rooms of {len(written)} logs"
+        table = _table([each.row for each in written])
+        failures = _failures(folder)
+        write_page(
+            listing, render("overview.html.j2", title=title, table=table, logs=written, failures=failures)
+        )
+        return ReportsWritten((*(each.page for each in written), listing), tuple(failed))
+    return ReportsWritten((), tuple(failed))
+
+
+def _failures(folder: Path) -> list[tuple[str, str]]:
+    """Names of the logs that a batch could not analyse, and why."""
+    try:
+        with (folder / BATCH_SUMMARY).open(encoding="utf-8", newline="") as file:
+            rows = list(csv.DictReader(file))
+        return [(row["log"], row["reason"]) for row in rows if row["status"] == "failed"]
+    except (OSError, ValueError, KeyError, csv.Error):
+        # The page tells of results; without a batch there are no others.
+        return []
+
+
+def _picture(results: RunResults) -> str:
+    """Picture of the last layout as a data URI."""
+    with results.open_maps() as maps:
+        plan = results.plan(results.choose(), maps)
+    return png_uri(as_pixels(draw_plan(plan, PICTURE), PICTURE_PX), few_colours=True)
+
+
+def _table(rows: list[tuple[Cell, ...]]) -> Table:
+    columns = (
+        Column("log", is_number=False),
+        Column("recorded", is_number=False),
+        Column("duration"),
+        Column("maps"),
+        Column("first coverage", "coverage of the first map"),
+        Column("rooms", "in the last map"),
+        Column("tracks", "rooms over the run"),
+        Column(
+            "final from", "coverage from which on the layout was as in the end; none if only the last map was"
+        ),
+        Column("splits"),
+        Column("merges"),
+        Column("shifts", "of the whole map"),
+        Column("backed by walls", "share of the outlines that walls back, median of the last map's rooms"),
+        Column("frontier, m", "open frontier of the last map's rooms"),
+    )
+    return Table("Logs", columns, tuple(rows))
+
+
+def _row(results: RunResults, name: str) -> tuple[Cell, ...]:
+    found, layout = results.summary["results"], results.summary.get("layout", {})
+    events, final = found.get("events", {}), layout.get("final_since")
+    first_ns, last_ns = found.get("first_log_time_ns"), found.get("last_log_time_ns")
+    span = None if first_ns is None or last_ns is None else (last_ns - first_ns) / 1e9
+    return (
+        Cell(name),
+        Cell(date_of(first_ns) or MISSING),
+        Cell(MISSING) if span is None else Cell(duration(span), span),
+        count(found["snapshots"]),
+        share(found["coverage_first"]),
+        count(found["rooms_last"]),
+        count(found["tracks"]),
+        share(None if final is None or is_last(final, results.choose()) else final["coverage"]),
+        count(events.get("split", 0)),
+        count(events.get("merged", 0)),
+        count(events.get("shifted", 0)),
+        share(layout.get("outline_wall_share_median")),
+        number(layout.get("frontier_m")),
+    )

@@ -1,0 +1,1 @@
+"""The Rerun recording and its viewers."""

@@ -1,0 +1,191 @@
+"""How a recording looks when it is opened: the layout stored in it."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+
+from rose2_logs.model.occupancy import FloatArray
+from rose2_logs.outputs.rerun.lanes import FINAL_IOU, FINAL_SHARE, LIVES, SHIFTS
+from rose2_logs.outputs.rerun.projected import SEEN_SHARE, SMOOTHED
+from rose2_logs.outputs.rerun.world import (
+    CLEAN,
+    DOORWAYS,
+    FACES,
+    FILLS,
+    LINES,
+    PATH,
+    PREDICTED,
+    ROBOT,
+    ROOMS,
+    SCORE,
+    SEGMENTS,
+    SPECTRUM,
+    VORONOI,
+)
+from rose2_logs.runs.sink import RECORDING_LAYERS
+
+COVERAGE_UNIT = 1e-4
+"""Step of the coverage timeline, which counts in whole numbers."""
+EYE_HEIGHT = 1.02
+"""Height of the eye over the side of the map that fills the view: the viewer sees 1.04 times its height."""
+MAP_ASPECT = 1.3
+"""Width over height of the view of the map in a window of usual shape."""
+SWITCHED = (CLEAN, SCORE, SEGMENTS, LINES, FACES, VORONOI)
+"""Layers of the map's view that are off at first and can be switched on."""
+TIMELINES = ("message_log_time", "ros2_timestamp", "snapshot", "coverage")
+Overrides = list[rrb.EntityBehavior | rrb.VisibleTimeRanges]
+PAPER, DARK = (236, 236, 236), (12, 12, 16)
+
+
+def make_blueprint(
+    low_m: FloatArray,
+    high_m: FloatArray,
+    layers: Collection[str] = RECORDING_LAYERS,
+    *,
+    smoothed: bool = False,
+) -> rrb.Blueprint:
+    """Map from above, a tab for each stage of the method, beside curves, lives of rooms, events, summary.
+
+    Parameters
+    ----------
+    low_m, high_m : (2,) float
+        Corners of what is shown, world metres.
+    layers : collection of str
+        The optional layers that the recording has; tabs without any are left out.
+    smoothed : bool
+        Whether it has the smoothed rooms.
+    """
+    stages = (
+        ("Rooms", (), ()),
+        ("Clean map", ("clean_map",), (CLEAN,)),
+        ("Structure score", ("score",), (SCORE,)),
+        ("Walls", ("segments", "lines"), (SEGMENTS, LINES)),
+        ("Faces", ("faces",), (FACES,)),
+        ("Voronoi graph", ("voronoi",), (VORONOI,)),
+    )
+    views: list[rrb.View] = [
+        _map_view(name, low_m, high_m, shown, (SMOOTHED,) if smoothed else ())
+        for name, needed, shown in stages
+        if not needed or set(needed) & set(layers)
+    ]
+    if smoothed:
+        views.insert(1, _map_view("Smoothed rooms", low_m, high_m, (SMOOTHED,)))
+    if "spectrum" in layers:
+        eye = eye_above(np.array([-1.0, -1.0]), np.array([1.0, 1.0]))
+        views.append(
+            rrb.Spatial3DView(
+                name="Spectrum", origin=SPECTRUM, eye_controls=eye, line_grid=False, background=DARK
+            )
+        )
+    return rrb.Blueprint(
+        rrb.Horizontal(
+            rrb.Tabs(*views, active_tab=0),
+            rrb.Vertical(
+                _curves(
+                    "How right the layout was", ("/run/coverage", FINAL_SHARE, FINAL_IOU, SHIFTS), (0.0, 1.05)
+                ),
+                rrb.Tabs(
+                    _lives(),
+                    _curves("Area, m²", ("/run/area/**",), legend=False),
+                    *([_curves("Seen share", (f"{SEEN_SHARE}/**",), legend=False)] if smoothed else []),
+                    _curves("Count", ("/run/rooms",)),
+                    _curves("Change", ("/run/variation_bits",)),
+                    active_tab=0,
+                ),
+                rrb.Tabs(
+                    rrb.TextDocumentView(name="Summary", origin="/summary"),
+                    rrb.TextLogView(
+                        name="Events",
+                        origin="/events",
+                        columns=rrb.TextLogColumns(
+                            timeline_columns=["snapshot"], text_log_columns=["loglevel", "body"]
+                        ),
+                    ),
+                    active_tab=0,
+                ),
+                row_shares=[3, 5, 4],
+            ),
+            column_shares=[7, 3],
+        ),
+        rrb.TimePanel(timeline="coverage", state="collapsed"),
+        rrb.BlueprintPanel(state="collapsed"),
+        rrb.SelectionPanel(state="collapsed"),
+        auto_views=False,
+    )
+
+
+def _map_view(
+    name: str, low_m: FloatArray, high_m: FloatArray, shown: Collection[str], off: Collection[str] = ()
+) -> rrb.Spatial3DView:
+    """View of the map with some of the switched layers on; rooms step back where others are looked at."""
+    hidden = [*(path for path in SWITCHED if path not in shown), *off]
+    if SMOOTHED in shown:
+        hidden += [FILLS, ROOMS, PREDICTED, DOORWAYS]
+    elif shown:
+        hidden += [PREDICTED, PATH, ROBOT]
+    if set(shown) & {CLEAN, SCORE, SEGMENTS, LINES, VORONOI}:
+        hidden += [FILLS, ROOMS]
+    overrides: dict[rr.EntityPath | str, Overrides] = {
+        path: [rrb.EntityBehavior(visible=False)] for path in hidden
+    }
+    # The way so far: the pieces of all maps up to the present one.
+    overrides[PATH] = [*overrides.get(PATH, []), _up_to_now()]
+    return rrb.Spatial3DView(
+        name=name,
+        origin="/world",
+        eye_controls=eye_above(low_m, high_m),
+        line_grid=False,
+        background=DARK if SCORE in shown else PAPER,
+        overrides=overrides,
+    )
+
+
+def _up_to_now() -> rrb.VisibleTimeRanges:
+    before = rr.encodings.TimeRangeBoundary.infinite()
+    now = rr.encodings.TimeRangeBoundary.cursor_relative(seq=0)
+    return rrb.VisibleTimeRanges([rrb.VisibleTimeRange(name, start=before, end=now) for name in TIMELINES])
+
+
+def view_side_m(low_m: FloatArray, high_m: FloatArray, aspect: float = MAP_ASPECT) -> float:
+    """Height of the part of the world that a view of such an aspect shows so that a rectangle fits in."""
+    size = high_m - low_m
+    return float(max(size[0] / aspect, size[1], 1e-3))
+
+
+def eye_above(low: FloatArray, high: FloatArray, aspect: float = MAP_ASPECT) -> rrb.EyeControls3D:
+    """Look from above so that a rectangle fills a view of such an aspect."""
+    centre, height = (low + high) / 2, EYE_HEIGHT * view_side_m(low, high, aspect)
+    return rrb.EyeControls3D(
+        kind=rrb.Eye3DKind.Orbital,
+        position=[centre[0], centre[1] - 1e-3 * height, height],
+        look_target=[centre[0], centre[1], 0.0],
+        eye_up=[0.0, 1.0, 0.0],
+    )
+
+
+def _axis() -> rrb.archetypes.TimeAxis:
+    """Return an axis over the whole run, whichever timeline it goes along; by default a plot is zoomed in."""
+    end = rr.encodings.TimeRangeBoundary.infinite()
+    whole_run = rr.encodings.TimeRange(start=end, end=end)
+    return rrb.archetypes.TimeAxis(link="Independent", view_range=whole_run)
+
+
+def _curves(
+    name: str, paths: Iterable[str], span: tuple[float, float] | None = None, legend: bool = True
+) -> rrb.TimeSeriesView:
+    return rrb.TimeSeriesView(
+        name=name,
+        origin="/run",
+        contents=list(paths),
+        axis_x=_axis(),
+        axis_y=None if span is None else rrb.ScalarAxis(range=span),
+        plot_legend=rrb.PlotLegend(visible=legend, corner=rrb.Corner2D.LeftTop),
+    )
+
+
+def _lives() -> rrb.StateTimelineView:
+    return rrb.StateTimelineView(name="Lives of rooms", origin=LIVES, time_view=_axis())

@@ -1,0 +1,126 @@
+"""The recordings of many logs opened together: as one data set of a Rerun catalog, by Rerun's own server."""
+
+from __future__ import annotations
+
+import logging
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rose2_logs.errors import LogError, OutputError
+from rose2_logs.model.occupancy import FloatArray
+from rose2_logs.outputs.rerun.blueprint import make_blueprint
+
+if TYPE_CHECKING:
+    from rerun.server import Server
+
+logger = logging.getLogger(__name__)
+
+MARGIN_M = 5.0
+"""Around the points where rooms are deepest: half a large room."""
+NO_TABLES_M = 20.0
+"""Half the side of the part of the world that is shown where no tables tell where the rooms are."""
+
+
+@contextmanager
+def serve_recordings(folder: Path, host: str, port: int) -> Iterator[tuple[str, int]]:
+    """Serve all recordings below a folder as one data set, named like it.
+
+    Parameters
+    ----------
+    folder : path
+        Searched at any depth. Of recordings of one and the same run the newest is taken.
+    host : str
+        Address to listen on.
+    port : int
+        Port to listen on; 0 for any that is free.
+
+    Yields
+    ------
+    url : str
+        Address of the catalog.
+    count : int
+        Number of recordings.
+
+    Raises
+    ------
+    LogError
+        If there is no recording.
+    OutputError
+        If the server cannot be started.
+    """
+    from rerun.server import Server
+
+    recordings = find_recordings(folder)
+    name = folder.resolve().name or "recordings"
+    try:
+        server = Server(host=host, port=port, datasets={name: [str(path) for path in recordings]})
+    except (OSError, ValueError) as error:
+        raise OutputError(f"{host}:{port}: no server can be started there: {error}") from error
+    with server, tempfile.TemporaryDirectory(prefix="rose2_logs_") as scratch:
+        _set_layout(server, name, recordings, Path(scratch))
+        yield server.url(), len(recordings)
+
+
+def find_recordings(folder: Path) -> list[Path]:
+    """Find the recordings below a folder, one of each run, sorted.
+
+    Raises
+    ------
+    LogError
+        If there is none.
+    """
+    from rerun.chunk import RrdReader
+
+    found: dict[str, Path] = {}
+    files = [path for path in folder.rglob("*.rrd") if not _is_hidden(path.relative_to(folder))]
+    for path in sorted(files, key=lambda path: (-path.stat().st_mtime_ns, path)):
+        try:
+            ids = [entry.recording_id for entry in RrdReader(path).recordings()]
+        except Exception as error:  # Rerun raises what its decoder meets
+            logger.warning("%s: is left out: %s", path, error)
+            continue
+        if taken := [found[each] for each in ids if each in found]:
+            logger.warning("%s: is left out: it is of the same run as %s", path, taken[0])
+            continue
+        found |= dict.fromkeys(ids, path)
+    if not found:
+        raise LogError(f"{folder}: holds no recording (.rrd); rose2-logs batch and analyze write them")
+    return sorted(set(found.values()))
+
+
+def _is_hidden(path: Path) -> bool:
+    return any(part.startswith(".") for part in path.parts)
+
+
+def _set_layout(server: Server, name: str, recordings: Sequence[Path], scratch: Path) -> None:
+    """Open every run in our layout: the one in each file counts only where it is opened alone."""
+    layout = scratch / "layout.rbl"
+    smoothed = any(path.with_name("smoothed.parquet").is_file() for path in recordings)
+    make_blueprint(*_corners_m(recordings), smoothed=smoothed).save("rose2_logs", str(layout))
+    try:
+        server.client().get_dataset(name).register_blueprint(layout.as_uri())
+    except ImportError:
+        logger.warning(
+            "the layout of views is Rerun's; for that of rose2-logs: pip install 'rose2-logs[batch]'"
+        )
+
+
+def _corners_m(recordings: Sequence[Path]) -> tuple[FloatArray, FloatArray]:
+    """Corners (2,), in world metres, of the part of the world where the runs have their rooms."""
+    import pyarrow.parquet as pq
+
+    points = []
+    for path in recordings:
+        table = path.with_name("rooms.parquet")
+        if table.is_file():
+            columns = pq.read_table(table, columns=["label_x_m", "label_y_m"]).drop_null()
+            points.append(np.column_stack([column.to_numpy() for column in columns.columns]))
+    known = np.concatenate([each for each in points if len(each)] or [np.empty((0, 2))])
+    if not len(known):
+        return np.full(2, -NO_TABLES_M), np.full(2, NO_TABLES_M)
+    return known.min(axis=0) - MARGIN_M, known.max(axis=0) + MARGIN_M

@@ -1,0 +1,236 @@
+"""The run as a Rerun recording: the map with its rooms along time and along coverage."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Collection
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import rerun as rr
+
+from rose2_logs.drawing.event_text import event_text
+from rose2_logs.drawing.extent import Extent
+from rose2_logs.drawing.palette import track_colour
+from rose2_logs.errors import OutputError
+from rose2_logs.outputs.rerun import viewer as rerun_viewer
+from rose2_logs.outputs.rerun.blueprint import COVERAGE_UNIT, make_blueprint, view_side_m
+from rose2_logs.outputs.rerun.columns import Entry, Scalar
+from rose2_logs.outputs.rerun.disk import abandon, require_space
+from rose2_logs.outputs.rerun.lanes import FINAL_IOU, FINAL_SHARE, SHIFTS, Lives
+from rose2_logs.outputs.rerun.layers import CHUNK_BYTES, Layers
+from rose2_logs.outputs.rerun.projected import SmoothedWorld
+from rose2_logs.outputs.rerun.summary import summary_text
+from rose2_logs.outputs.rerun.world import World
+from rose2_logs.runs.sink import RECORDING_LAYERS, RunInfo
+from rose2_logs.runs.tables import Tables
+from rose2_logs.system.files import part_of, writing
+from rose2_logs.system.text import percent
+from rose2_logs.tracking.back_projection import SmoothedSnapshot
+from rose2_logs.tracking.track_history import RoomLives
+from rose2_logs.tracking.tracked_snapshot import RoomEvent, TrackedSnapshot, map_motion
+
+logger = logging.getLogger(__name__)
+
+FLUSH_TIMEOUT_S = 60.0
+CURVES = {
+    "/run/coverage": ("coverage", (90, 190, 90)),
+    FINAL_SHARE: ("rooms of their last shape", (250, 160, 50)),
+    FINAL_IOU: ("overlap with the last layout", (90, 150, 250)),
+    "/run/rooms": ("rooms", (190, 130, 250)),
+    "/run/variation_bits": ("variation of information, bits", (250, 100, 100)),
+}
+"""Curves of the whole run: what they are called and their colours."""
+SHIFT_COLOUR = (255, 80, 80)
+
+
+class RerunRecording:
+    """Sink that writes a ``.rrd`` with its layout, or shows the run in an open viewer, or both.
+
+    Timelines are ``message_log_time`` and ``ros2_timestamp`` (as in Rerun's own MCAP importer), ``snapshot``,
+    and ``coverage``, the greatest so far, in steps of 1e-4. Rooms stand under ``/world/rooms/TRACK``, their
+    areas under ``/run/area/TRACK``; they are cleared when their track is lost. What has not changed since the
+    snapshot before is not logged again. What only the last map tells, lanes of the rooms' lives and how right
+    the layout was, follows at the end; before that the smoothed rooms, in a second pass, if there is one.
+
+    Parameters
+    ----------
+    path : path, optional
+        Where to; written beside and renamed when whole. Without it nothing is stored.
+    info : RunInfo
+        The run.
+    live : bool
+        Also show the run in a Rerun viewer, which is started where none is open.
+    layers : collection of str
+        Which of `RECORDING_LAYERS` to write.
+    tables : Tables, optional
+        The tables of the run, which know at the end what it came to.
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written.
+    """
+
+    def __init__(
+        self,
+        path: Path | None,
+        info: RunInfo,
+        *,
+        live: bool = False,
+        layers: Collection[str] = RECORDING_LAYERS,
+        tables: Tables | None = None,
+    ) -> None:
+        self._path = path
+        self._part = part_of(path) if path else None
+        self._info = info
+        self._live = live
+        self._wanted = layers
+        self._tables = tables
+        self._viewer_answers = live
+        self._is_lost = False
+        self._shown: set[int] = set()
+        self._known: set[int] = set()
+        self._smoothed: SmoothedWorld | None = None
+        self._extent = Extent()
+        self._frames = 0
+        self._lives = RoomLives() if tables is None else tables.lives
+
+    def __enter__(self) -> Self:
+        # The same log gives the same recording id, so that a second run replaces the first in a viewer.
+        fingerprint = str(self._info.provenance.get("sha256", self._info.log_path.name))
+        self._recording = rr.RecordingStream(
+            "rose2_logs",
+            recording_id=f"{self._info.log_path.stem}-{fingerprint[:16]}",
+            send_properties=True,
+        )
+        self._layers = self._new_layers()
+        sinks: list[rr.FileSink | rr.GrpcSink] = []
+        if self._part is not None:
+            with writing(self._part.parent):
+                self._part.parent.mkdir(parents=True, exist_ok=True)
+            sinks.append(rr.FileSink(str(self._part)))
+        if self._live:
+            sinks.append(rr.GrpcSink(rerun_viewer.open_viewer(rerun_viewer.VIEWER_PORT)))
+        self._recording.set_sinks(*sinks)
+        self._recording.set_log_time_enabled(False)
+        self._recording.set_log_tick_enabled(False)
+        self._world = World(self._layers, self._recording, self._wanted)
+        self._lanes = Lives(self._recording)
+        for path, (name, colour) in CURVES.items():
+            self._recording.log(path, rr.SeriesLines(names=name, colors=[colour], widths=2), static=True)
+        jumps = rr.SeriesPoints(
+            names="the map shifted", colors=[SHIFT_COLOUR], markers="cross", marker_sizes=8
+        )
+        self._recording.log(SHIFTS, jumps, static=True)
+        return self
+
+    def write(self, frame: TrackedSnapshot) -> None:
+        """Log one snapshot at all its times."""
+        snapshot = frame.snapshot
+        coverage = _steps(frame.coverage)
+        self._layers.begin(snapshot.log_time_ns, snapshot.stamp_ns, snapshot.index, coverage)
+        self._extent.add(frame)
+        self._world.log(frame, view_side_m(self._extent.low_m, self._extent.high_m))
+        self._lanes.add(self._layers.now, frame.track_ids)
+        self._log_curves(frame)
+        for event in frame.events:
+            if event.kind != "continued":
+                text = f"{percent(frame.coverage, ' %')}: {event_text(event)}"
+                self._layers.add("/events", Entry(text, _event_level(event)))
+        if self._tables is None:
+            self._lives.add(frame)
+        if self._live and self._frames == 0:
+            # A live viewer shows the layout from the beginning; a file alone gets the final one.
+            self._send_blueprint()
+        self._frames += 1
+        self._flush()
+
+    def write_smoothed(self, found: SmoothedSnapshot) -> None:
+        """Log what one map shows of the last map's rooms, after all maps, in their order again."""
+        if self._smoothed is None:
+            self._layers.flush()
+            self._smoothed = SmoothedWorld(self._new_layers(), self._recording)
+        view_m = view_side_m(self._extent.low_m, self._extent.high_m)
+        self._smoothed.log(found, _steps(found.coverage), view_m)
+        self._flush()
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        try:
+            if kind is None:
+                self._layers.flush()
+                if self._smoothed is not None:
+                    self._smoothed.flush()
+                hindsight = None if self._tables is None else self._tables.hindsight
+                self._lanes.log(hindsight)
+                text = summary_text(self._info, self._lives, hindsight, self._frames)
+                self._recording.log(
+                    "/summary", rr.TextDocument(text, media_type="text/markdown"), static=True
+                )
+                if self._frames:
+                    self._send_blueprint()
+                self._flush()
+            if not self._is_lost:
+                self._recording.disconnect()
+            if kind is None and self._path is not None and self._part is not None:
+                with writing(self._path):
+                    self._part.replace(self._path)
+        finally:
+            if self._part is not None:
+                self._part.unlink(missing_ok=True)
+
+    def _new_layers(self) -> Layers:
+        # A live viewer shows each snapshot at once.
+        return Layers(self._recording, 0 if self._live else CHUNK_BYTES)
+
+    def _send_blueprint(self) -> None:
+        blueprint = make_blueprint(
+            self._extent.low_m, self._extent.high_m, self._wanted, smoothed=self._smoothed is not None
+        )
+        self._recording.send_blueprint(blueprint)
+
+    def _flush(self) -> None:
+        """Write what was logged; a viewer that was closed along the way is not waited for again."""
+        if self._live and not self._viewer_answers:
+            return
+        if self._part is not None and self._path is not None:
+            require_space(self._part, self._path)
+        try:
+            self._recording.flush(timeout_sec=FLUSH_TIMEOUT_S)
+        except RuntimeError as error:
+            if not self._live:
+                self._is_lost = True
+                abandon(self._recording)
+                raise OutputError(f"{self._path}: cannot be written: {error}") from error
+            self._viewer_answers = False
+            logger.warning("the Rerun viewer does not answer any more; the run goes on without it")
+
+    def _log_curves(self, frame: TrackedSnapshot) -> None:
+        self._layers.add("/run/coverage", Scalar(frame.coverage))
+        self._layers.add("/run/rooms", Scalar(len(frame.track_ids)))
+        if map_motion(frame.events) is not None:
+            self._layers.add(SHIFTS, Scalar(frame.coverage))
+        if frame.change is not None and frame.change.variation_bits is not None:
+            self._layers.add("/run/variation_bits", Scalar(frame.change.variation_bits))
+        for track in sorted(self._shown - set(frame.track_ids)):
+            self._layers.clear(f"/run/area/{track}")
+        self._shown = set(frame.track_ids)
+        for track, area in zip(frame.track_ids, frame.analysis.rooms.areas_m2.tolist(), strict=True):
+            if track not in self._known:
+                self._known.add(track)
+                name = rr.SeriesLines(colors=[track_colour(track)], names=f"room {track}")
+                self._recording.log(f"/run/area/{track}", name, static=True)
+            self._layers.add(f"/run/area/{track}", Scalar(area))
+
+
+def _steps(coverage: float) -> int:
+    """Place on the coverage timeline."""
+    return round(coverage / COVERAGE_UNIT)
+
+
+def _event_level(event: RoomEvent) -> str:
+    is_warning = event.kind in ("split", "merged", "lost", "shifted")
+    return str(rr.TextLogLevel.WARN if is_warning else rr.TextLogLevel.INFO)

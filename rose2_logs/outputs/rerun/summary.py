@@ -1,0 +1,121 @@
+"""The text that a recording opens with: what came out of the run, room by room."""
+
+from __future__ import annotations
+
+import math
+import re
+
+from rose2_logs.model.room_quality import UNSURE_SIGN, is_unsure
+from rose2_logs.outputs.rerun.blueprint import COVERAGE_UNIT
+from rose2_logs.runs.sink import RunInfo
+from rose2_logs.system.text import percent
+from rose2_logs.tracking.convergence import Hindsight
+from rose2_logs.tracking.track_history import Moment, RoomLives
+
+NAMED_MOST = 6
+"""Rooms named in one sentence."""
+_MARKUP = re.compile(r"[\\`*_{}\[\]<>()#!&~$]")
+"""What has a meaning in Markdown; after a backslash it has none."""
+
+
+def summary_text(info: RunInfo, lives: RoomLives, hindsight: Hindsight | None, maps: int) -> str:
+    """Write the summary of a run as Markdown.
+
+    Parameters
+    ----------
+    info : RunInfo
+        The run.
+    lives : RoomLives
+        What is known of every room.
+    hindsight : Hindsight, optional
+        Since when what was right; without it that is left out.
+    maps : int
+        Number of maps.
+    """
+    minutes = "" if lives.last is None else f", {_duration(lives.last.time_s)}"
+    rooms = len(lives.in_last_map)
+    text = [
+        f"# {_cell(info.log_path.name)}",
+        f"**{rooms} room{'' if rooms == 1 else 's'}** at the end, {len(lives.lives)} over the run; "
+        f"{maps} map{'' if maps == 1 else 's'}{minutes}.",
+    ]
+    if hindsight is not None:
+        final = hindsight.layout_final
+        last = None if maps == 1 or lives.last is None else lives.last.snapshot
+        text.append(
+            "**The layout still changed up to the last map**: take the rooms as preliminary."
+            if final is None or final.snapshot == last
+            else f"The layout was as in the end **from {_percent(final.coverage)} coverage on** "
+            f"({_duration(final.time_s)})."
+        )
+    text += _worth_a_look(lives)
+    rows = [
+        "| room | area, m² | first seen | shape right | area settled | walls |",
+        "|--:|--:|--:|--:|--:|--:|",
+    ]
+    for track in lives.in_last_map:
+        life = lives.lives[track]
+        right = None if hindsight is None else hindsight.shape_right.get(track)
+        settled = None if hindsight is None else hindsight.area_settled.get(track)
+        walls = "" if life.outline_wall_share is None else _percent(life.outline_wall_share)
+        rows.append(
+            f"| {track} | {life.area_m2:.1f} | {_percent(life.first.coverage)} | {_moment(right)} "
+            f"| {_moment(settled)} | {walls} |"
+        )
+    text.append("\n".join(rows))
+    text.append(
+        "Percent of coverage: when the room was first seen; when its shape with the unseen part first "
+        "overlapped its last one by 0.8; from when on its area was within 10 % of its last. "
+        "Walls: share of its outline that walls back. "
+        f"On the timeline `coverage`, {1 / COVERAGE_UNIT:.0f} is 100 %."
+    )
+    about = {
+        "log": info.origin or info.log_path.name,
+        "topic": info.topic,
+        "method": info.method,
+        **{f"version of {name}": version for name, version in info.versions.items()},
+    }
+    text.append(
+        "\n".join(
+            ["| run | |", "|---|---|", *(f"| {key} | {_cell(value)} |" for key, value in about.items())]
+        )
+    )
+    return "\n\n".join(text) + "\n"
+
+
+def _worth_a_look(lives: RoomLives) -> list[str]:
+    """Tell which rooms are unsure, and where the whole map shifted."""
+    told = []
+    shares = [(lives.lives[track].outline_wall_share, track) for track in lives.in_last_map]
+    unsure = sorted((share, track) for share, track in shares if share is not None and is_unsure(share))
+    if unsure:
+        named = ", ".join(f"{track}{UNSURE_SIGN} ({_percent(share)})" for share, track in unsure[:NAMED_MOST])
+        more = f" and {len(unsure) - NAMED_MOST} more" if len(unsure) > NAMED_MOST else ""
+        told.append(f"**Unsure**, with little wall around: room {named}{more}.")
+    if lives.largest_shift is not None:
+        at, motion = lives.largest_shift
+        x, y = motion.shift_xy_m
+        told.append(
+            f"**The whole map shifted** {'once' if lives.shifts == 1 else f'{lives.shifts} times'}, most by "
+            f"{math.hypot(x, y):.2f} m and {math.degrees(motion.turn_rad):+.1f}° at {_percent(at.coverage)} "
+            "coverage: loop closures, or trouble of SLAM."
+        )
+    return told
+
+
+def _percent(share: float) -> str:
+    return percent(share, " %")
+
+
+def _moment(moment: Moment | None) -> str:
+    return "" if moment is None else _percent(moment.coverage)
+
+
+def _duration(seconds: float) -> str:
+    minutes, rest = divmod(round(seconds), 60)
+    return f"{minutes} min {rest} s" if minutes else f"{rest} s"
+
+
+def _cell(value: object) -> str:
+    """Text for a cell of a table: names come from a log, and are neither markup nor the end of the cell."""
+    return _MARKUP.sub(r"\\\g<0>", " ".join(str(value).split()).replace("|", "/"))

@@ -1,0 +1,250 @@
+"""What a recording shows of one map: its layers in the world, and its spectrum."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+
+from rose2_logs.drawing.hatching import hatch_unseen
+from rose2_logs.drawing.palette import track_colour
+from rose2_logs.model.occupancy import FloatArray
+from rose2_logs.model.room_quality import UNSURE_SIGN, is_unsure
+from rose2_logs.outputs.rerun.columns import Label, Strips
+from rose2_logs.outputs.rerun.layers import Layers
+from rose2_logs.outputs.rerun.pictures import MapPictures, spectrum_picture
+from rose2_logs.tracking.track_history import evidence_of
+from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot
+
+LAYER_STEP_M = 0.01
+"""Layers lie this far above each other, so that none flickers through another."""
+OUTLINE_POINTS, DOOR_POINTS, PATH_POINTS, LINE_POINTS, THIN_POINTS = 2.0, 4.0, 2.0, 1.5, 0.75
+"""Widths of lines in points of the screen, which stay readable at any zoom."""
+DOOR_COLOUR, PATH_COLOUR, ROBOT_COLOUR = (230, 90, 20), (20, 90, 200), (200, 20, 60)
+LINE_COLOUR, VORONOI_COLOUR, DIRECTION_COLOUR = (60, 110, 230), (150, 20, 150), (255, 190, 40)
+UNCLUSTERED_COLOUR = (130, 130, 130)
+STRONG_EDGE, WEAK_EDGE = (20, 20, 90), (80, 165, 235)
+"""Edges that walls cover all along, and not at all; told apart without seeing red or green too."""
+OUTLINE_SHADE, SEGMENT_SHADE = 0.6, 0.75
+"""Share of the colour of a fill that its outline has, and of a track's that a wall's segments have."""
+PATH_GAP_M = 2.0
+"""Poses farther apart are not joined: the robot was put elsewhere, or found itself again."""
+ROBOT_LENGTH_M, ROBOT_WIDTH_M = 0.7, 0.45
+"""Size of the arrowhead that stands for the robot, about that of a mobile base."""
+MARKS = (0.8, 0.98)
+"""Where the marks of the directions begin and end, from the centre of the spectrum's picture to its rim."""
+DIRECTION_NAME = "walls at {angle:.1f}°"
+NAMED_SHARE = 0.004
+"""Rooms with less of the area of a square view get a number only: number and area are about 65 of the usual
+1000 points wide, the side of a room of this share."""
+MAP, ROOMS, DOORWAYS = "/world/map", "/world/rooms", "/world/doorways"
+FILLS, CLEAN, SCORE = "/world/room_fills", "/world/clean_map", "/world/structure_score"
+PREDICTED, PATH, ROBOT = "/world/predicted", "/world/path", "/world/robot"
+SEGMENTS, LINES, FACES, VORONOI = "/world/segments", "/world/lines", "/world/faces", "/world/voronoi"
+SPECTRUM = "/spectrum"
+HEIGHTS = (MAP, CLEAN, SCORE, FILLS, PREDICTED, ROOMS, FACES, LINES, SEGMENTS, VORONOI, DOORWAYS, PATH, ROBOT)
+"""From the lowest layer to the highest; labels stand above them all."""
+Colour = tuple[int, int, int]
+
+
+class World:
+    """Logs the layers of one map after the other.
+
+    Parameters
+    ----------
+    layers : Layers
+        Where to.
+    recording : RecordingStream
+        For what stays the same over the run.
+    wanted : collection of str
+        Those of `sink.RECORDING_LAYERS` that are to be written.
+    """
+
+    def __init__(self, layers: Layers, recording: rr.RecordingStream, wanted: Collection[str]) -> None:
+        self._layers = layers
+        self._recording = recording
+        self._wanted = wanted
+        self._shown: set[int] = set()
+        self._known: set[int] = set()
+        self._named: set[int] = set()
+        self._pose: FloatArray | None = None
+        recording.log("/world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+        for path, width, colour in (
+            (DOORWAYS, DOOR_POINTS, DOOR_COLOUR),
+            (PATH, PATH_POINTS, PATH_COLOUR),
+            (ROBOT, OUTLINE_POINTS, ROBOT_COLOUR),
+            (PREDICTED, THIN_POINTS, None),
+            (SEGMENTS, OUTLINE_POINTS, None),
+            (LINES, THIN_POINTS, LINE_COLOUR),
+            (FACES, LINE_POINTS, None),
+            (VORONOI, LINE_POINTS, VORONOI_COLOUR),
+            (f"{SPECTRUM}/directions", LINE_POINTS, DIRECTION_COLOUR),
+        ):
+            self._style_lines(path, width, colour)
+
+    def log(self, frame: TrackedSnapshot, view_side_m: float) -> None:
+        """Log one map, after the layers have begun its snapshot; the view is so high, at first."""
+        self._log_pictures(frame)
+        self._log_rooms(frame, view_side_m)
+        doors = np.array([door.ends_m for door in frame.analysis.rooms.doorways]).reshape(-1, 4)
+        self._log_lines(DOORWAYS, doors)
+        if "predicted" in self._wanted:
+            lines, room = hatch_unseen(frame)
+            colours = np.array([track_colour(track) for track in frame.track_ids], float).reshape(-1, 3)
+            self._log_lines(PREDICTED, lines, (OUTLINE_SHADE * colours[room]).astype(np.uint8))
+        self._log_structure(frame)
+        if frame.path is not None:
+            self._log_path(frame.path)
+
+    def _log_pictures(self, frame: TrackedSnapshot) -> None:
+        pictures = MapPictures(frame.snapshot)
+        self._layers.show(MAP, pictures.map(_height_m(MAP)))
+        self._layers.show(
+            FILLS, pictures.rooms(frame.analysis.rooms.labels, frame.track_ids, _height_m(FILLS))
+        )
+        structure = frame.analysis.structure
+        if structure is None:
+            return
+        if "clean_map" in self._wanted:
+            self._layers.show(CLEAN, pictures.clean_map(structure.clean, _height_m(CLEAN)))
+        if "score" in self._wanted:
+            self._layers.show(SCORE, pictures.score(structure.score, _height_m(SCORE)))
+        if "spectrum" in self._wanted:
+            yaw = frame.analysis.geometry.yaw_rad
+            self._layers.show(f"{SPECTRUM}/magnitude", spectrum_picture(structure.spectrum, yaw))
+            self._log_directions(structure.directions_rad)
+
+    def _log_directions(self, directions_rad: FloatArray) -> None:
+        """Mark, through the spectrum's centre, where walls of the dominant directions have their ridge."""
+        across = directions_rad + np.pi / 2
+        # At the rim of the picture only, so that the ridge itself can be seen.
+        begins, ends = (reach * np.column_stack([np.cos(across), np.sin(across)]) for reach in MARKS)
+        marks = np.concatenate([np.hstack([begins, ends]), np.hstack([-begins, -ends])])
+        points = np.column_stack([marks.reshape(-1, 2), np.full(2 * len(marks), LAYER_STEP_M)])
+        lengths = np.full(len(marks), 2, np.int32)
+        self._layers.show(f"{SPECTRUM}/directions", Strips(points.astype(np.float32), lengths))
+        for number, (angle, place) in enumerate(zip(directions_rad, begins, strict=True)):
+            text = DIRECTION_NAME.format(angle=np.degrees(angle))
+            label = Label((float(place[0]), float(place[1]), 2 * LAYER_STEP_M), text)
+            if number not in self._named:
+                self._named.add(number)
+                self._style_label(f"{SPECTRUM}/names/{number}")
+            self._layers.show(f"{SPECTRUM}/names/{number}", label)
+        for number in range(len(directions_rad), self._layers.count_below(f"{SPECTRUM}/names")):
+            self._layers.clear(f"{SPECTRUM}/names/{number}")
+
+    def _log_rooms(self, frame: TrackedSnapshot, view_side_m: float) -> None:
+        rooms = frame.analysis.rooms
+        for track in sorted(self._shown - set(frame.track_ids)):
+            self._layers.clear(f"{ROOMS}/{track}")
+        self._shown = set(frame.track_ids)
+        points = lifted(np.nan_to_num(rooms.label_points_m), len(HEIGHTS)).tolist()
+        for number, track in enumerate(frame.track_ids):
+            if track not in self._known:
+                self._known.add(track)
+                self._begin_track(track)
+            self._layers.show(f"{ROOMS}/{track}", _rings(rooms.outer_rings_m[number]))
+            x, y, z = points[number]
+            wall_share, _ = evidence_of(frame, number)
+            area_m2 = float(rooms.areas_m2[number])
+            text = room_label(track, area_m2, view_side_m, unsure=is_unsure(wall_share))
+            self._layers.show(f"{ROOMS}/{track}/label", Label((x, y, z), text))
+
+    def _begin_track(self, track: int) -> None:
+        """Log what stays the same for a track."""
+        red, green, blue = (int(OUTLINE_SHADE * value) for value in track_colour(track))
+        self._style_lines(f"{ROOMS}/{track}", OUTLINE_POINTS, (red, green, blue))
+        self._style_label(f"{ROOMS}/{track}/label")
+
+    def _log_structure(self, frame: TrackedSnapshot) -> None:
+        analysis = frame.analysis
+        if analysis.walls is not None and "segments" in self._wanted:
+            self._log_lines(
+                SEGMENTS, analysis.walls.segments_m, _cluster_colours(analysis.walls.segment_cluster)
+            )
+        if analysis.walls is not None and "lines" in self._wanted:
+            self._log_lines(LINES, analysis.walls.lines_m)
+        if analysis.floor_plan is not None and "faces" in self._wanted:
+            weight = analysis.floor_plan.edge_weight[:, None]
+            colours = weight * np.array(STRONG_EDGE) + (1 - weight) * np.array(WEAK_EDGE)
+            self._log_lines(FACES, analysis.floor_plan.edges_m, colours.astype(np.uint8))
+        if analysis.voronoi_m is not None:
+            self._log_lines(VORONOI, analysis.voronoi_m)
+
+    def _log_path(self, path: FloatArray) -> None:
+        """Log the way since the map before; the view shows all that came before with it."""
+        if not len(path):
+            return
+        way = path if self._pose is None else np.concatenate([self._pose[None], path])
+        self._pose = path[-1]
+        far = np.hypot(*np.diff(way[:, :2], axis=0).T) > PATH_GAP_M
+        lengths = np.diff([0, *np.flatnonzero(far) + 1, len(way)])
+        self._layers.add(PATH, Strips(lifted(way[:, :2], HEIGHTS.index(PATH)), lengths.astype(np.int32)))
+        tip, back, side = ROBOT_LENGTH_M / 2, -ROBOT_LENGTH_M / 2, ROBOT_WIDTH_M / 2
+        head = np.array([[tip, 0], [back, side], [0.6 * back, 0], [back, -side], [tip, 0]])
+        cosine, sine = np.cos(self._pose[2]), np.sin(self._pose[2])
+        there = head @ np.array([[cosine, sine], [-sine, cosine]]) + self._pose[:2]
+        self._layers.show(ROBOT, Strips(lifted(there, HEIGHTS.index(ROBOT)), np.array([5], np.int32)))
+
+    def _log_lines(self, path: str, ends_m: FloatArray, colours: NDArray[np.uint8] | None = None) -> None:
+        points = lifted(ends_m.reshape(-1, 2), HEIGHTS.index(path))
+        self._layers.show(path, Strips(points, np.full(len(ends_m), 2, np.int32), colours))
+
+    def _style_lines(self, path: str, width: float, colour: Colour | None) -> None:
+        self._recording.log(path, line_style(width, colour), static=True)
+
+    def _style_label(self, path: str) -> None:
+        self._recording.log(path, label_style(), static=True)
+
+
+def line_style(width: float, colour: Colour | None) -> rr.LineStrips3D:
+    """Width in points of the screen that all lines of a path have, and their colour if it is one."""
+    return rr.LineStrips3D.from_fields(
+        radii=rr.components.Radius.ui_points(width), colors=None if colour is None else [colour]
+    )
+
+
+def label_style() -> rr.Points3D:
+    """How names are shown."""
+    return rr.Points3D.from_fields(
+        colors=[(255, 255, 255)], radii=rr.components.Radius.ui_points(0.5), show_labels=True
+    )
+
+
+def room_label(
+    track: int, area_m2: float, view_side_m: float, *, unsure: bool = False, told: str | None = None
+) -> str:
+    """Name a room: number and area in one line, the number alone if these would cover its neighbours.
+
+    The viewer cuts labels of several lines down to the first one where there are many. `told` stands in place
+    of the area where that is not what matters.
+    """
+    number = f"{track}{UNSURE_SIGN if unsure else ''}"
+    if area_m2 < NAMED_SHARE * view_side_m**2:
+        return number
+    return f"{number}: {told or f'{area_m2:.0f} m²'}"
+
+
+def _height_m(path: str) -> float:
+    return HEIGHTS.index(path) * LAYER_STEP_M
+
+
+def _cluster_colours(cluster: NDArray[np.int32]) -> NDArray[np.uint8]:
+    """Colour (N, 3) of each segment by its wall."""
+    count = int(cluster.max(initial=-1)) + 1
+    colours = [np.array(track_colour(number + 1)) * SEGMENT_SHADE for number in range(count)]
+    # A segment of no wall has the number -1: the last colour.
+    return np.array([*colours, UNCLUSTERED_COLOUR])[cluster].astype(np.uint8)
+
+
+def lifted(points_m: FloatArray, layer: float) -> NDArray[np.float32]:
+    """Points (K, 2) as (K, 3) at a layer's height; half of one lies between two."""
+    return np.column_stack([points_m, np.full(len(points_m), layer * LAYER_STEP_M)]).astype(np.float32)
+
+
+def _rings(rings: Sequence[FloatArray]) -> Strips:
+    """Closed rings at the height of rooms."""
+    points = lifted(np.concatenate([np.zeros((0, 2)), *rings]), HEIGHTS.index(ROOMS))
+    return Strips(points, np.array([len(ring) for ring in rings], np.int32))

@@ -1,0 +1,1 @@
+"""A run from its maps to stored data, and stored data back to a run."""

@@ -1,0 +1,119 @@
+"""A Parquet file that is written row group by row group, and appears under its name when it is whole."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Self
+
+from rose2_logs.system.files import part_of, writing
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+ROWS_PER_GROUP = 2000
+"""Rows held back until they are written as one row group: some hundred kilobytes with polygons."""
+ROWS_PER_BATCH = 100
+"""Rows held as Python objects, which take several times as much, until they become a batch of Arrow's."""
+COMPRESSION = "zstd"
+
+Row = dict[str, Any]
+
+
+class ParquetTable:
+    """One file: rows are added, then it is closed, then published.
+
+    Leaving the context removes what was not published.
+
+    Parameters
+    ----------
+    path : path
+        Its name.
+    schema : pyarrow.Schema
+        Its columns.
+    part : path, optional
+        Where it is written until then; by default hidden beside its name.
+    """
+
+    def __init__(self, path: Path, schema: pa.Schema, part: Path | None = None) -> None:
+        self.part = part or part_of(path)
+        self._path = path
+        self._schema = schema
+        self._rows: list[Row] = []
+        self._batches: list[pa.RecordBatch] = []
+        self._writer: pq.ParquetWriter | None = None
+
+    def __enter__(self) -> Self:
+        import pyarrow.parquet as pq
+
+        with writing(self._path):
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            self._writer = pq.ParquetWriter(self.part, self._schema, compression=COMPRESSION)
+        return self
+
+    def add(self, rows: list[Row]) -> None:
+        """Take rows; they are written when there are enough for a group.
+
+        Raises
+        ------
+        OutputError
+            If the file cannot be written.
+        """
+        self._rows += rows
+        if len(self._rows) >= ROWS_PER_BATCH:
+            self._pack()
+        if sum(batch.num_rows for batch in self._batches) >= ROWS_PER_GROUP:
+            self._flush()
+
+    def _pack(self) -> None:
+        import pyarrow as pa
+
+        self._batches.append(pa.RecordBatch.from_pylist(self._rows, self._schema))
+        self._rows = []
+
+    def _flush(self) -> None:
+        import pyarrow as pa
+
+        if self._rows:
+            self._pack()
+        if self._writer is not None and self._batches:
+            with writing(self._path):
+                self._writer.write_table(pa.Table.from_batches(self._batches).combine_chunks())
+            self._batches = []
+
+    def close(self) -> None:
+        """Write the last rows; the part can be read from now on.
+
+        Raises
+        ------
+        OutputError
+            If the file cannot be written.
+        """
+        self._flush()
+        self._close_writer()
+
+    def _close_writer(self) -> None:
+        if self._writer is not None:
+            writer, self._writer = self._writer, None
+            with writing(self._path):
+                writer.close()
+
+    def publish(self) -> None:
+        """Give the closed file its name.
+
+        Raises
+        ------
+        OutputError
+            If that cannot be done.
+        """
+        with writing(self._path):
+            self.part.replace(self._path)
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        try:
+            self._close_writer()
+        finally:
+            self.part.unlink(missing_ok=True)

@@ -1,0 +1,251 @@
+"""What the map says along each edge: wall, open, or not seen (paper, III-C: edge weights)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeVar
+
+import cv2
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from rose2_logs.config.parameters import FloorPlanParameters
+from rose2_logs.model.occupancy import BoolArray, FloatArray
+from rose2_logs.segmentation.floor_plan.faces import SNAP_M
+
+LINE_SEARCH_M = 4 * SNAP_M
+"""Noding moves an edge off its line by less than this."""
+LOOK_SAMPLES = 25
+"""Samples of a look ahead; at 3 m one every 12 cm."""
+Number = TypeVar("Number", bound=np.generic)
+
+
+@dataclass(frozen=True, eq=False)
+class EdgeEvidence:
+    """Lengths (E,) in metres of each edge; what is neither was not seen or is clutter.
+
+    Attributes
+    ----------
+    wall_m : (E,) float
+        Covered by walls.
+    blind_m : (E,) float
+        Of these, what shows no free space on one of its sides, see `_read_lines`.
+    open_m : (E,) float
+        Open free space.
+    length_m : (E,) float
+        All of the edge.
+    passage_share : (E,) float
+        Width of the best passage through the edge (a stretch of its line without a wall) over the width of
+        the room beside it: about 1 across a corridor, less in a doorway, 0 where the edge is not open.
+    """
+
+    wall_m: FloatArray
+    blind_m: FloatArray
+    open_m: FloatArray
+    length_m: FloatArray
+    passage_share: FloatArray
+
+    @property
+    def weight(self) -> FloatArray:
+        """Share (E,) of each edge that walls cover, in [0, 1]."""
+        share: FloatArray = np.divide(
+            self.wall_m, self.length_m, out=np.zeros_like(self.wall_m), where=self.length_m > 0
+        )
+        return np.minimum(share, 1.0)
+
+
+def edge_evidence(
+    edges_m: FloatArray,
+    lines_m: FloatArray,
+    walls: BoolArray,
+    free: BoolArray,
+    resolution_m: float,
+    parameters: FloorPlanParameters,
+) -> EdgeEvidence:
+    """Read the map along the representative lines and share what is found among their edges.
+
+    Parameters
+    ----------
+    edges_m : (E, 4) float
+        Edges in the grid frame, metres; those that lie on no line get zeros.
+    lines_m : (L, 4) float
+        Representative lines.
+    walls, free : (H, W) bool
+        Cells of walls and free cells.
+    """
+    if len(lines_m) == 0:
+        nothing = np.zeros(len(edges_m))
+        length = np.hypot(edges_m[:, 2] - edges_m[:, 0], edges_m[:, 3] - edges_m[:, 1])
+        return EdgeEvidence(nothing, nothing, nothing, length, nothing)
+    line, step_m, is_wall, is_blind, is_free = _read_lines(lines_m, walls, free, resolution_m, parameters)
+    offset = np.concatenate([[0], np.cumsum(np.bincount(line, minlength=len(lines_m)))])
+    owner, start, end = _place_edges(edges_m, lines_m)
+    length = np.hypot(edges_m[:, 2] - edges_m[:, 0], edges_m[:, 3] - edges_m[:, 1])
+    on_line = owner >= 0
+    lengths = []
+    for flag in (is_wall, is_blind, is_free & ~is_wall):
+        total = np.concatenate([[0.0], np.cumsum(flag)])
+        samples = np.arange(len(total), dtype=float)
+        base, step = offset[owner[on_line]], step_m[owner[on_line]]
+        spans = [np.interp(base + at[on_line] / step, samples, total) for at in (start, end)]
+        value = np.zeros(len(edges_m))
+        value[on_line] = (spans[1] - spans[0]) * step
+        lengths.append(value)
+    run_share = _passages(line, is_wall, step_m, lines_m, walls, resolution_m, parameters)
+    run_share[~is_free] = 0
+    share = np.zeros(len(edges_m))
+    first = offset[owner] + np.floor(start / step_m[owner] + 0.5).astype(np.int64)
+    last = offset[owner] + np.floor(end / step_m[owner] + 0.5).astype(np.int64)
+    some = np.flatnonzero(on_line & (last > first))
+    # In the order of the samples, since what lies between two edges is gone through as well.
+    some = some[np.argsort(first[some], kind="stable")]
+    if len(some):
+        bounds = np.minimum(np.column_stack([first[some], last[some]]).ravel(), len(run_share) - 1)
+        share[some] = np.maximum.reduceat(run_share, bounds)[::2]
+    wall_m, blind_m, open_m = lengths
+    return EdgeEvidence(wall_m, blind_m, open_m, length, share)
+
+
+def _passages(
+    line: NDArray[np.intp],
+    is_wall: BoolArray,
+    step_m: FloatArray,
+    lines_m: FloatArray,
+    walls: BoolArray,
+    resolution_m: float,
+    parameters: FloorPlanParameters,
+) -> FloatArray:
+    """Length of the stretch without a wall that each sample lies in over the room on both sides of it.
+
+    From three points of a stretch one looks straight ahead and back, as far as the stretch is wide (times
+    `passage_look_widths`) or to the next wall. The greatest distance from walls met on a side is half the
+    width of the room there. The stretch is held against the narrower side, so that a line across a corridor
+    is as wide as the corridor; but a gap in a wall, between two jambs on its line, against the wider
+    side, so that the mouth of a narrow corridor is the doorway of a hall.
+
+    Returns
+    -------
+    share : (S,) float
+        0 on walls.
+    """
+    begins = np.flatnonzero(np.concatenate([[True], (np.diff(line) != 0) | (np.diff(is_wall) != 0)]))
+    ends = np.append(begins[1:], len(line))
+    run = np.repeat(np.arange(len(begins)), ends - begins)
+    run_line = line[begins]
+    length = (ends - begins) * step_m[run_line]
+    first_of_line = np.searchsorted(line, run_line)
+    vector = lines_m[run_line, 2:] - lines_m[run_line, :2]
+    vector /= np.maximum(np.hypot(vector[:, 0], vector[:, 1]), 1e-12)[:, None]
+    normal = np.column_stack([-vector[:, 1], vector[:, 0]])
+    distance = cv2.distanceTransform((~walls).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
+    depth = np.minimum(length * parameters.passage_look_widths, parameters.passage_look_max_m)
+    ahead = np.linspace(0, 1, LOOK_SAMPLES)
+    sides = []
+    for sign in (1, -1):
+        widest = np.zeros(len(begins))
+        for part in (0.25, 0.5, 0.75):
+            at = (begins - first_of_line + part * (ends - begins)) * step_m[run_line]
+            eye = lines_m[run_line, :2] + vector * at[:, None]
+            points = eye[:, None] + sign * normal[:, None] * (depth[:, None] * ahead)[..., None]
+            met = _sample(distance, points.reshape(-1, 2), resolution_m).reshape(len(begins), -1)
+            met = np.where(np.minimum.accumulate(met, axis=1) > 0, met, 0)
+            np.maximum(widest, met.max(1), out=widest)
+        sides.append(widest * resolution_m)
+    gap = _between_jambs(begins, ends, line, is_wall, step_m, parameters)
+    gap &= length <= parameters.doorway_max_width_m
+    room = 2 * np.maximum(np.where(gap, np.maximum(*sides), np.minimum(*sides)), resolution_m / 2)
+    return np.where(is_wall, 0.0, (length / room)[run])
+
+
+def _between_jambs(
+    begins: NDArray[np.intp],
+    ends: NDArray[np.intp],
+    line: NDArray[np.intp],
+    is_wall: BoolArray,
+    step_m: FloatArray,
+    parameters: FloorPlanParameters,
+) -> BoolArray:
+    """Tell which stretches (R,) of samples have wall on their line before and after them."""
+    of_run = line[begins]
+    count = np.maximum(1, np.round(parameters.jamb_length_m / step_m[of_run]).astype(np.intp))
+    before = np.maximum(begins - count, np.searchsorted(line, of_run))
+    after = np.minimum(ends + count, np.searchsorted(line, of_run, side="right"))
+    total = np.concatenate([[0], np.cumsum(is_wall)])
+    walled = np.minimum(total[begins] - total[before], total[after] - total[ends])
+    between: BoolArray = walled >= parameters.jamb_min_fill * count
+    return between
+
+
+def _read_lines(
+    lines_m: FloatArray,
+    walls: BoolArray,
+    free: BoolArray,
+    resolution_m: float,
+    parameters: FloorPlanParameters,
+) -> tuple[NDArray[np.intp], FloatArray, BoolArray, BoolArray, BoolArray]:
+    """Sample each line once a cell: a wall is where a wall cell lies across it within the tolerance.
+
+    A wall is blind where no free cell lies within `blind_look_m` on one of its sides, unless another wall
+    runs there: what is behind was not seen, or is a piece of furniture.
+
+    Returns
+    -------
+    line : (S,) int
+        Line of each sample, in order along the lines.
+    step_m : (L,) float
+        Distance between the samples of a line.
+    is_wall, is_blind, is_free : (S,) bool
+    """
+    vector = lines_m[:, 2:] - lines_m[:, :2]
+    length = np.hypot(vector[:, 0], vector[:, 1])
+    count = np.maximum(np.ceil(length / resolution_m).astype(np.int64), 1)
+    line = np.repeat(np.arange(len(lines_m)), count)
+    position = np.arange(len(line)) - np.repeat(np.cumsum(count) - count, count)
+    centre = lines_m[line, :2] + vector[line] * ((position + 0.5) / count[line])[:, None]
+    normal = (np.column_stack([-vector[:, 1], vector[:, 0]]) / np.maximum(length, 1e-12)[:, None])[line]
+    is_wall = np.zeros(len(line), bool)
+    reach = round(parameters.wall_tolerance_m / resolution_m)
+    for step in range(-reach, reach + 1):
+        is_wall |= _sample(walls, centre + normal * (step * resolution_m), resolution_m)
+    is_blind = np.zeros(len(line), bool)
+    centre_of_wall, normal_of_wall = centre[is_wall], normal[is_wall]
+    steps = np.arange(1, round(parameters.blind_look_m / resolution_m) + 1) * resolution_m
+    for side in (1, -1):
+        is_empty, is_through = np.ones((2, len(centre_of_wall)), bool)
+        for at_m in side * steps:
+            points = centre_of_wall + normal_of_wall * at_m
+            is_empty &= ~_sample(free, points, resolution_m)
+            is_through &= _sample(walls, points, resolution_m)
+        is_blind[is_wall] |= is_empty & ~is_through
+    return line, length / count, is_wall, is_blind, _sample(free, centre, resolution_m)
+
+
+def _sample(mask: NDArray[Number], points_m: FloatArray, resolution_m: float) -> NDArray[Number]:
+    """Values of the cells that hold points; 0 outside the map."""
+    cells = np.floor(points_m / resolution_m).astype(np.intp)
+    inside = np.all((cells >= 0) & (cells < mask.shape[::-1]), axis=1)
+    values = np.zeros(len(cells), mask.dtype)
+    values[inside] = mask[cells[inside, 1], cells[inside, 0]]
+    return values
+
+
+def _place_edges(edges_m: FloatArray, lines_m: FloatArray) -> tuple[NDArray[np.intp], FloatArray, FloatArray]:
+    """Line of each edge (-1 for none) and where along it the edge starts and ends, in metres."""
+    owner = np.full(len(edges_m), -1, np.intp)
+    tree = shapely.STRtree(shapely.linestrings(lines_m.reshape(-1, 2, 2)))
+    middle = shapely.points((edges_m[:, :2] + edges_m[:, 2:]) / 2)
+    edge, line = tree.query(middle, predicate="dwithin", distance=LINE_SEARCH_M)
+    # Where lines cross at a point, the edge's own line is the one that both its ends lie on.
+    ends = [shapely.points(edges_m[edge, k : k + 2]) for k in (0, 2)]
+    misfit = np.maximum(*[shapely.distance(end, tree.geometries[line]) for end in ends])
+    good = misfit <= LINE_SEARCH_M
+    edge, line, misfit = edge[good], line[good], misfit[good]
+    order = np.lexsort((line, misfit, edge))[::-1]
+    owner[edge[order]] = line[order]
+    direction = lines_m[owner, 2:] - lines_m[owner, :2]
+    direction /= np.maximum(np.hypot(direction[:, 0], direction[:, 1]), 1e-12)[:, None]
+    along = [np.einsum("ij,ij->i", edges_m[:, k : k + 2] - lines_m[owner, :2], direction) for k in (0, 2)]
+    length = shapely.length(tree.geometries[owner])
+    start, end = np.minimum(*along), np.maximum(*along)
+    return owner, np.clip(start, 0, length), np.clip(end, 0, length)

@@ -1,0 +1,87 @@
+"""Faces: the cells of the plane that the representative lines cut out (paper, III-C)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from rose2_logs.model.occupancy import FloatArray
+
+SNAP_M = 1e-3
+"""Vertices are snapped to this lattice (1 mm), far below a cell and far above rounding."""
+SUBCELL_BITS = 8
+"""Polygons are rasterised with vertices in 1/256 of a cell, the finest that OpenCV needs here."""
+
+
+@dataclass(frozen=True, eq=False)
+class FaceGraph:
+    """A planar graph. Metres, grid frame.
+
+    Attributes
+    ----------
+    polygons : (F,) array of shapely Polygon
+    edges_m : (E, 4) float
+        Edges x0, y0, x1, y1.
+    edge_faces : (E, 2) int32
+        The faces at both sides, -1 for the outside of the frame.
+    """
+
+    polygons: NDArray[np.object_]
+    edges_m: FloatArray
+    edge_faces: NDArray[np.int32]
+
+
+def build_faces(lines_m: FloatArray, frame: shapely.Polygon) -> FaceGraph:
+    """Cut a convex part of the plane by lines.
+
+    Parameters
+    ----------
+    lines_m : (L, 4) float
+        Lines x0, y0, x1, y1; ends that cut nothing are left out.
+    frame : shapely Polygon
+        The part, metres.
+    """
+    lines = shapely.linestrings(lines_m.reshape(-1, 2, 2))
+    lines = shapely.intersection(lines, frame)
+    network = shapely.union_all(np.append(lines, frame.exterior), grid_size=SNAP_M)
+    polygons = shapely.get_parts(shapely.polygonize([network]))
+    # A fixed order: by the lowest, then leftmost corner, whatever GEOS does inside.
+    bounds = shapely.bounds(polygons)
+    polygons = polygons[np.lexsort((shapely.area(polygons), bounds[:, 0], bounds[:, 1]))]
+    rings, face_of_ring = shapely.get_rings(polygons, return_index=True)
+    points, ring = shapely.get_coordinates(rings, return_index=True)
+    inner = np.flatnonzero(ring[1:] == ring[:-1])
+    vertex_key = np.rint(points / SNAP_M).astype(np.int64)
+    vertices, vertex = np.unique(vertex_key, axis=0, return_inverse=True)
+    ends = np.sort(np.column_stack([vertex[inner], vertex[inner + 1]]), axis=1)
+    pairs, edge = np.unique(ends, axis=0, return_inverse=True)
+    face = face_of_ring[ring[inner]]
+    order = np.lexsort((face, edge))
+    edge, face = edge[order], face[order]
+    second = np.zeros(len(edge), bool)
+    second[1:] = edge[1:] == edge[:-1]
+    edge_faces = np.full((len(pairs), 2), -1, np.int32)
+    edge_faces[edge[~second], 0] = face[~second]
+    edge_faces[edge[second], 1] = face[second]
+    edges = vertices[pairs].reshape(-1, 4) * SNAP_M
+    return FaceGraph(polygons, edges, edge_faces)
+
+
+def rasterise(
+    polygons: NDArray[np.object_], values: NDArray[np.int32], shape: tuple[int, int], resolution_m: float
+) -> NDArray[np.int32]:
+    """Paint polygons into cells: (H, W) int32 with `values`, 0 where there is none."""
+    image = np.zeros(shape, np.int32)
+    scale = 1 << SUBCELL_BITS
+    for polygon, value in zip(polygons, values, strict=True):
+        for part in shapely.get_parts(polygon):
+            rings = [
+                np.rint((shapely.get_coordinates(ring) / resolution_m - 0.5) * scale).astype(np.int32)
+                for ring in shapely.get_rings(part)
+            ]
+            cv2.fillPoly(image, rings, int(value), shift=SUBCELL_BITS)
+    return image

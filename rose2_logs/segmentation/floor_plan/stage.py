@@ -1,0 +1,86 @@
+"""Stage C in one call."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.affinity import rotate
+
+from rose2_logs.config.parameters import FloorPlanParameters
+from rose2_logs.model.occupancy import BoolArray, FloatArray
+from rose2_logs.segmentation.floor_plan.edge_weights import EdgeEvidence, edge_evidence
+from rose2_logs.segmentation.floor_plan.faces import FaceGraph, build_faces
+from rose2_logs.segmentation.floor_plan.grouping import group_faces
+from rose2_logs.segmentation.floor_plan.rooms import clearance, free_area, label_faces
+
+FRAME_MARGIN_M = 1.0
+"""The plane is cut within the map's box and this much around it, so that its outer walls lie inside."""
+
+
+@dataclass(frozen=True, eq=False)
+class FloorPlanResult:
+    """Stage C in the grid frame, metres.
+
+    Attributes
+    ----------
+    graph : FaceGraph
+    evidence : EdgeEvidence
+    seen : (F,) float
+        Share of each face that is known to be free.
+    group : (F,) int32
+        Group of each face, 1.., 0 for faces outside.
+    labels : (H, W) int32
+        Group of each free cell, 0 for none.
+    """
+
+    graph: FaceGraph
+    evidence: EdgeEvidence
+    seen: FloatArray
+    group: NDArray[np.int32]
+    labels: NDArray[np.int32]
+
+
+def make_floor_plan(
+    lines_m: FloatArray,
+    walls: BoolArray,
+    free: BoolArray,
+    direction_rad: float,
+    resolution_m: float,
+    parameters: FloorPlanParameters,
+) -> FloorPlanResult:
+    """Faces, edge weights, inside and outside, groups of faces.
+
+    The plane is cut within a box along `direction_rad`, the strongest dominant direction: what lies beyond
+    counts as unseen, so that a box along the axes of the raster would give other rooms to a turned map.
+    """
+    graph = build_faces(lines_m, _frame(free | walls, direction_rad, resolution_m))
+    count = len(graph.polygons)
+    evidence = edge_evidence(graph.edges_m, lines_m, walls, free, resolution_m, parameters)
+    face_of_cell = label_faces(graph, (free.shape[0], free.shape[1]), resolution_m)
+    area = free_area(face_of_cell, free, count, resolution_m)
+    seen = area / np.maximum(shapely.area(graph.polygons), 1e-12)
+    # Without any line the map is one face, however little of it was seen.
+    inside = (seen >= parameters.face_min_seen) | (count == 1)
+    widest = clearance(face_of_cell, free, walls, count, resolution_m)
+    area[~inside] = 0
+    group = 1 + group_faces(graph.edge_faces, evidence, area, seen, widest, parameters)
+    labels = np.concatenate([np.zeros(1, np.int32), group])[face_of_cell]
+    labels[~free] = 0
+    return FloorPlanResult(graph, evidence, seen, group, labels)
+
+
+def _frame(known: BoolArray, direction_rad: float, resolution_m: float) -> shapely.Polygon:
+    """Box around the known cells along a direction, with a margin: it turns with the map."""
+    rows = np.flatnonzero(known.any(1))
+    if len(rows) == 0:
+        return shapely.box(0, 0, known.shape[1] * resolution_m, known.shape[0] * resolution_m)
+    first = known.argmax(1)[rows]
+    last = known.shape[1] - known[:, ::-1].argmax(1)[rows]
+    corners = np.concatenate([np.column_stack([x, y]) for x in (first, last) for y in (rows, rows + 1)])
+    turned = rotate(shapely.multipoints(corners * resolution_m), -direction_rad, (0, 0), use_radians=True)
+    box = shapely.buffer(shapely.envelope(turned), FRAME_MARGIN_M, join_style="mitre")
+    frame: shapely.Polygon = rotate(box, direction_rad, (0, 0), use_radians=True)
+    return frame

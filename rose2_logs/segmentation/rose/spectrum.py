@@ -1,0 +1,154 @@
+"""The map's two-dimensional spectrum and the dominant directions that its ridges show (paper, III-A)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft, ndimage
+
+from rose2_logs.config.parameters import SpectrumParameters
+from rose2_logs.model.occupancy import BoolArray, FloatArray
+from rose2_logs.segmentation.circular_peaks import circular_peaks
+
+PICTURE_SIDE = 160
+"""Pixels along the side of the spectrum's picture: its ridges are told apart, and it stays small."""
+
+
+@dataclass(frozen=True, eq=False)
+class Spectrum:
+    """Half-plane Fourier transform of the occupied cells, with all walls brought to one thickness.
+
+    Attributes
+    ----------
+    values : (h, w // 2 + 1) complex64
+        The transform, zero padded to a size (h, w) that is good for it.
+    frequency_x, frequency_y : (1, w // 2 + 1) and (h, 1) float32
+        Frequencies in cycles per metre.
+    shape : (int, int)
+        The padded size (h, w).
+    """
+
+    values: NDArray[np.complex64]
+    frequency_x: NDArray[np.float32]
+    frequency_y: NDArray[np.float32]
+    shape: tuple[int, int]
+
+    def filtered(self, gain: NDArray[np.float32], size: tuple[int, int]) -> NDArray[np.float32]:
+        """Transform back what a gain of the half plane's shape leaves, cut to `size` cells."""
+        # One axis after the other, so that rows that are cut off are not transformed.
+        columns = fft.ifft(self.values * gain, axis=0, overwrite_x=True)[: size[0]]
+        image: NDArray[np.float32] = fft.irfft(columns, self.shape[1], axis=1, overwrite_x=True)
+        return image[:, : size[1]]
+
+
+def compute_spectrum(occupied: BoolArray, resolution_m: float, parameters: SpectrumParameters) -> Spectrum:
+    """Transform the occupied cells of the explored part of a map.
+
+    The canvas is padded by twice the length of the structure filter so that nothing wraps around, and the
+    cells are blurred by `wall_sigma_m`, so that a wall that wobbles by a cell still is one straight line;
+    thick walls and furniture count no more than a thin wall does.
+    """
+    margin = int(np.ceil(2 * parameters.structure_length_m / resolution_m))
+    shape = tuple(fft.next_fast_len(side + margin, real=True) for side in occupied.shape)
+    walls = _walls_of_one_thickness(occupied, resolution_m, parameters.wall_sigma_m)
+    # One axis after the other, so that rows of zeros are not transformed.
+    values = fft.fft(fft.rfft(walls, shape[1], axis=1), shape[0], axis=0)
+    frequency_x = fft.rfftfreq(shape[1], resolution_m).astype(np.float32)[None, :]
+    frequency_y = fft.fftfreq(shape[0], resolution_m).astype(np.float32)[:, None]
+    return Spectrum(values, frequency_x, frequency_y, (shape[0], shape[1]))
+
+
+def spectrum_picture(spectrum: Spectrum, parameters: SpectrumParameters) -> NDArray[np.uint8]:
+    """Draw the spectrum for people: the logarithm of its magnitude around frequency zero.
+
+    Returns
+    -------
+    picture : (S, S) uint8
+        S is `PICTURE_SIDE`. Columns are x, rows y frequencies from `-1 / shortest_wave_m` to as much above 0,
+        the waves that directions are looked for in; 0 is the median of the magnitudes, 255 the greatest.
+    """
+    step_x, step_y = float(spectrum.frequency_x[0, 1]), float(spectrum.frequency_y[1, 0])
+    height, width = spectrum.values.shape
+    columns = min(max(round(1 / parameters.shortest_wave_m / step_x), 1), width)
+    rows = min(max(round(1 / parameters.shortest_wave_m / step_y), 1), height // 2)
+    # The transform holds the half of positive x; a real map's spectrum is the same turned by half a circle.
+    part = np.concatenate([spectrum.values[-rows:, :columns], spectrum.values[:rows, :columns]])
+    half = cv2.resize(np.abs(part), (PICTURE_SIDE // 2, PICTURE_SIDE), interpolation=cv2.INTER_AREA)
+    logarithm = np.log1p(np.concatenate([half[::-1, ::-1], half], axis=1))
+    low, high = float(np.median(logarithm)), float(logarithm.max())
+    if high <= low:
+        return np.zeros(logarithm.shape, np.uint8)
+    shown: NDArray[np.uint8] = (255 * np.clip((logarithm - low) / (high - low), 0, 1)).astype(np.uint8)
+    return shown
+
+
+def _walls_of_one_thickness(occupied: BoolArray, resolution_m: float, sigma_m: float) -> NDArray[np.float32]:
+    """Blur the occupied cells, scaled so that a straight wall one cell thick is 1 and cut off there."""
+    sigma = max(sigma_m / resolution_m, 0.5)
+    walls: NDArray[np.float32] = occupied.astype(np.float32)
+    cv2.GaussianBlur(walls, (0, 0), sigma, dst=walls, borderType=cv2.BORDER_CONSTANT)
+    walls /= np.float32(1 / (np.sqrt(2 * np.pi) * sigma))
+    return np.minimum(walls, 1, out=walls)
+
+
+def angular_energy(spectrum: Spectrum, parameters: SpectrumParameters) -> FloatArray:
+    """Sum the spectrum's magnitude over the direction of the walls that cause it.
+
+    A wall along direction t has its energy on the frequencies perpendicular to t. The magnitude is unfolded
+    to polar coordinates and summed over the radius, so weighted that each point of the plane counts the same.
+
+    Returns
+    -------
+    energy : (B,) float
+        Bin b is centred on the wall direction b * pi / B.
+    """
+    bins = round(np.pi / parameters.angle_step_rad)
+    step_x, step_y = float(spectrum.frequency_x[0, 1]), float(spectrum.frequency_y[1, 0])
+    lowest = 1 / parameters.longest_wave_m
+    highest = min(
+        1 / parameters.shortest_wave_m, float(spectrum.frequency_x.max()), float(spectrum.frequency_y.max())
+    )
+    if highest <= lowest:
+        return np.zeros(bins)
+    radius = np.arange(lowest, highest, min(step_x, step_y))
+    across = np.arange(bins) * np.pi / bins - np.pi / 2
+    magnitude = np.fft.fftshift(np.abs(spectrum.values), axes=0)
+    polar = cv2.remap(
+        magnitude,
+        (np.outer(np.cos(across), radius) / step_x).astype(np.float32),
+        (np.outer(np.sin(across), radius) / step_y + len(magnitude) // 2).astype(np.float32),
+        cv2.INTER_LINEAR,
+        borderMode=cv2.BORDER_REPLICATE,
+    )
+    energy: FloatArray = ndimage.gaussian_filter1d(
+        polar.astype(float) @ radius, parameters.angle_sigma_rad / np.pi * bins, mode="wrap"
+    )
+    return energy
+
+
+def dominant_directions(energy: FloatArray, parameters: SpectrumParameters) -> tuple[FloatArray, FloatArray]:
+    """Peaks of the angular energy, refined below a bin by a parabola.
+
+    Returns
+    -------
+    directions_rad : (D,) float
+        Wall directions in [0, pi), strongest first.
+    strengths : (D,) float
+        Height of each peak above the floor, as a share of the energy's range.
+    """
+    span = float(np.ptp(energy))
+    if span <= 0:
+        return np.zeros(0), np.zeros(0)
+    bins = len(energy)
+    heights = (energy - energy.min()) / span
+    gap = round(parameters.direction_min_gap_rad / np.pi * bins)
+    peaks = circular_peaks(heights, gap, parameters.peak_min_prominence)
+    left, centre, right = heights[peaks - 1], heights[peaks], heights[(peaks + 1) % bins]
+    curvature = left - 2 * centre + right
+    shift = np.divide(left - right, 2 * curvature, out=np.zeros(len(peaks)), where=curvature < 0)
+    directions = np.mod((peaks + shift) * np.pi / bins, np.pi)
+    order = np.lexsort((directions, -centre))
+    return directions[order], centre[order]

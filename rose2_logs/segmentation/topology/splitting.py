@@ -1,0 +1,145 @@
+"""Rooms whose Voronoi graph is not connected, or only through narrow passages, are split (paper, III-D)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import find_objects
+from shapely import STRtree, box, linestrings
+
+from rose2_logs.config.parameters import TopologyParameters
+from rose2_logs.model.occupancy import BoolArray, FloatArray
+from rose2_logs.segmentation.topology.voronoi import clearance_m, parts_of_room
+
+
+def split_rooms(
+    labels: NDArray[np.int32],
+    walls: BoolArray,
+    lines_m: FloatArray,
+    directions_rad: FloatArray,
+    resolution_m: float,
+    parameters: TopologyParameters,
+) -> NDArray[np.int32]:
+    """Split rooms until the Voronoi graph of each is connected by more than narrow passages.
+
+    Two large parts of a room are divided along the representative line near it that best keeps them apart;
+    where none does, along the dominant direction that does, midway between the parts. A cut touches the cells
+    of its own room only.
+
+    Returns
+    -------
+    labels : (H, W) int32
+        With new numbers for the split off parts, above the old ones.
+    """
+    labels = labels.copy()
+    clear = clearance_m(walls, resolution_m)
+    lines = _Lines.of(lines_m)
+    number = int(labels.max(initial=0))
+    pending = [
+        (room, window, 0) for room, window in enumerate(find_objects(labels), start=1) if window is not None
+    ]
+    while pending:
+        room, window, rounds = pending.pop()
+        beyond = _beyond_cut(
+            labels[window] == room, window, clear, lines, directions_rad, resolution_m, parameters
+        )
+        if beyond is None:
+            continue
+        number += 1
+        labels[window][beyond] = number
+        if rounds + 1 < parameters.max_rounds:
+            pending += [(room, window, rounds + 1), (number, window, rounds + 1)]
+    return labels
+
+
+@dataclass(frozen=True, eq=False)
+class _Lines:
+    """The representative lines: normals (L, 2) and offsets (L,), and a tree to find those that meet a box."""
+
+    normals: FloatArray
+    offsets: FloatArray
+    tree: STRtree
+
+    @classmethod
+    def of(cls, ends_m: FloatArray) -> _Lines:
+        return cls(*_as_normals(ends_m), STRtree(linestrings(ends_m.reshape(-1, 2, 2))))
+
+    def near(self, points: NDArray[np.float32]) -> tuple[FloatArray, FloatArray]:
+        """Normals and offsets of the lines that meet the box around some points."""
+        found = np.sort(self.tree.query(box(*points.min(0), *points.max(0)), predicate="intersects"))
+        return self.normals[found], self.offsets[found]
+
+
+def _beyond_cut(
+    inside: BoolArray,
+    window: tuple[slice, slice],
+    clear: NDArray[np.float32],
+    lines: _Lines,
+    directions_rad: FloatArray,
+    resolution_m: float,
+    parameters: TopologyParameters,
+) -> tuple[NDArray[np.intp], NDArray[np.intp]] | None:
+    """Rows and columns of the cells beyond the cut through a room, in its window; None if it stays whole."""
+    part = parts_of_room(inside, clear[window], resolution_m, parameters)
+    size = np.bincount(part.ravel())[1:] * resolution_m**2
+    # The two largest parts are divided first; the rest follow in later rounds.
+    largest = np.argsort(-size, kind="stable")[:2]
+    if len(largest) < 2 or size[largest[1]] < parameters.split_min_area_m2:
+        return None
+    row, column = np.nonzero(inside)
+    points = np.empty((len(row), 2), np.float32)
+    points[:, 0], points[:, 1] = column, row
+    points += np.array([window[1].start, window[0].start], np.float32) + 0.5
+    points *= resolution_m
+    of_cell = part[row, column]
+    one, two = points[of_cell == largest[0] + 1], points[of_cell == largest[1] + 1]
+    candidates = [lines.near(points), _between(one, two, directions_rad)]
+    beyond = _cut(points, one, two, candidates, parameters.split_min_purity)
+    return None if beyond is None else (row[beyond], column[beyond])
+
+
+def _cut(
+    points: NDArray[np.float32],
+    one: NDArray[np.float32],
+    two: NDArray[np.float32],
+    candidates: list[tuple[FloatArray, FloatArray]],
+    min_purity: float,
+) -> BoolArray | None:
+    """Tell which points (P,) lie on the second part's side of the best line of the first set that divides."""
+    for normals, offsets in candidates:
+        purity = np.array([_purity(one, two, n, d) for n, d in zip(normals, offsets, strict=True)])
+        best = int(purity.argmax()) if len(purity) else -1
+        if best >= 0 and purity[best] >= min_purity:
+            above = points @ normals[best] > offsets[best]
+            beyond: BoolArray = above == ((two @ normals[best] > offsets[best]).mean() > 0.5)
+            return beyond
+    return None
+
+
+def _purity(one: NDArray[np.float32], two: NDArray[np.float32], normal: FloatArray, offset: float) -> float:
+    """Share of the worse part that lies on its own side of a line."""
+    a, b = (one @ normal > offset).mean(), (two @ normal > offset).mean()
+    return float(max(min(a, 1 - b), min(1 - a, b)))
+
+
+def _as_normals(lines_m: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Lines x0, y0, x1, y1 as unit normals (L, 2) and offsets (L,)."""
+    vector = lines_m[:, 2:] - lines_m[:, :2]
+    normal = np.column_stack([-vector[:, 1], vector[:, 0]])
+    normal /= np.maximum(np.hypot(normal[:, 0], normal[:, 1]), 1e-12)[:, None]
+    return normal, np.einsum("ij,ij->i", normal, lines_m[:, :2])
+
+
+def _between(
+    one: NDArray[np.float32], two: NDArray[np.float32], directions_rad: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Lines along the dominant directions, each at the offset that best divides two sets of points."""
+    normals = np.column_stack([-np.sin(directions_rad), np.cos(directions_rad)])
+    offsets = np.zeros(len(normals))
+    for k, normal in enumerate(normals):
+        a, b = one @ normal, two @ normal
+        low, high = (a, b) if np.median(a) <= np.median(b) else (b, a)
+        offsets[k] = (np.quantile(low, 0.98) + np.quantile(high, 0.02)) / 2
+    return normals, offsets

@@ -1,0 +1,211 @@
+"""The Voronoi graph of each room's free space, and the parts between its passages (paper, III-D)."""
+
+from __future__ import annotations
+
+import heapq
+from collections import defaultdict
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+from skimage.morphology import skeletonize
+from skimage.segmentation import watershed
+
+from rose2_logs.config.parameters import TopologyParameters
+from rose2_logs.model.occupancy import BoolArray, FloatArray, roots, straight_runs
+
+DRAWN_BLOCK = 2
+"""The graph is drawn by every so many cells: a passage of 30 cm is three of 10 cm wide."""
+SMOOTH_CELLS = 1.0
+"""Blur of the clearance, so that the steps of the raster are no summits of their own."""
+
+
+def parts_of_room(
+    inside: BoolArray, clear: NDArray[np.float32], resolution_m: float, parameters: TopologyParameters
+) -> NDArray[np.int32]:
+    """Find the parts of a room that only narrow passages connect.
+
+    A passage is a point of the Voronoi graph where the clearance, the distance from walls, is least between
+    two summits: a saddle. Two parts are one where the clearance of the passage is at least
+    `passage_min_ratio` of that of the less open part; what is too small or too narrow joins what it opens to
+    most.
+
+    Parameters
+    ----------
+    inside : (H, W) bool
+        The cells of the room.
+    clear : (H, W) float32
+        Distance from walls in metres, see `clearance_m`; clutter makes no passage.
+
+    Returns
+    -------
+    part : (H, W) int32
+        Parts 1.., 0 outside the room.
+    """
+    if _is_one_part(inside, clear, parameters):
+        return inside.astype(np.int32)
+    basin = _basins(inside, clear, resolution_m, parameters.summit_reach_m)
+    count = int(basin.max()) + 1
+    summit = np.zeros(count)
+    np.maximum.at(summit, basin[inside], clear[inside])
+    area: FloatArray = np.bincount(basin[inside], minlength=count).astype(float) * resolution_m**2
+    root = _join_basins(_passages(basin, count, clear), summit, area, parameters)
+    number = np.zeros(count, np.int32)
+    number[1:] = np.unique(root[1:], return_inverse=True)[1] + 1
+    return number[basin]
+
+
+def _is_one_part(inside: BoolArray, clear: NDArray[np.float32], parameters: TopologyParameters) -> bool:
+    """Tell quickly that a room has one part; most have.
+
+    The summits of two parts lie in its cells that are as clear as a part must be. Where these hang together,
+    and those that are clearer than a narrow passage can be do too, some way between the two is no passage.
+    """
+    least = parameters.split_min_clearance_m
+    widest = float(clear[inside].max(initial=0.0))
+    for level in {least, max(least, parameters.passage_min_ratio * widest)}:
+        pieces, _ = cv2.connectedComponents((inside & (clear >= level)).astype(np.uint8), connectivity=8)
+        if pieces > 2:
+            return False
+    return True
+
+
+def voronoi_graph(
+    labels: NDArray[np.int32], walls: BoolArray, resolution_m: float, min_clearance_m: float
+) -> NDArray[np.int32]:
+    """Row and column (K, 2) of the cells of the Voronoi graph: the skeleton of the clear free space."""
+    clear = (labels > 0) & (clearance_m(walls, resolution_m) >= min_clearance_m)
+    skeleton = skeletonize(clear)  # type: ignore[no-untyped-call]
+    return np.argwhere(skeleton).astype(np.int32)
+
+
+def voronoi_lines(
+    inside: BoolArray, walls: BoolArray, resolution_m: float, min_clearance_m: float
+) -> FloatArray:
+    """Draw the Voronoi graph of a map as straight lines between the middles of its cells.
+
+    Of every block of `DRAWN_BLOCK` by `DRAWN_BLOCK` cells one is looked at: enough for the eye.
+
+    Parameters
+    ----------
+    inside : (H, W) bool
+        The cells of all rooms.
+    walls : (H, W) bool
+        Wall cells.
+    resolution_m : float
+        Side of a cell.
+    min_clearance_m : float
+        Points nearer to a wall are left out, and with them what only they connect.
+
+    Returns
+    -------
+    (N, 4) float
+        x0, y0, x1, y1 in metres, in the frame of the cells.
+    """
+    clear = inside & (clearance_m(walls, resolution_m) >= min_clearance_m)
+    skeleton = np.pad(skeletonize(clear[::DRAWN_BLOCK, ::DRAWN_BLOCK]), 1)  # type: ignore[no-untyped-call]
+    row, column = np.nonzero(skeleton)
+    found = []
+    for down, right in ((0, 1), (1, 0), (1, 1), (1, -1)):
+        linked = skeleton[row + down, column + right]
+        if down and right:
+            # Where a cell at the corner links the two already, a diagonal would close a triangle.
+            linked = linked & ~skeleton[row + down, column] & ~skeleton[row, column + right]
+        first, last = straight_runs(row[linked], column[linked], (down, right))
+        found.append(np.concatenate([first, last + np.array([down, right])], axis=1))
+    # The frame of padding is one cell wide; each cell stands for the middle of the first of its block.
+    cells = (np.concatenate(found) - 1) * float(DRAWN_BLOCK) + 0.5
+    return cells[:, [1, 0, 3, 2]] * resolution_m
+
+
+def clearance_m(walls: BoolArray, resolution_m: float) -> NDArray[np.float32]:
+    """Distance (H, W) from the nearest wall cell in metres, slightly blurred."""
+    distance = cv2.distanceTransform((~walls).view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
+    clear: NDArray[np.float32] = np.asarray(cv2.GaussianBlur(distance, (0, 0), SMOOTH_CELLS), np.float32)
+    clear *= np.float32(resolution_m)
+    return clear
+
+
+def _basins(
+    inside: BoolArray, clear: NDArray[np.float32], resolution_m: float, reach_m: float
+) -> NDArray[np.int32]:
+    """Divide a room (H, W) at the valleys between the summits of its clearance; basins 1.., 0 outside."""
+    # The watershed makes larger copies of what it is given, so that nothing else shall hold on to it.
+    basin: NDArray[np.int32] = watershed(  # type: ignore[no-untyped-call]
+        -clear, _summits(inside, clear, resolution_m, reach_m), mask=inside
+    )
+    return basin
+
+
+def _summits(
+    inside: BoolArray, clear: NDArray[np.float32], resolution_m: float, reach_m: float
+) -> NDArray[np.int32]:
+    """Number (H, W) from 1 the cells that are the clearest of their room as far as `reach_m`."""
+    width = 2 * max(1, round(reach_m / resolution_m)) + 1
+    height = np.where(inside, clear, -1)
+    summits = inside & (height == cv2.dilate(height, np.ones((width, width), np.uint8)))
+    markers: NDArray[np.int32] = ndimage.label(summits, np.ones((3, 3)))[0]
+    return markers
+
+
+def _passages(
+    basin: NDArray[np.int32], count: int, clear: NDArray[np.float32]
+) -> dict[int, dict[int, float]]:
+    """Clearance in metres of the widest passage between neighbouring ones of some basins."""
+    keys, widths = [], []
+    for first, second in (
+        ((slice(None), slice(None, -1)), (slice(None), slice(1, None))),
+        ((slice(None, -1), slice(None)), (slice(1, None), slice(None))),
+    ):
+        meet = basin[first] != basin[second]
+        meet &= (basin[first] > 0) & (basin[second] > 0)
+        a, b = basin[first][meet].astype(np.int64), basin[second][meet].astype(np.int64)
+        keys.append(np.minimum(a, b) * count + np.maximum(a, b))
+        widths.append(np.minimum(clear[first][meet], clear[second][meet]))
+    pairs, index = np.unique(np.concatenate(keys), return_inverse=True)
+    widest = np.zeros(len(pairs))
+    np.maximum.at(widest, index, np.concatenate(widths))
+    passages: dict[int, dict[int, float]] = defaultdict(dict)
+    for pair, width in zip(pairs.tolist(), widest.tolist(), strict=True):
+        a, b = divmod(pair, count)
+        passages[a][b] = passages[b][a] = width
+    return passages
+
+
+def _join_basins(
+    passages: dict[int, dict[int, float]],
+    summit: FloatArray,
+    area: FloatArray,
+    parameters: TopologyParameters,
+) -> NDArray[np.intp]:
+    """Join the two basins with the widest passage, again and again; return the part of each basin."""
+    parent = np.arange(len(summit))
+
+    def openness(a: int, b: int) -> float:
+        """Width of the passage for the less open side; what is no part by itself comes first."""
+        ratio = passages[a][b] / max(min(summit[a], summit[b]), 1e-9)
+        is_part = (
+            min(area[a], area[b]) >= parameters.split_min_area_m2
+            and min(summit[a], summit[b]) >= parameters.split_min_clearance_m
+        )
+        return float(ratio if is_part else 1 + ratio)
+
+    heap = [(-openness(a, b), a, b) for a in passages for b in passages[a] if a < b]
+    heapq.heapify(heap)
+    while heap:
+        value, a, b = heapq.heappop(heap)
+        if b not in passages.get(a, {}) or value != -openness(a, b):
+            continue
+        if -value < parameters.passage_min_ratio:
+            break
+        parent[b] = a
+        summit[a] = max(summit[a], summit[b])
+        area[a] += area[b]
+        for c, width in passages.pop(b).items():
+            del passages[c][b]
+            if c != a:
+                passages[a][c] = passages[c][a] = max(passages[a].get(c, 0.0), width)
+        for c in passages[a]:
+            heapq.heappush(heap, (-openness(a, c), min(a, c), max(a, c)))
+    return roots(parent)

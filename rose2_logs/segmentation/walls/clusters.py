@@ -1,0 +1,122 @@
+"""Wall clusters: segments of one direction that belong to one wall (paper, III-B)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from rose2_logs.config.parameters import WallParameters
+from rose2_logs.model.occupancy import FloatArray
+from rose2_logs.segmentation.walls.segments import Segments
+
+
+@dataclass(frozen=True, eq=False)
+class WallClusters:
+    """Walls as intervals along a direction. Metres, grid frame.
+
+    Attributes
+    ----------
+    direction : (C,) int32
+        Index of the direction.
+    offset : (C,) float
+        Distance of the wall's line from the origin, along the direction turned by a quarter.
+    start, end : (C,) float
+        Where along the direction the wall begins and ends.
+    covered : (C,) float
+        Length of the wall that segments cover.
+    of_segment : (N,) int32
+        Cluster of each segment.
+    """
+
+    direction: NDArray[np.int32]
+    offset: FloatArray
+    start: FloatArray
+    end: FloatArray
+    covered: FloatArray
+    of_segment: NDArray[np.int32]
+
+
+def cluster_segments(segments: Segments, parameters: WallParameters) -> WallClusters:
+    """Join the segments of one direction that are close to each other by DBSCAN.
+
+    Distance is lateral offset over `cluster_lateral_m` or gap along the wall over `cluster_gap_m`, the larger
+    of the two. No segment is noise (min_samples of 1), which makes the clusters the connected components of
+    the segments nearer than 1 to each other. Each cluster lies at the median offset of its segments, weighted
+    by their length.
+    """
+    direction, offset, start, end = segments.direction, segments.offset, segments.start, segments.end
+    of_segment = np.full(len(offset), -1, np.int32)
+    count = 0
+    for index in range(len(segments.directions_rad)):
+        chosen = np.flatnonzero(direction == index)
+        if len(chosen):
+            pair = _near_intervals(offset[chosen], start[chosen], end[chosen], parameters)
+            near = coo_matrix((np.ones(len(pair[0]), bool), pair), shape=(len(chosen), len(chosen)))
+            more, labels = connected_components(near, directed=False)
+            of_segment[chosen] = count + labels
+            count += more
+    length = np.maximum(end - start, 1e-9)
+    first = np.full(count, np.inf)
+    last = np.full(count, -np.inf)
+    np.minimum.at(first, of_segment, start)
+    np.maximum.at(last, of_segment, end)
+    cluster_direction = np.zeros(count, np.int32)
+    cluster_direction[of_segment] = direction
+    return WallClusters(
+        cluster_direction,
+        weighted_median(offset, length, of_segment, count),
+        first,
+        last,
+        covered_length(start, end, of_segment, count),
+        of_segment,
+    )
+
+
+def _near_intervals(
+    offset: FloatArray, start: FloatArray, end: FloatArray, parameters: WallParameters
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Pairs of intervals that are close enough both across and along, found among those sorted by offset."""
+    order = np.argsort(offset, kind="stable")
+    sorted_offset = offset[order]
+    here = np.arange(len(offset))
+    count = (
+        np.searchsorted(sorted_offset, sorted_offset + parameters.cluster_lateral_m, side="right") - here - 1
+    )
+    first = np.repeat(here, count)
+    second = first + 1 + np.arange(len(first)) - np.repeat(np.cumsum(count) - count, count)
+    one, other = order[first], order[second]
+    gap = np.maximum(start[one], start[other]) - np.minimum(end[one], end[other])
+    near = gap <= parameters.cluster_gap_m
+    return one[near], other[near]
+
+
+def weighted_median(
+    values: FloatArray, weights: FloatArray, group: NDArray[np.int32], count: int
+) -> FloatArray:
+    """Weighted median (count,) of the values of each group."""
+    order = np.lexsort((values, group))
+    ordered_group, total = group[order], np.bincount(group, weights=weights, minlength=count)
+    running = np.cumsum(weights[order])
+    before = np.concatenate([[0.0], np.cumsum(total)[:-1]])
+    reached = running - before[ordered_group] >= total[ordered_group] / 2 - 1e-12
+    first = np.full(count, len(values))
+    np.minimum.at(first, ordered_group[reached], np.flatnonzero(reached))
+    median: FloatArray = values[order][first]
+    return median
+
+
+def covered_length(start: FloatArray, end: FloatArray, group: NDArray[np.int32], count: int) -> FloatArray:
+    """Length (count,) of the union of the intervals of each group."""
+    order = np.lexsort((start, group))
+    group, start, end = group[order], start[order], end[order]
+    # Groups are laid out one after the other on one axis, so that a single running maximum serves all.
+    span = float(np.ptp(np.concatenate([start, end]))) + 1.0 if len(start) else 1.0
+    shift = group * span - (start.min() if len(start) else 0.0)
+    reach = np.maximum.accumulate(end + shift)
+    before = np.concatenate([[-np.inf], reach[:-1]])
+    added = np.maximum(end + shift - np.maximum(start + shift, before), 0)
+    return np.bincount(group, weights=added, minlength=count).astype(float)

@@ -1,0 +1,89 @@
+"""Stage B in one call."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rose2_logs.config.parameters import WallParameters
+from rose2_logs.model.occupancy import BoolArray, FloatArray
+from rose2_logs.segmentation.walls.clusters import cluster_segments
+from rose2_logs.segmentation.walls.lines import RepresentativeLines, representative_lines
+from rose2_logs.segmentation.walls.segments import (
+    detect_segments,
+    join_segments,
+    local_directions,
+    long_pieces,
+)
+
+
+@dataclass(frozen=True, eq=False)
+class WallResult:
+    """Stage B in the grid frame, metres.
+
+    Attributes
+    ----------
+    segments_m : (N, 4) float
+        All segments.
+    segment_direction : (N,) int32
+        Index into `directions_rad`.
+    segment_line : (N,) int32
+        Representative line of each segment's wall cluster, -1 for none.
+    directions_rad : (D,) float
+        Dominant directions first, then local ones.
+    lines : RepresentativeLines
+        The representative lines.
+    walls : (H, W) bool
+        Wall cells: the clean map, what is attached to it, and the walls off the dominant directions.
+    """
+
+    segments_m: FloatArray
+    segment_direction: NDArray[np.int32]
+    segment_line: NDArray[np.int32]
+    directions_rad: FloatArray
+    lines: RepresentativeLines
+    walls: BoolArray
+
+
+def find_walls(
+    occupied: BoolArray,
+    clean: BoolArray,
+    attached: BoolArray,
+    dominant_rad: FloatArray,
+    resolution_m: float,
+    parameters: WallParameters,
+) -> WallResult:
+    """Segments, wall clusters and representative lines of a clean map (H, W) and what is attached to it."""
+    along, _ = detect_segments(clean, dominant_rad, resolution_m, parameters.segment_min_length_m, parameters)
+    # Off the dominant directions nothing but its length tells a wall from furniture.
+    length_m = parameters.local_segment_min_length_m
+    local, local_walls = detect_segments(
+        long_pieces(occupied & ~clean, resolution_m, length_m, parameters),
+        local_directions(dominant_rad, parameters),
+        resolution_m,
+        length_m,
+        parameters,
+    )
+    segments = join_segments(along, local)
+    clusters = cluster_segments(segments, parameters)
+    lines = representative_lines(clusters, segments.directions_rad, len(dominant_rad), parameters)
+    return WallResult(
+        segments.ends_m,
+        segments.direction,
+        lines.of_cluster[clusters.of_segment],
+        segments.directions_rad,
+        lines,
+        attached | local_walls,
+    )
+
+
+def count_walls(
+    clean: BoolArray, dominant_rad: FloatArray, resolution_m: float, parameters: WallParameters
+) -> int:
+    """Number of wall clusters along the dominant directions of a clean map (H, W)."""
+    segments, _ = detect_segments(
+        clean, dominant_rad, resolution_m, parameters.segment_min_length_m, parameters
+    )
+    return len(cluster_segments(segments, parameters).offset)

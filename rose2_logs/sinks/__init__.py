@@ -1,1 +1,0 @@
-"""What becomes of a run: Rerun recording, annotated MCAP, tables."""

@@ -1,0 +1,232 @@
+"""The rooms of every map of a run by the layout of its last one: smoothing, where tracking filters.
+
+What a map alone shows of a half seen building is often wrong. Once the run is over, its last map tells
+which rooms there are; an earlier map shows how much of each was seen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from skimage.measure import label as connected
+
+from rose2_logs.config.parameters import OccupancyParameters, Parameters, TrackingParameters
+from rose2_logs.model.occupancy import (
+    BoolArray,
+    FloatArray,
+    GridGeometry,
+    OccupancySnapshot,
+    classify,
+    known_window,
+    label_sizes,
+)
+from rose2_logs.model.rooms import RoomMap
+from rose2_logs.tracking.registration import POINTS_MIN, RigidMotion, WallFit, wall_faces
+from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot, map_motion
+
+
+@dataclass(frozen=True, eq=False)
+class SmoothedRooms:
+    """How much of the rooms of the run's last map another map shows.
+
+    Attributes
+    ----------
+    labels : (H, W) int32
+        On the map's canvas: 0 = no room, 1..R = the rooms of the last map.
+    areas_m2 : (R,) float
+        Area of each.
+    """
+
+    labels: NDArray[np.int32]
+    areas_m2: FloatArray
+
+
+class Smoother:
+    """Carries the rooms of a run's last map over to the maps before it.
+
+    A map is laid over the last one: first as it moved from map to map, then by its walls. Each of its free
+    cells takes the room that lies there in the end; the nearest, where the last map shows no free space.
+    Pieces of a room smaller than `smoothed_min_area_m2` take the room beside them.
+
+    Parameters
+    ----------
+    last : OccupancySnapshot
+        The last map.
+    rooms : RoomMap
+        Its rooms.
+    tracking : TrackingParameters
+        The least piece of a room.
+    occupancy : OccupancyParameters, optional
+        Which cells are free, which are walls.
+    """
+
+    def __init__(
+        self,
+        last: OccupancySnapshot,
+        rooms: RoomMap,
+        tracking: TrackingParameters,
+        occupancy: OccupancyParameters | None = None,
+    ) -> None:
+        self._min_area_m2 = tracking.smoothed_min_area_m2
+        self._occupancy = occupancy or OccupancyParameters()
+        self._window = known_window(last.cells >= 0)
+        self._geometry, self._count = rooms.geometry, len(rooms)
+        labels = rooms.labels[self._window]
+        free, occupied = classify(last.cells, self._occupancy)
+        self._nearest = np.where(free[self._window], labels, _filled(labels))
+        points = wall_faces(free, occupied, last.geometry)
+        self._fit = WallFit(points, last.geometry.resolution_m) if len(points) >= POINTS_MIN else None
+
+    def rooms(self, snapshot: OccupancySnapshot, motion: RigidMotion) -> SmoothedRooms:
+        """Find the rooms of the last map on another one.
+
+        Parameters
+        ----------
+        snapshot : OccupancySnapshot
+            The map.
+        motion : RigidMotion
+            How the whole map moved from then to the end, see `motions_to_last`.
+        """
+        labels = np.zeros(snapshot.geometry.shape, np.int32)
+        window = known_window(snapshot.cells >= 0)
+        all_free, occupied = classify(snapshot.cells, self._occupancy)
+        free = all_free[window]
+        row, column = np.nonzero(free)
+        if self._count == 0 or len(row) == 0:
+            return SmoothedRooms(labels, np.zeros(self._count))
+        corner = np.array([window[0].start, window[1].start])
+        centres = snapshot.geometry.cell_centres(row + corner[0], column + corner[1])
+        laid_over = self._laid_over(all_free, occupied, snapshot.geometry, motion)
+        cells = self._geometry.world_to_cell(laid_over.points(centres))
+        cells -= (self._window[0].start, self._window[1].start)
+        np.clip(cells, 0, np.array(self._nearest.shape) - 1, out=cells)
+        part = labels[window]
+        part[row, column] = self._nearest[cells[:, 0], cells[:, 1]]
+        cell_m2 = snapshot.geometry.cell_area_m2
+        _join_small_pieces(part, free, self._min_area_m2 / cell_m2)
+        return SmoothedRooms(labels, label_sizes(part, self._count)[1:].astype(float) * cell_m2)
+
+    def _laid_over(
+        self, free: BoolArray, occupied: BoolArray, geometry: GridGeometry, motion: RigidMotion
+    ) -> RigidMotion:
+        """Fit a map's walls to those of the last one, where that brings more of them together."""
+        points = wall_faces(free, occupied, geometry)
+        fit = self._fit
+        if fit is None or len(points) < POINTS_MIN:
+            return motion
+        walls = WallFit(points, geometry.resolution_m).sample()
+        centre = walls.points.mean(axis=0)
+        start = RigidMotion.moving(centre, motion.points(centre), motion.turn_rad)
+        fitted = fit.settled(walls, start)
+        return max(start, fitted, key=lambda each: fit.share(walls.points, each))
+
+
+def motions_to_last(motions: Sequence[RigidMotion | None]) -> list[RigidMotion]:
+    """How the whole map moved from each map of a run to the last.
+
+    Parameters
+    ----------
+    motions : sequence
+        How it moved to each from the one before; None where it stayed.
+    """
+    found = [RigidMotion.none()]
+    for motion in reversed(motions[1:]):
+        found.append(found[-1] if motion is None else motion.then(found[-1]))
+    return found[: len(motions)][::-1]
+
+
+def _join_small_pieces(labels: NDArray[np.int32], free: NDArray[np.bool_], min_cells: float) -> None:
+    """Give the cells (H, W) of pieces smaller than so many to the nearest larger piece, if there is one."""
+    piece: NDArray[np.int64] = connected(labels, background=0, connectivity=1)  # type: ignore[no-untyped-call]
+    small = np.bincount(piece.ravel()) < min_cells
+    small[0] = False
+    kept = np.where(small[piece], 0, labels)
+    if small.any() and kept.any():
+        np.copyto(labels, _filled(kept), where=small[piece] & free)
+
+
+def _filled(labels: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Give each cell (H, W) without a room that of the nearest cell that has one."""
+    if not labels.any():
+        return labels
+    _, nearest = cv2.distanceTransformWithLabels(
+        (labels == 0).view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
+    )
+    room_of = np.zeros(int(nearest.max()) + 1, np.int32)
+    room_of[nearest[labels > 0]] = labels[labels > 0]
+    return room_of[nearest]
+
+
+@dataclass(frozen=True, eq=False)
+class SmoothedSnapshot:
+    """One map of a run with what it shows of the rooms of the last one.
+
+    Attributes
+    ----------
+    snapshot : OccupancySnapshot
+        The map.
+    coverage : float
+        As of `TrackedSnapshot`.
+    rooms : SmoothedRooms
+        How much it shows of the last map's rooms.
+    last_rooms : RoomMap
+        The rooms of the last map.
+    track_ids : tuple of R int
+        Their tracks.
+    to_last : RigidMotion
+        How the whole map moved from then to the end.
+    """
+
+    snapshot: OccupancySnapshot
+    coverage: float
+    rooms: SmoothedRooms
+    last_rooms: RoomMap
+    track_ids: tuple[int, ...]
+    to_last: RigidMotion
+
+
+class RunSmoother:
+    """Keeps what the second pass needs along the run, some numbers a map, and makes that pass.
+
+    Parameters
+    ----------
+    parameters : Parameters
+        Of the run.
+    """
+
+    def __init__(self, parameters: Parameters) -> None:
+        self._parameters = parameters
+        self._last: TrackedSnapshot | None = None
+        self._motions: dict[int, RigidMotion | None] = {}
+        self._coverages: dict[int, float] = {}
+
+    def add(self, frame: TrackedSnapshot) -> None:
+        """Take the next map of the run."""
+        self._last = frame
+        self._motions[frame.snapshot.index] = map_motion(frame.events)
+        self._coverages[frame.snapshot.index] = frame.coverage
+
+    def smoothed(self, snapshots: Iterable[OccupancySnapshot]) -> Iterator[SmoothedSnapshot]:
+        """Yield the maps with the rooms of the last one; one map at a time is held.
+
+        Parameters
+        ----------
+        snapshots : iterable of OccupancySnapshot
+            The maps of the run once more. Those that were not taken before are left out.
+        """
+        last = self._last
+        if last is None:
+            return
+        rooms = last.analysis.rooms
+        smoother = Smoother(last.snapshot, rooms, self._parameters.tracking, self._parameters.occupancy)
+        to_last = dict(zip(self._motions, motions_to_last(list(self._motions.values())), strict=True))
+        for snapshot in snapshots:
+            if snapshot.index in to_last:
+                motion = to_last[snapshot.index]
+                found = smoother.rooms(snapshot, motion)
+                coverage = self._coverages[snapshot.index]
+                yield SmoothedSnapshot(snapshot, coverage, found, rooms, last.track_ids, motion)

@@ -1,0 +1,308 @@
+"""How far the whole map moved from one snapshot to the next, as loop closures and resets of SLAM move it."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rose2_logs.config.parameters import OccupancyParameters, TrackingParameters
+from rose2_logs.model.occupancy import BoolArray, FloatArray, GridGeometry, OccupancySnapshot, classify
+
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
+
+POINTS_MAX = 2000
+"""Wall cells of the map before that are laid over the next map, evenly taken: enough for some millimetres."""
+POINTS_MIN = 50
+"""Fewer wall cells do not tell how a map lies: two metres of wall."""
+SEARCH_POINTS = 500
+"""Wall cells that the search among many positions tries."""
+GATES_M = (0.5, 0.3, 0.2, 0.1)
+"""How far a wall's nearest wall may be, from step to step of the fit: a loop closure's leap, then drift."""
+GATE_MIN_CELLS = 2.0
+"""And this many cells at least: a wall's two faces, and its wobble."""
+NEIGHBOURS = 12
+"""Wall cells around a point that tell how the wall runs: half a metre of its face."""
+DAMPING = 1e-3
+"""Least share of the walls that must stand across a direction to fit the shift along it."""
+ROUNDS_MAX = 8
+"""Rounds of the fit for each gate; it has settled before."""
+SETTLED_M = 1e-4
+"""The fit has settled when no point moves further than this."""
+SEARCH_RASTER_M = 0.1
+"""Cells of the raster on which positions are searched."""
+SEARCH_STEP_M = 0.3
+"""Step of the search, which the fit's first gate bridges."""
+SEARCH_CANDIDATES = 5
+"""Positions, the best of the search, that are fitted."""
+SURE_SHARE = 0.75
+"""Where the fit brings this share of the walls together, no other position is searched."""
+BETTER_SHARE = 0.05
+"""Another position is taken when it brings this share more of the walls together than staying does."""
+
+
+@dataclass(frozen=True)
+class RigidMotion:
+    """A shift and turn of the plane, as the whole map makes it within its frame.
+
+    Attributes
+    ----------
+    centre_xy_m : (float, float)
+        The middle of the walls, before.
+    shift_xy_m : (float, float)
+        How far that point moved.
+    turn_rad : float
+        Turn about that point, counter-clockwise.
+    """
+
+    centre_xy_m: tuple[float, float]
+    shift_xy_m: tuple[float, float]
+    turn_rad: float
+
+    @classmethod
+    def moving(cls, centre_m: FloatArray, to_m: FloatArray, turn_rad: float) -> RigidMotion:
+        """Motion that brings a point (2,) to another and turns about it."""
+        (x, y), (dx, dy) = centre_m.tolist(), (to_m - centre_m).tolist()
+        return cls((x, y), (dx, dy), float(turn_rad))
+
+    @classmethod
+    def none(cls) -> RigidMotion:
+        """Return the motion that leaves everything where it is."""
+        return cls((0.0, 0.0), (0.0, 0.0), 0.0)
+
+    @property
+    def pose(self) -> tuple[float, float, float]:
+        """Where the frame's origin comes to lie, x and y in metres, and the turn in radians."""
+        x, y = self.points(np.zeros(2)).tolist()
+        return x, y, self.turn_rad
+
+    def then(self, later: RigidMotion) -> RigidMotion:
+        """Return the motion of both, about the frame's origin; `later` is applied after this one."""
+        origin = np.zeros(2)
+        return RigidMotion.moving(origin, later.points(self.points(origin)), self.turn_rad + later.turn_rad)
+
+    def inverse(self) -> RigidMotion:
+        """Return the motion that takes this one back."""
+        centre, shift = np.asarray(self.centre_xy_m), np.asarray(self.shift_xy_m)
+        return RigidMotion.moving(centre + shift, centre, -self.turn_rad)
+
+    def points(self, xy_m: FloatArray) -> FloatArray:
+        """Where points (..., 2) come to lie, metres."""
+        c, s = np.cos(self.turn_rad), np.sin(self.turn_rad)
+        centre = np.asarray(self.centre_xy_m)
+        moved: FloatArray = (
+            (xy_m - centre) @ np.array([[c, s], [-s, c]]) + centre + np.asarray(self.shift_xy_m)
+        )
+        return moved
+
+    def grid(self, geometry: GridGeometry) -> GridGeometry:
+        """Where a grid comes to lie."""
+        x, y = self.points(np.asarray(geometry.origin_xy_m)).tolist()
+        return dataclasses.replace(geometry, origin_xy_m=(x, y), yaw_rad=geometry.yaw_rad + self.turn_rad)
+
+
+class MapAligner:
+    """Tells of successive maps how each lies against the one before, by their walls.
+
+    Parameters
+    ----------
+    tracking : TrackingParameters
+        The least motion that counts, and how far is searched.
+    occupancy : OccupancyParameters, optional
+        Which cells are walls.
+    """
+
+    def __init__(self, tracking: TrackingParameters, occupancy: OccupancyParameters | None = None) -> None:
+        self._tracking = tracking
+        self._occupancy = occupancy or OccupancyParameters()
+        self._before: WallSample | None = None
+
+    def update(self, snapshot: OccupancySnapshot) -> RigidMotion | None:
+        """Take the next map of the run.
+
+        Parameters
+        ----------
+        snapshot : OccupancySnapshot
+            The map.
+
+        Returns
+        -------
+        RigidMotion or None
+            The motion, in the world frame, of what both maps show; None where it is less than `shift_min_m`
+            on average, or the walls do not tell.
+        """
+        points = wall_points(snapshot, self._occupancy)
+        before, self._before = self._before, None
+        if len(points) < POINTS_MIN:
+            return None
+        fit = WallFit(points, snapshot.geometry.resolution_m)
+        self._before = fit.sample()
+        if before is None:
+            return None
+        motion = fit.best(before, self._tracking)
+        moved = np.linalg.norm(motion.points(before.points) - before.points, axis=1).mean()
+        return motion if moved >= self._tracking.shift_min_m else None
+
+
+def wall_points(snapshot: OccupancySnapshot, parameters: OccupancyParameters) -> FloatArray:
+    """World centres (N, 2) of the occupied cells beside free ones: the faces of walls."""
+    return wall_faces(*classify(snapshot.cells, parameters), snapshot.geometry)
+
+
+def wall_faces(free: BoolArray, occupied: BoolArray, geometry: GridGeometry) -> FloatArray:
+    """Do the same for a map whose cells (H, W) are told apart already."""
+    return geometry.cell_centres(*np.nonzero(occupied & _beside(free)))
+
+
+def _beside(mask: BoolArray) -> BoolArray:
+    """Cells that share a side with one of a mask."""
+    beside = np.zeros_like(mask)
+    beside[1:] |= mask[:-1]
+    beside[:-1] |= mask[1:]
+    beside[:, 1:] |= mask[:, :-1]
+    beside[:, :-1] |= mask[:, 1:]
+    return beside
+
+
+def evenly(points: FloatArray, most: int) -> FloatArray:
+    """Take at most so many points (N, 2), evenly."""
+    if len(points) <= most:
+        return points
+    return points[np.linspace(0, len(points) - 1, most).astype(np.intp)]
+
+
+@dataclass(frozen=True, eq=False)
+class WallSample:
+    """Points (N, 2) of walls in world metres, and a unit vector (N, 2) across the wall at each."""
+
+    points: FloatArray
+    across: FloatArray
+
+
+class WallFit:
+    """The walls of a map, which those of another are laid over."""
+
+    def __init__(self, points: FloatArray, resolution_m: float) -> None:
+        from scipy.spatial import cKDTree
+
+        self._points = points
+        self._tree: cKDTree = cKDTree(points)
+        self._gates = tuple(max(gate, GATE_MIN_CELLS * resolution_m) for gate in GATES_M)
+
+    def sample(self) -> WallSample:
+        """Some of the walls, to be laid over those of the next map."""
+        points = evenly(self._points, POINTS_MAX)
+        _, nearest = self._tree.query(points, k=NEIGHBOURS)
+        around = self._points[nearest] - self._points[nearest].mean(axis=1, keepdims=True)
+        x, y = around[..., 0], around[..., 1]
+        # The direction of the greatest spread is that of the wall.
+        along = np.arctan2(2 * (x * y).sum(axis=1), (x * x - y * y).sum(axis=1)) / 2
+        return WallSample(points, np.stack([-np.sin(along), np.cos(along)], axis=1))
+
+    def best(self, walls: WallSample, parameters: TrackingParameters) -> RigidMotion:
+        """Motion of walls that brings most of them to walls; staying unless another is better."""
+        points = walls.points
+        centre = points.mean(axis=0)
+        staying = RigidMotion.moving(centre, centre, 0.0)
+        least = max(self.share(points, staying) + BETTER_SHARE, parameters.shift_min_share)
+        if least > 1:
+            return staying
+        fitted = self.settled(walls, staying)
+        share = self.share(points, fitted)
+        if share < SURE_SHARE:
+            for start in self._search(points, centre, parameters):
+                other = self.settled(walls, start)
+                if (found := self.share(points, other)) > share:
+                    fitted, share = other, found
+        return fitted if share >= least else staying
+
+    def share(self, points: FloatArray, motion: RigidMotion) -> float:
+        """Share of points that a motion brings to a wall."""
+        distance, _ = self._tree.query(motion.points(points), distance_upper_bound=self._gates[-1])
+        return float(np.isfinite(distance).mean())
+
+    def settled(self, walls: WallSample, motion: RigidMotion) -> RigidMotion:
+        """Fit wall to nearest wall in turns (ICP), the far ones with little weight (Tukey's biweight).
+
+        Only the distance across the wall counts: along a wall, cells match at every step of the raster.
+        """
+        centre = np.asarray(motion.centre_xy_m)
+        radius = float(np.linalg.norm(walls.points - centre, axis=1).max())
+        for gate in self._gates:
+            for _ in range(ROUNDS_MAX):
+                placed = motion.points(walls.points)
+                distance, nearest = self._tree.query(placed, distance_upper_bound=gate)
+                near = np.isfinite(distance)
+                if np.count_nonzero(near) < POINTS_MIN:
+                    return motion
+                weight = (1 - (distance[near] / gate) ** 2) ** 2
+                to = motion.points(centre)
+                across = motion.points(walls.across[near] + centre) - to
+                shift, turn = _step(
+                    placed[near] - to, self._points[nearest[near]] - placed[near], across, weight, radius
+                )
+                motion = RigidMotion.moving(centre, to + shift, motion.turn_rad + turn)
+                if np.hypot(*shift) + abs(turn) * radius < SETTLED_M:
+                    break
+        return motion
+
+    def _search(
+        self, points: FloatArray, centre: FloatArray, parameters: TrackingParameters
+    ) -> list[RigidMotion]:
+        """Best starts among all shifts and turns within reach: correlation with the distance to walls."""
+        nearness, low = self._nearness(parameters.shift_search_m)
+        chosen = evenly(points, SEARCH_POINTS)
+        radius = max(float(np.linalg.norm(chosen - centre, axis=1).max()), SEARCH_STEP_M)
+        shifts = _steps(parameters.shift_search_m, SEARCH_STEP_M)
+        turns = _steps(parameters.shift_search_rad, SEARCH_STEP_M / radius)
+        offset = np.stack(np.meshgrid(shifts, shifts, indexing="ij"), -1).reshape(-1, 2)
+        height, width = nearness.shape
+        scores = np.zeros((len(turns), len(offset)))
+        for number, turn in enumerate(turns):
+            placed = RigidMotion.moving(centre, centre, turn).points(chosen) - low
+            cells = np.floor((placed[:, None] + offset) / SEARCH_RASTER_M).astype(np.intp)
+            x, y = cells[..., 0], cells[..., 1]
+            inside = (x >= 0) & (y >= 0) & (x < width) & (y < height)
+            scores[number] = (nearness[y.clip(0, height - 1), x.clip(0, width - 1)] * inside).sum(axis=0)
+        best = np.argsort(-scores, axis=None, kind="stable")[:SEARCH_CANDIDATES]
+        return [
+            RigidMotion.moving(centre, centre + offset[at % len(offset)], turns[at // len(offset)])
+            for at in best.tolist()
+        ]
+
+    def _nearness(self, margin_m: float) -> tuple[FloatArray, FloatArray]:
+        """Raster (H, W): 1 at walls, 0 from the first gate on; and the world position (2,) of its corner."""
+        import cv2
+
+        low = self._points.min(axis=0) - margin_m
+        cells = np.floor((self._points - low) / SEARCH_RASTER_M).astype(np.intp)
+        margin = int(np.ceil(margin_m / SEARCH_RASTER_M)) + 1
+        width, height = (cells.max(axis=0) + margin).tolist()
+        no_wall = np.ones((height, width), np.uint8)
+        no_wall[cells[:, 1], cells[:, 0]] = 0
+        distance = cv2.distanceTransform(no_wall, cv2.DIST_L2, cv2.DIST_MASK_5) * SEARCH_RASTER_M
+        return np.maximum(0.0, 1.0 - distance / self._gates[0]).astype(np.float64), low
+
+
+def _steps(reach: float, step: float) -> FloatArray:
+    """Values from -reach to reach, zero among them, about a step apart."""
+    count = int(np.ceil(reach / step))
+    return np.linspace(-reach, reach, 2 * count + 1)
+
+
+def _step(
+    points: FloatArray, gaps: FloatArray, across: FloatArray, weight: FloatArray, radius_m: float
+) -> tuple[FloatArray, float]:
+    """Shift (2,) and turn about the origin that close gaps (N, 2) across walls with the least squares.
+
+    What the walls do not tell, as the shift along a single corridor, stays as it is.
+    """
+    turned = np.stack([-points[:, 1], points[:, 0]], axis=1) / radius_m
+    rows = np.column_stack([across, (across * turned).sum(axis=1)])
+    weighted = rows * weight[:, None]
+    damping = DAMPING * weight.sum() * np.eye(3)
+    solved = np.linalg.solve(weighted.T @ rows + damping, weighted.T @ (across * gaps).sum(axis=1))
+    return solved[:2], float(solved[2]) / radius_m

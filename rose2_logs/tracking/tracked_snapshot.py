@@ -1,0 +1,89 @@
+"""What tracking adds to an analysis, and what the sinks receive."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+from rose2_logs.model.occupancy import FloatArray, OccupancySnapshot
+from rose2_logs.model.room_quality import RoomEvidence
+from rose2_logs.segmentation.pipeline import SnapshotAnalysis
+from rose2_logs.tracking.layout_change import LayoutChange
+from rose2_logs.tracking.registration import RigidMotion
+
+EventKind = Literal["shifted", "continued", "returned", "born", "split", "merged", "lost"]
+EVENT_ORDER: tuple[EventKind, ...] = get_args(EventKind)
+"""Order of one snapshot's events: the map, what the rooms are, then what became of the tracks before."""
+MAP_TRACK = 0
+"""Stands for the track in an event of the whole map."""
+
+
+@dataclass(frozen=True)
+class RoomEvent:
+    """Something that happened to the identity of rooms, or to the whole map, at one snapshot.
+
+    Attributes
+    ----------
+    kind : str
+        born: a track begins; continued: a room takes its track on; split: a track's room is now several
+        rooms; merged: several tracks' rooms are now one; lost: a track has no room any more;
+        returned: a lost track has a room again; shifted: the whole map moved within its frame.
+    snapshot : int
+        Index of the snapshot.
+    track : int
+        The track that the event is about: of a split the one that was split, of a merge the one that stays,
+        of a shift `MAP_TRACK`.
+    others : tuple of int
+        The further tracks: the parts that a split gave birth to, the tracks that a merge ended.
+    overlap : float
+        Intersection over union of the room with its track's last shape; 0 where there is none.
+    motion : RigidMotion, optional
+        Of a shift: how the map moved since the snapshot before.
+    """
+
+    kind: EventKind
+    snapshot: int
+    track: int
+    others: tuple[int, ...] = ()
+    overlap: float = 0.0
+    motion: RigidMotion | None = None
+
+
+def map_motion(events: Iterable[RoomEvent]) -> RigidMotion | None:
+    """Motion of the whole map among one snapshot's events, if it moved."""
+    return next((event.motion for event in events if event.kind == "shifted"), None)
+
+
+@dataclass(frozen=True, eq=False)
+class TrackedSnapshot:
+    """One snapshot with all that was found: what a sink receives.
+
+    Attributes
+    ----------
+    snapshot : OccupancySnapshot
+        The map.
+    analysis : SnapshotAnalysis
+        Its structure and rooms.
+    coverage : float
+        Known free area over that of the last map of the run, in [0, 1].
+    track_ids : tuple of R int
+        The track (1, 2, ... never used again) of room i + 1.
+    events : tuple of RoomEvent
+        What happened to the tracks at this snapshot.
+    evidence : RoomEvidence, optional
+        How sure the rooms are.
+    change : LayoutChange, optional
+        How the layout changed since the map before.
+    path : (K, 3) float, optional
+        Poses of the robot since the map before: x, y in world metres, yaw in radians.
+    """
+
+    snapshot: OccupancySnapshot
+    analysis: SnapshotAnalysis
+    coverage: float
+    track_ids: tuple[int, ...]
+    events: tuple[RoomEvent, ...]
+    evidence: RoomEvidence | None = None
+    change: LayoutChange | None = None
+    path: FloatArray | None = None

@@ -1,0 +1,130 @@
+"""The layout of one map of a run, drawn or written for other programs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from rose2_logs.drawing.image_files import write_image
+from rose2_logs.drawing.pixels import as_pixels
+from rose2_logs.drawing.plan import draw_plan
+from rose2_logs.drawing.svg import as_svg
+from rose2_logs.errors import ParameterError
+from rose2_logs.outputs.exports.formats import planned_files, write_plan
+from rose2_logs.runs.folder import RunResults
+from rose2_logs.runs.projected_plan import smoothed_plan
+from rose2_logs.system.files import refuse_existing, replacing
+
+FIGURE_WIDTH_PX = 1800
+"""Width of a figure as PNG: 15 cm, a text's width, at 300 dots an inch."""
+PICTURE_ENDINGS = (".png", ".svg")
+
+
+def write_figure(
+    folder: Path,
+    out: Path | None = None,
+    snapshot: int | None = None,
+    coverage: float | None = None,
+    *,
+    smoothed: bool = False,
+    width_px: int = FIGURE_WIDTH_PX,
+    overwrite: bool = False,
+) -> Path:
+    """Draw the layout of a map.
+
+    Parameters
+    ----------
+    folder : path
+        Results of a log.
+    out : path, optional
+        The picture, ``.png`` or ``.svg``; by default ``<name>.figure.png`` in the folder, with the number of
+        the map in its name if it is not the last, and ``smoothed`` if it is.
+    snapshot, coverage : int, float, optional
+        Which map, see `RunResults.choose`.
+    smoothed : bool
+        Draw the rooms of the last map as far as this one shows them, instead of its own.
+    width_px : int
+        Width of a PNG.
+    overwrite : bool
+        Whether a picture may be replaced.
+
+    Returns
+    -------
+    path
+        The picture.
+
+    Raises
+    ------
+    LogError
+        If the results cannot be read.
+    ParameterError
+        If there is no such map, or the picture would be of another kind.
+    OutputError
+        If the picture exists and may not be replaced, or cannot be written.
+    """
+    results = RunResults(folder)
+    number = results.choose(snapshot, coverage)
+    stem = f"{_stem(results, number)}.smoothed" if smoothed else _stem(results, number)
+    out = folder / f"{stem}.figure.png" if out is None else out
+    kind = out.suffix.lower()
+    if kind not in PICTURE_ENDINGS:
+        raise ParameterError(f"{out}: a figure is {' or '.join(PICTURE_ENDINGS)}; let its name end so")
+    refuse_existing([out], overwrite=overwrite)
+    with results.open_maps() as maps:
+        plan = smoothed_plan(results, number, maps) if smoothed else results.plan(number, maps)
+        drawing = draw_plan(plan)
+    if kind == ".png":
+        write_image(out, as_pixels(drawing, width_px))
+    else:
+        with replacing(out) as part:
+            part.write_text(as_svg(drawing), encoding="utf-8")
+    return out
+
+
+def export_plan(
+    folder: Path,
+    formats: Sequence[str],
+    out: Path | None = None,
+    snapshot: int | None = None,
+    coverage: float | None = None,
+    *,
+    overwrite: bool = False,
+) -> list[Path]:
+    """Write the floor plan of a map for other programs.
+
+    Parameters
+    ----------
+    folder : path
+        Results of a log.
+    formats : sequence of str
+        Names among `exports.formats.FORMATS`.
+    out : path, optional
+        Folder for the files; by default that of the results.
+    snapshot, coverage : int, float, optional
+        Which map, see `RunResults.choose`; its number stands in the files' names if it is not the last.
+    overwrite : bool
+        Whether files may be replaced.
+
+    Returns
+    -------
+    list of path
+        The files.
+
+    Raises
+    ------
+    LogError, ParameterError, OutputError
+        As `write_figure`, or if there is no such format.
+    """
+    results = RunResults(folder)
+    number = results.choose(snapshot, coverage)
+    out = folder if out is None else out
+    stem = _stem(results, number)
+    refuse_existing(planned_files(formats, out, stem), overwrite=overwrite)
+    with results.open_maps() as maps:
+        plan = results.plan(number, maps, with_walls=True)
+    return write_plan(plan, formats, out, stem)
+
+
+def _stem(results: RunResults, number: int) -> str:
+    """Beginning of the files' names: the log's, and the map's number unless it is the last."""
+    return results.name if number == results.choose() else f"{results.name}.snapshot{number}"

@@ -1,0 +1,140 @@
+"""One saved map to its rooms: label image, floor plan as GeoJSON, picture."""
+
+from __future__ import annotations
+
+import logging
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from rose2_logs.config.parameters import Parameters, ReadingParameters
+from rose2_logs.drawing.image_files import write_image, write_label_image
+from rose2_logs.drawing.room_picture import draw_rooms
+from rose2_logs.errors import LogError, ParameterError
+from rose2_logs.io import open_log
+from rose2_logs.io.discovery import IMAGE_ENDINGS
+from rose2_logs.io.opening import DEFAULT_LIMITS
+from rose2_logs.io.saved_maps import MapFilesSource
+from rose2_logs.model.explored import coarser_for_its_size
+from rose2_logs.model.occupancy import OccupancySnapshot
+from rose2_logs.model.room_plan import plan_of_analysis
+from rose2_logs.model.room_quality import room_evidence
+from rose2_logs.model.rooms import RoomMap
+from rose2_logs.outputs.exports.formats import planned_files, write_plan
+from rose2_logs.outputs.exports.geojson import plan_geojson
+from rose2_logs.runs.summary import write_json
+from rose2_logs.segmentation.pipeline import analyse
+from rose2_logs.system.files import refuse_existing, require_utf8
+
+logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class StaticMapResult:
+    """What `segment_map` found and wrote."""
+
+    rooms: RoomMap
+    folder: Path
+    files: tuple[Path, ...]
+
+
+def segment_map(
+    map_file: Path,
+    folder: Path,
+    parameters: Parameters,
+    method: str = "rose2",
+    *,
+    formats: Sequence[str] = (),
+    resolution_m: float | None = None,
+    overwrite: bool = False,
+) -> StaticMapResult:
+    """Segment a saved map and write what was found.
+
+    Parameters
+    ----------
+    map_file : path
+        A map_server ``.yaml``, or an image in the grey values of ROS maps.
+    folder : path
+        Receives ``<name>.labels.png`` (0 = none, row 0 at the top like the image),
+        ``<name>.floor_plan.geojson`` and ``<name>.rooms.png``.
+    parameters, method
+        As for `analyse`.
+    formats : sequence of str
+        Further formats for the floor plan, see `exports.formats`.
+    resolution_m : float, optional
+        Side of a cell, for an image without a ``.yaml`` beside it; its origin is then its lower left corner.
+    overwrite : bool
+        Whether earlier results may be replaced.
+
+    Raises
+    ------
+    LogError, InvalidMapError, ParameterError
+        If the map cannot be read, or its resolution is neither given nor written beside it.
+    OutputError
+        If results exist and may not be replaced, cannot be written, or could not name the map.
+    """
+    for named in (map_file, folder):
+        require_utf8(named)
+    name = map_file.stem
+    files = tuple(
+        folder / f"{name}{ending}" for ending in (".labels.png", ".floor_plan.geojson", ".rooms.png")
+    )
+    more = planned_files([each for each in formats if each != "geojson"], folder, name)
+    refuse_existing([*files, *more], overwrite=overwrite)
+    snapshot = read_static_map(map_file, resolution_m, parameters.reading)
+    analysis = analyse(snapshot, parameters, method)
+    note = coarser_for_its_size(snapshot.geometry, analysis.resolution_m, parameters.occupancy)
+    if note is not None:
+        logger.warning("%s: %s", map_file, note)
+    write_label_image(files[0], np.flipud(analysis.rooms.labels))
+    evidence = room_evidence(snapshot, analysis.rooms, parameters.occupancy)
+    plan = plan_of_analysis(snapshot, analysis, evidence, name, parameters.occupancy)
+    write_json(files[1], plan_geojson(plan, analysis.walls))
+    write_image(files[2], draw_rooms(snapshot, analysis))
+    more = write_plan(plan, [each for each in formats if each != "geojson"], folder, name)
+    return StaticMapResult(analysis.rooms, folder, (*files, *more))
+
+
+def read_static_map(
+    map_file: Path, resolution_m: float | None = None, limits: ReadingParameters = DEFAULT_LIMITS
+) -> OccupancySnapshot:
+    """Read a saved map; an image without a ``.yaml`` needs its resolution.
+
+    Raises
+    ------
+    LogError, InvalidMapError, ParameterError
+        If it cannot be read, is a log, or its resolution is neither given nor written beside it.
+    """
+    if not map_file.is_file():
+        what = "is a folder: name the map in it" if map_file.is_dir() else "there is no such file"
+        raise LogError(f"{map_file}: {what}")
+    is_bare = map_file.suffix.lower() in IMAGE_ENDINGS and not map_file.with_suffix(".yaml").exists()
+    if is_bare and resolution_m is None:
+        raise ParameterError(f"{map_file}: no .yaml lies beside it; pass --resolution METRES_PER_CELL")
+    if not is_bare and resolution_m is not None:
+        raise ParameterError(f"{map_file}: its .yaml says the resolution; leave --resolution out")
+    with _described(map_file, resolution_m) as log, open_log(log, limits=limits) as reader:
+        if not isinstance(reader.source, MapFilesSource):
+            raise LogError(
+                f"{map_file}: is a log, no saved map: rose2-logs analyze finds the rooms of its maps"
+            )
+        return reader.first()
+
+
+@contextmanager
+def _described(map_file: Path, resolution_m: float | None) -> Iterator[Path]:
+    """Give the map itself, or a description as map_server writes it for an image that has none."""
+    if resolution_m is None:
+        yield map_file
+        return
+    import yaml
+
+    with tempfile.TemporaryDirectory() as folder:
+        described = Path(folder) / f"{map_file.stem}.yaml"
+        about = {"image": str(map_file.resolve()), "resolution": resolution_m, "origin": [0.0, 0.0, 0.0]}
+        described.write_text(yaml.safe_dump(about), encoding="utf-8")
+        yield described
