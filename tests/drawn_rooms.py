@@ -6,9 +6,9 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from rose2_logs.model.analysis import SnapshotAnalysis
 from rose2_logs.model.occupancy import GridGeometry, OccupancySnapshot
 from rose2_logs.model.rooms import Doorway, RoomMap
-from rose2_logs.segmentation.pipeline import SnapshotAnalysis
 
 SECOND_NS = 10**9
 

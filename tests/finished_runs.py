@@ -7,7 +7,7 @@ from pathlib import Path
 from mcap.reader import make_reader
 from mcap.writer import Writer
 
-from rose2_logs.io import Selection
+from rose2_logs.config.selection import Selection
 from rose2_logs.workflows.analyze import RunOptions, analyse_log
 
 SAMPLE_LOGS = Path(__file__).parents[1] / "sample_logs"

@@ -13,10 +13,11 @@ from hypothesis.extra import numpy as arrays
 from shapely.geometry import MultiPolygon, Polygon, box
 
 from rose2_logs.config.parameters import Parameters
+from rose2_logs.model.analysis import SnapshotAnalysis
 from rose2_logs.model.occupancy import CellValues, GridGeometry
 from rose2_logs.model.room_quality import RoomEvidence, room_evidence
 from rose2_logs.runs.codec import Codec, dataclasses_within
-from rose2_logs.segmentation.pipeline import SnapshotAnalysis, analyse
+from rose2_logs.segmentation.pipeline import analyse
 
 CODEC = Codec([SnapshotAnalysis, RoomEvidence])
 

@@ -11,7 +11,8 @@ import pytest
 from drawn_maps import office, snapshot
 
 from rose2_logs.config.parameters import Parameters
-from rose2_logs.segmentation.pipeline import SnapshotAnalysis, analyse
+from rose2_logs.model.analysis import SnapshotAnalysis
+from rose2_logs.segmentation.pipeline import analyse
 from rose2_logs.system.shared_memory import (
     ALIGNMENT_BYTES,
     LARGE_BYTES,

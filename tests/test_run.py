@@ -14,10 +14,11 @@ from finished_runs import SAMPLE_LOGS
 from saved_maps import FREE, WALL, save_map, save_run, two_rooms
 
 from rose2_logs.config.parameters import Parameters
+from rose2_logs.config.selection import Selection
 from rose2_logs.errors import LogError, OutputError, ParameterError
-from rose2_logs.io import Selection
 from rose2_logs.runs.provenance import fingerprint, log_files
-from rose2_logs.workflows.analyze import TABLES, RunOptions, analyse_log, log_stem, seconds_into_log
+from rose2_logs.runs.tables import TABLES
+from rose2_logs.workflows.analyze import RunOptions, analyse_log, log_stem, seconds_into_log
 
 SHARED_BAGS = Path(__file__).parents[2] / "shared" / "bags"
 TABLES_ONLY = RunOptions(recording=False, annotated_log=False)

@@ -21,8 +21,9 @@ from rose2_logs.cli.main import main
 from rose2_logs.config.parameters import Parameters
 from rose2_logs.errors import AlreadyWholeError, InvalidMapError, OutputError
 from rose2_logs.runs.output_folder import OutputFolder, difference
+from rose2_logs.runs.tables import TABLES
 from rose2_logs.system.files import locked
-from rose2_logs.workflows.analyze import TABLES, RunOptions, analyse_log
+from rose2_logs.workflows.analyze import RunOptions, analyse_log
 
 SEEN = (110, 130, 150, 170, 190, 210, 240)
 OPTIONS = {"recording": False, "annotated_log": True}

@@ -23,15 +23,18 @@ from numpy.typing import NDArray
 from PIL import Image as PillowImage
 
 from rose2_logs.config.parameters import Parameters, ReadingParameters
+from rose2_logs.config.selection import Selection
 from rose2_logs.drawing.case_picture import room_colours
 from rose2_logs.drawing.pixels import as_pixels
 from rose2_logs.drawing.plan import PANEL, draw_plan
-from rose2_logs.io import Selection, open_log
+from rose2_logs.io import open_log
+from rose2_logs.model.analysis import SnapshotAnalysis
 from rose2_logs.model.explored import ExploredPart
-from rose2_logs.model.occupancy import UNKNOWN, BoolArray, FloatArray, OccupancySnapshot, known_window
+from rose2_logs.model.labels import known_window
+from rose2_logs.model.occupancy import UNKNOWN, BoolArray, FloatArray, OccupancySnapshot
 from rose2_logs.runs.folder import RunResults
 from rose2_logs.segmentation.floor_plan.stage import make_floor_plan
-from rose2_logs.segmentation.pipeline import SnapshotAnalysis, analyse
+from rose2_logs.segmentation.pipeline import analyse
 from rose2_logs.segmentation.rose.spectrum import Spectrum, compute_spectrum
 from rose2_logs.segmentation.rose.stage import find_structure
 from rose2_logs.segmentation.topology.splitting import split_rooms

@@ -14,8 +14,8 @@ from typing import Any
 import pyarrow as pa
 
 from rose2_logs.batch.folders import LOGS_FOLDER
+from rose2_logs.runs.tables import SMOOTHED, SUMMARY, TABLES
 from rose2_logs.system.files import part_of, replacing, writing
-from rose2_logs.workflows.analyze import SMOOTHED, SUMMARY, TABLES
 
 TABLES_FOLDER = "tables"
 PARTITION = "log"

@@ -23,8 +23,8 @@ from rose2_logs.batch.record import BatchSettings, Record, Signature, local_sign
 from rose2_logs.batch.task import LogOutcome, LogTask, Progress
 from rose2_logs.errors import LogError, OutputError, ParameterError
 from rose2_logs.io.discovery import BAG_DESCRIPTION
+from rose2_logs.runs.tables import SMOOTHED, SUMMARY, TABLES
 from rose2_logs.system.files import require_utf8
-from rose2_logs.workflows.analyze import SMOOTHED, SUMMARY, TABLES
 
 logger = logging.getLogger(__name__)
 

@@ -12,9 +12,9 @@ from typing import Any
 from rose2_logs import __version__
 from rose2_logs.batch.location import Location
 from rose2_logs.config.parameters import Parameters
+from rose2_logs.config.run_options import RECORDING_LAYERS
 from rose2_logs.errors import LogError
 from rose2_logs.runs.provenance import log_files
-from rose2_logs.runs.sink import RECORDING_LAYERS
 from rose2_logs.runs.summary import write_json
 from rose2_logs.system.files import readable
 

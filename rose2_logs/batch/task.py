@@ -222,9 +222,10 @@ def _analyse(task: LogTask, report: Report, notices: Notices) -> LogOutcome:
 
 
 def _analyse_local(task: LogTask, path: Path, signature: Signature, report: Report) -> LogOutcome:
-    from rose2_logs.io import Selection
+    from rose2_logs.config.selection import Selection
     from rose2_logs.runs.provenance import fingerprint
-    from rose2_logs.workflows.analyze import SUMMARY, RunOptions, analyse_log, seconds_into_log
+    from rose2_logs.runs.tables import SUMMARY
+    from rose2_logs.workflows.analyze import RunOptions, analyse_log, seconds_into_log
 
     if task.known is not None:
         is_same = fingerprint(path)["sha256"] == task.known.sha256

@@ -168,7 +168,7 @@ def analyze(
 ) -> None:
     """Find and follow the rooms in all maps of a log; write recording, annotated MCAP and tables."""
     from rose2_logs.cli import printing as reporting
-    from rose2_logs.io import Selection
+    from rose2_logs.config.selection import Selection
     from rose2_logs.system.workers import keep_freed_memory
     from rose2_logs.workflows.analyze import RunOptions, analyse_log, log_stem, seconds_into_log
 

@@ -133,7 +133,7 @@ def chosen_layers(names: str) -> tuple[str, ...]:
     ParameterError
         If there is no such layer.
     """
-    from rose2_logs.runs.sink import RECORDING_LAYERS
+    from rose2_logs.config.run_options import RECORDING_LAYERS
 
     if names in ("all", "none"):
         return RECORDING_LAYERS if names == "all" else ()

@@ -17,14 +17,8 @@ from scipy.spatial import cKDTree
 
 from rose2_logs.config.parameters import OccupancyParameters, SpectrumParameters
 from rose2_logs.model.explored import ExploredPart
-from rose2_logs.model.occupancy import (
-    UNKNOWN,
-    BoolArray,
-    FloatArray,
-    OccupancySnapshot,
-    classify,
-    known_window,
-)
+from rose2_logs.model.labels import known_window
+from rose2_logs.model.occupancy import UNKNOWN, BoolArray, FloatArray, OccupancySnapshot, classify
 from rose2_logs.segmentation.circular_peaks import circular_peaks
 from rose2_logs.segmentation.rose.spectrum import angular_energy, compute_spectrum
 from rose2_logs.tracking.registration import POINTS_MIN, RigidMotion, WallFit, evenly, wall_faces

@@ -6,8 +6,20 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from rose2_logs.config.parameters import Parameters
-from rose2_logs.io import Selection
-from rose2_logs.runs.sink import RECORDING_LAYERS
+from rose2_logs.config.selection import Selection
+
+RECORDING_LAYERS = (
+    "predicted",
+    "path",
+    "clean_map",
+    "score",
+    "spectrum",
+    "segments",
+    "lines",
+    "faces",
+    "voronoi",
+)
+"""Layers of a recording that can be left out; map, rooms and doorways are always there."""
 
 NOT_IN_JOURNAL = (
     *("topic", "selection", "parameters", "workers", "recording", "layers", "annotated_log", "bag"),

@@ -13,7 +13,7 @@ from PIL import ImageDraw, ImageFont
 from rose2_logs.drawing.palette import track_colour
 from rose2_logs.evaluation.case_errors import Comparison, Mark
 from rose2_logs.evaluation.scores import Scores
-from rose2_logs.model.occupancy import known_window
+from rose2_logs.model.labels import known_window
 
 Image = NDArray[np.uint8]
 Colour = tuple[int, int, int]

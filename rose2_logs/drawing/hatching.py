@@ -11,7 +11,8 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from rose2_logs.model.occupancy import UNKNOWN, BoolArray, FloatArray, GridGeometry, straight_runs
+from rose2_logs.model.labels import straight_runs
+from rose2_logs.model.occupancy import UNKNOWN, BoolArray, FloatArray, GridGeometry
 from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot
 
 HATCH_STEP_M = 0.4

@@ -16,7 +16,8 @@ from rose2_logs.comparison.room_changes import RoomStatus
 from rose2_logs.comparison.wall_changes import WallStatus
 from rose2_logs.drawing.case_picture import text_line
 from rose2_logs.drawing.palette import track_colour
-from rose2_logs.model.occupancy import UNKNOWN, FloatArray, GridGeometry, known_window
+from rose2_logs.model.labels import known_window
+from rose2_logs.model.occupancy import UNKNOWN, FloatArray, GridGeometry
 from rose2_logs.tracking.matching import resample_labels
 from rose2_logs.tracking.registration import RigidMotion
 

@@ -11,7 +11,7 @@ from shapely.geometry.base import BaseGeometry
 
 from rose2_logs.drawing.palette import track_colour
 from rose2_logs.drawing.shapes import Area, Colour, Drawing, Lines, Picture, Text, hatching
-from rose2_logs.model.occupancy import distinct_labels
+from rose2_logs.model.labels import distinct_labels
 from rose2_logs.model.room_plan import PlanMap, PlanRoom, RoomPlan, predicted_parts
 from rose2_logs.model.room_quality import UNSURE_SIGN, unsure_sign
 from rose2_logs.system.text import percent

@@ -8,8 +8,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from rose2_logs.model.analysis import SnapshotAnalysis
 from rose2_logs.model.occupancy import FloatArray, OccupancySnapshot
-from rose2_logs.segmentation.pipeline import SnapshotAnalysis
 
 Image = NDArray[np.uint8]
 

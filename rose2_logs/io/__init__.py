@@ -1,6 +1,7 @@
 """Log to stream of occupancy snapshots; nothing outside this package knows a file format."""
 
-from rose2_logs.io.log import LogReader, Selection
+from rose2_logs.config.selection import Selection
+from rose2_logs.io.log import LogReader
 from rose2_logs.io.opening import inspect_log, open_log, open_source
 
 __all__ = ["LogReader", "Selection", "inspect_log", "open_log", "open_source"]

@@ -1,14 +1,15 @@
-"""What stage A returns: dominant directions, structure score, clean map."""
+"""What the analysis of one map gives: structure, walls, floor plan, rooms."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from shapely.geometry import Polygon
 
-from rose2_logs.model.occupancy import BoolArray, CellValues, FloatArray
+from rose2_logs.model.occupancy import BoolArray, CellValues, FloatArray, GridGeometry, OccupancySnapshot
+from rose2_logs.model.rooms import RoomMap
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,3 +102,52 @@ class FloorPlan:
     faces: tuple[Polygon, ...]
     face_inside: NDArray[np.bool_]
     room_of_face: NDArray[np.int32]
+
+
+@dataclass(frozen=True, eq=False)
+class SnapshotAnalysis:
+    """The paper's output <clean map, lines, faces, floor plan, segmented map> for one snapshot.
+
+    Attributes
+    ----------
+    index, log_time_ns, stamp_ns : int
+        Those of the snapshot.
+    geometry : GridGeometry
+        Where the map lies in the world.
+    free_area_m2 : float
+        Area of the known free cells.
+    resolution_m : float
+        Side of the cells that the map was analysed in: its own, or of blocks where that is finer than needed
+        or the map is large.
+    rooms : RoomMap
+        The segmented map with the predicted shapes.
+    structure, walls, floor_plan
+        What the stages found; None from a method that does not have them.
+    seconds : dict
+        Time per stage.
+    voronoi_m : (V, 4) float or None
+        Lines x0, y0, x1, y1 of the free space's Voronoi graph, world metres, where it was asked for.
+    """
+
+    index: int
+    log_time_ns: int
+    stamp_ns: int
+    geometry: GridGeometry
+    free_area_m2: float
+    resolution_m: float
+    rooms: RoomMap
+    structure: Structure | None
+    walls: Walls | None
+    floor_plan: FloorPlan | None
+    seconds: dict[str, float]
+    voronoi_m: FloatArray | None = None
+
+    def again_for(self, snapshot: OccupancySnapshot) -> SnapshotAnalysis:
+        """Return the same for another snapshot of the same free and occupied cells at the same place."""
+        return replace(
+            self,
+            index=snapshot.index,
+            log_time_ns=snapshot.log_time_ns,
+            stamp_ns=snapshot.stamp_ns,
+            seconds=dict.fromkeys(self.seconds, 0.0),
+        )

@@ -10,15 +10,8 @@ from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from rose2_logs.config.parameters import OccupancyParameters
-from rose2_logs.model.occupancy import (
-    BoolArray,
-    CellValues,
-    FloatArray,
-    GridGeometry,
-    Scalar,
-    classify,
-    known_window,
-)
+from rose2_logs.model.labels import known_window
+from rose2_logs.model.occupancy import BoolArray, CellValues, FloatArray, GridGeometry, Scalar, classify
 
 NEIGHBOURS = ((0, -1), (0, 1), (-1, 0), (1, 0), (-1, -1), (-1, 1), (1, -1), (1, 1))
 """Where a coarse cell without a room looks for one: cells with a common side first."""

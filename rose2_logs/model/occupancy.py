@@ -20,8 +20,6 @@ SMALLEST_CELL_M, LARGEST_CELL_M = 1e-4, 100.0
 """Sides of cells that maps are made of, in metres: a laser's noise is above, a building below."""
 FARTHEST_ORIGIN_M = 1e8
 """No place on earth lies farther from the origin of its frame, in metres, in no projection."""
-COUNTED_AT_ONCE = 2**16
-"""Cells whose labels are counted at once."""
 
 
 @dataclass(frozen=True)
@@ -224,87 +222,3 @@ def free_area_m2(snapshot: OccupancySnapshot, parameters: OccupancyParameters) -
     """Known free area of a map in square metres."""
     free, _ = classify(snapshot.cells, parameters)
     return float(free.sum()) * snapshot.geometry.cell_area_m2
-
-
-def known_window(known: BoolArray) -> tuple[slice, slice]:
-    """Rows and columns of the smallest part of a mask that holds all of it; the first cell if it is empty."""
-    rows, columns = np.flatnonzero(known.any(1)), np.flatnonzero(known.any(0))
-    if len(rows) == 0:
-        return slice(0, 1), slice(0, 1)
-    return slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)
-
-
-def distinct_labels(labels: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDArray[np.intp]]:
-    """Find the distinct values of a label image and where each comes first in reading order.
-
-    The same as ``numpy.unique`` with ``return_index``, but it sorts the runs of equal labels only.
-
-    Returns
-    -------
-    values : (K,) int64
-        Ascending.
-    first : (K,) int
-        Index into the flattened image.
-    """
-    flat = labels.ravel()
-    starts = np.flatnonzero(np.concatenate([[True], flat[1:] != flat[:-1]]))
-    values, index = np.unique(flat[starts], return_index=True)
-    return values.astype(np.int64), starts[index]
-
-
-def renumbered(labels: NDArray[np.int32], number: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Return ``number[labels]``, the image with new numbers, written over the old ones to save memory."""
-    for rows in np.array_split(labels, max(1, labels.size // COUNTED_AT_ONCE)):
-        rows[...] = number[rows]
-    return labels
-
-
-def roots(parent: NDArray[np.intp]) -> NDArray[np.intp]:
-    """What each of N regions (N,) belongs to after all joins.
-
-    Parameters
-    ----------
-    parent : (N,) int
-        The region that each was made part of; itself where it was not.
-    """
-    while not np.array_equal(above := parent[parent], parent):
-        parent = above
-    return parent
-
-
-def label_sizes(labels: NDArray[np.integer], count: int) -> NDArray[np.int64]:
-    """Number of cells (count + 1,) of each label 0..count of an image.
-
-    The same as ``numpy.bincount``, which would make a copy of the image in its own type.
-    """
-    sizes = np.zeros(count + 1, np.int64)
-    for rows in np.array_split(labels, max(1, labels.size // COUNTED_AT_ONCE)):
-        sizes += np.bincount(rows.ravel(), minlength=count + 1)
-    return sizes
-
-
-def straight_runs(
-    row: NDArray[np.integer], column: NDArray[np.integer], step: tuple[int, int]
-) -> tuple[NDArray[np.integer], NDArray[np.integer]]:
-    """Join cells that follow one another along a direction.
-
-    Parameters
-    ----------
-    row, column : (N,) int
-        The cells, each once.
-    step : (int, int)
-        From a cell to the next of its run: (0, 1), or 1 row with any number of columns.
-
-    Returns
-    -------
-    first, last : (K, 2) int
-        Row and column of the ends of each run; a lone cell is both.
-    """
-    down, right = step
-    place, line = (row, column - right * row) if down else (column, row)
-    order = np.lexsort((place, line))
-    cells = np.column_stack([row, column])[order]
-    is_first = np.ones(len(cells), bool)
-    is_first[1:] = (np.diff(line[order]) != 0) | (np.diff(place[order]) != 1)
-    is_last = np.append(is_first[1:], True)[: len(cells)]
-    return cells[is_first], cells[is_last]

@@ -10,18 +10,12 @@ from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from rose2_logs.config.parameters import OccupancyParameters
-from rose2_logs.model.occupancy import (
-    UNKNOWN,
-    BoolArray,
-    FloatArray,
-    GridGeometry,
-    OccupancySnapshot,
-    known_window,
-)
+from rose2_logs.model.analysis import SnapshotAnalysis
+from rose2_logs.model.labels import known_window
+from rose2_logs.model.occupancy import UNKNOWN, BoolArray, FloatArray, GridGeometry, OccupancySnapshot
+from rose2_logs.model.outlines import outline
 from rose2_logs.model.room_quality import RoomEvidence, is_unsure
 from rose2_logs.model.rooms import Doorway
-from rose2_logs.segmentation.floor_plan.rooms import outline
-from rose2_logs.segmentation.pipeline import SnapshotAnalysis
 
 PREDICTED_MIN_WIDTH_M = 0.3
 """Unseen parts of rooms are told from this width on: narrower ones are walls, whose inside is never seen."""

@@ -10,7 +10,8 @@ from shapely.geometry.base import BaseGeometry
 
 from rose2_logs.config.parameters import OccupancyParameters
 from rose2_logs.model.explored import ExploredPart
-from rose2_logs.model.occupancy import UNKNOWN, BoolArray, FloatArray, OccupancySnapshot, known_window
+from rose2_logs.model.labels import known_window
+from rose2_logs.model.occupancy import UNKNOWN, BoolArray, FloatArray, OccupancySnapshot
 from rose2_logs.model.rooms import RoomMap
 
 OUTLINE_STEP_M = 0.1

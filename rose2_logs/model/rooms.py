@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
-from rose2_logs.model.occupancy import FloatArray, GridGeometry, label_sizes
+from rose2_logs.model.labels import label_sizes
+from rose2_logs.model.occupancy import FloatArray, GridGeometry
 
 LABEL_DEPTH_SHARE = 0.8
 """A label stands at most this much less deep than its room is at most: along a corridor in the middle."""

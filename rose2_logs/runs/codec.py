@@ -17,7 +17,7 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from rose2_logs.model.occupancy import known_window
+from rose2_logs.model.labels import known_window
 
 _LENGTH = struct.Struct("<I")
 PLAIN = (str, int, float, bool, type(None))

@@ -20,9 +20,9 @@ from rose2_logs.model.room_plan import PlanRoom, RoomPlan
 from rose2_logs.model.rooms import Doorway
 from rose2_logs.runs.maps import RunMaps
 from rose2_logs.runs.provenance import log_files
+from rose2_logs.runs.tables import SMOOTHED, SUMMARY, TABLES
 from rose2_logs.system.files import require_utf8
 from rose2_logs.system.text import percent
-from rose2_logs.workflows.analyze import SMOOTHED, SUMMARY, TABLES
 
 if TYPE_CHECKING:
     import pyarrow as pa

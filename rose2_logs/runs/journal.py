@@ -19,10 +19,10 @@ from typing import IO, Any, Self
 import zstandard
 
 from rose2_logs.errors import InvalidMapError, OutputError
+from rose2_logs.model.analysis import SnapshotAnalysis
 from rose2_logs.model.occupancy import OccupancySnapshot
 from rose2_logs.model.room_quality import RoomEvidence
 from rose2_logs.runs.codec import Codec
-from rose2_logs.segmentation.pipeline import SnapshotAnalysis
 from rose2_logs.system.files import writing
 from rose2_logs.system.workers import Workers
 

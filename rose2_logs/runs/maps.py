@@ -10,8 +10,9 @@ import shapely
 from numpy.typing import NDArray
 
 from rose2_logs.config.parameters import OccupancyParameters, ReadingParameters
+from rose2_logs.config.selection import Selection
 from rose2_logs.errors import LogError
-from rose2_logs.io import LogReader, Selection, open_source
+from rose2_logs.io import LogReader, open_source
 from rose2_logs.io.opening import DEFAULT_LIMITS
 from rose2_logs.io.source import MessageSource
 from rose2_logs.model.occupancy import FloatArray, GridGeometry, OccupancySnapshot

@@ -11,19 +11,6 @@ from rose2_logs.config.parameters import Parameters
 from rose2_logs.tracking.back_projection import SmoothedSnapshot
 from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot
 
-RECORDING_LAYERS = (
-    "predicted",
-    "path",
-    "clean_map",
-    "score",
-    "spectrum",
-    "segments",
-    "lines",
-    "faces",
-    "voronoi",
-)
-"""Layers of a recording that can be left out; map, rooms and doorways are always there."""
-
 
 @dataclass(frozen=True)
 class RunInfo:

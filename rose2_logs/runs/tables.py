@@ -202,3 +202,13 @@ def _doorway_rows(frame: TrackedSnapshot) -> list[Row]:
             }
         )
     return rows
+
+
+TABLES = ("snapshots", "rooms", "tracks", "events", "doorways")
+
+
+SMOOTHED = "smoothed"
+"""Name of the table that a run has only where it was asked to smooth."""
+
+
+SUMMARY = "summary.json"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -13,17 +12,11 @@ from shapely.geometry.base import BaseGeometry
 
 from rose2_logs.config.parameters import Parameters
 from rose2_logs.errors import ParameterError
-from rose2_logs.model.analysis import FloorPlan, Structure, Walls
+from rose2_logs.model.analysis import FloorPlan, SnapshotAnalysis, Structure, Walls
 from rose2_logs.model.explored import ExploredPart
-from rose2_logs.model.occupancy import (
-    BoolArray,
-    FloatArray,
-    GridGeometry,
-    OccupancySnapshot,
-    distinct_labels,
-    label_sizes,
-    renumbered,
-)
+from rose2_logs.model.labels import distinct_labels, label_sizes, renumbered
+from rose2_logs.model.occupancy import BoolArray, OccupancySnapshot
+from rose2_logs.model.outlines import room_outlines
 from rose2_logs.model.rooms import Doorway, RoomMap
 from rose2_logs.segmentation.baselines.stage import BASELINES, segment_by_baseline
 from rose2_logs.segmentation.floor_plan.doorways import find_doorways
@@ -31,7 +24,6 @@ from rose2_logs.segmentation.floor_plan.rooms import (
     adopt_left_out,
     number_rooms,
     predicted_shapes,
-    room_outlines,
     settle_borders,
 )
 from rose2_logs.segmentation.floor_plan.stage import FloorPlanResult, make_floor_plan
@@ -42,55 +34,6 @@ from rose2_logs.segmentation.walls.stage import WallResult, count_walls, find_wa
 
 METHODS = ("rose2", *BASELINES)
 """Names of the segmentation methods: the paper's, and those that it compares with."""
-
-
-@dataclass(frozen=True, eq=False)
-class SnapshotAnalysis:
-    """The paper's output <clean map, lines, faces, floor plan, segmented map> for one snapshot.
-
-    Attributes
-    ----------
-    index, log_time_ns, stamp_ns : int
-        Those of the snapshot.
-    geometry : GridGeometry
-        Where the map lies in the world.
-    free_area_m2 : float
-        Area of the known free cells.
-    resolution_m : float
-        Side of the cells that the map was analysed in: its own, or of blocks where that is finer than needed
-        or the map is large.
-    rooms : RoomMap
-        The segmented map with the predicted shapes.
-    structure, walls, floor_plan
-        What the stages found; None from a method that does not have them.
-    seconds : dict
-        Time per stage.
-    voronoi_m : (V, 4) float or None
-        Lines x0, y0, x1, y1 of the free space's Voronoi graph, world metres, where it was asked for.
-    """
-
-    index: int
-    log_time_ns: int
-    stamp_ns: int
-    geometry: GridGeometry
-    free_area_m2: float
-    resolution_m: float
-    rooms: RoomMap
-    structure: Structure | None
-    walls: Walls | None
-    floor_plan: FloorPlan | None
-    seconds: dict[str, float]
-    voronoi_m: FloatArray | None = None
-
-    def again_for(self, snapshot: OccupancySnapshot) -> SnapshotAnalysis:
-        """Return the same for another snapshot of the same free and occupied cells at the same place."""
-        return replace(
-            self,
-            index=snapshot.index,
-            log_time_ns=snapshot.log_time_ns,
-            stamp_ns=snapshot.stamp_ns,
-            seconds=dict.fromkeys(self.seconds, 0.0),
-        )
 
 
 def analyse(

@@ -15,15 +15,8 @@ from numpy.typing import NDArray
 from skimage.measure import label as connected
 
 from rose2_logs.config.parameters import OccupancyParameters, Parameters, TrackingParameters
-from rose2_logs.model.occupancy import (
-    BoolArray,
-    FloatArray,
-    GridGeometry,
-    OccupancySnapshot,
-    classify,
-    known_window,
-    label_sizes,
-)
+from rose2_logs.model.labels import known_window, label_sizes
+from rose2_logs.model.occupancy import BoolArray, FloatArray, GridGeometry, OccupancySnapshot, classify
 from rose2_logs.model.rooms import RoomMap
 from rose2_logs.tracking.registration import POINTS_MIN, RigidMotion, WallFit, wall_faces
 from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot, map_motion

@@ -6,9 +6,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal, get_args
 
+from rose2_logs.model.analysis import SnapshotAnalysis
 from rose2_logs.model.occupancy import FloatArray, OccupancySnapshot
 from rose2_logs.model.room_quality import RoomEvidence
-from rose2_logs.segmentation.pipeline import SnapshotAnalysis
 from rose2_logs.tracking.layout_change import LayoutChange
 from rose2_logs.tracking.registration import RigidMotion
 

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rose2_logs.config.parameters import OccupancyParameters, TrackingParameters
+from rose2_logs.model.analysis import SnapshotAnalysis
 from rose2_logs.model.occupancy import BoolArray, FloatArray, OccupancySnapshot
 from rose2_logs.model.rooms import RoomMap
-from rose2_logs.segmentation.pipeline import SnapshotAnalysis
 from rose2_logs.tracking.matching import RegionShape, assign, cut_out_rooms
 from rose2_logs.tracking.memory import TrackMemory
 from rose2_logs.tracking.overlap import share_of

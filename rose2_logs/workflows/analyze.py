@@ -27,7 +27,7 @@ from rose2_logs.runs.provenance import fingerprint, log_place, software_versions
 from rose2_logs.runs.sink import CopyingSink, RunInfo, Sink, SmoothedSink
 from rose2_logs.runs.stream import SnapshotWorkers, start_workers, tracked_snapshots
 from rose2_logs.runs.summary import RunTotals, write_summary
-from rose2_logs.runs.tables import Tables
+from rose2_logs.runs.tables import SMOOTHED, SUMMARY, TABLES, Tables
 from rose2_logs.system.files import refuse_existing, require_short, require_utf8
 from rose2_logs.system.warnings import Notices, gathered, muted
 from rose2_logs.tracking.back_projection import RunSmoother
@@ -35,9 +35,6 @@ from rose2_logs.tracking.track_history import Moment
 from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot
 
 __all__ = [
-    "SMOOTHED",
-    "SUMMARY",
-    "TABLES",
     "OnSnapshot",
     "RunOptions",
     "RunResult",
@@ -48,10 +45,6 @@ __all__ = [
 
 logger = logging.getLogger(__name__)
 
-TABLES = ("snapshots", "rooms", "tracks", "events", "doorways")
-SMOOTHED = "smoothed"
-"""Name of the table that a run has only where it was asked to smooth."""
-SUMMARY = "summary.json"
 NAMELESS = "log"
 """What the results of a log without a name of its own are called."""
 

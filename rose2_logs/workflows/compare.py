@@ -12,13 +12,14 @@ from rose2_logs.comparison.final_layout import FinalLayout
 from rose2_logs.comparison.layouts import LayoutComparison, compare_layouts
 from rose2_logs.comparison.placement import PlacedMap
 from rose2_logs.config.parameters import Parameters, ReadingParameters
+from rose2_logs.config.selection import Selection
 from rose2_logs.errors import LogError, ParameterError
-from rose2_logs.io import Selection, open_log
+from rose2_logs.io import open_log
 from rose2_logs.model.occupancy import OccupancySnapshot
 from rose2_logs.runs.folder import RunResults
+from rose2_logs.runs.tables import SUMMARY
 from rose2_logs.segmentation.pipeline import analyse
 from rose2_logs.system.files import refuse_existing, writing
-from rose2_logs.workflows.analyze import SUMMARY
 
 FILES = (
     "room_changes.parquet",

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from rose2_logs.config.parameters import OccupancyParameters, Parameters
+from rose2_logs.config.selection import Selection
 from rose2_logs.errors import LogError
-from rose2_logs.io import LogReader, Selection, open_source
+from rose2_logs.io import LogReader, open_source
 from rose2_logs.io.source import LogInfo, MessageSource
 from rose2_logs.model.occupancy import OccupancySnapshot, classify
 

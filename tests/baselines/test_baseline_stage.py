@@ -7,8 +7,8 @@ from drawn_maps import agreement, office, snapshot
 from free_masks import RESOLUTION_M, overlap_with_room, ring, two_rooms
 
 from rose2_logs.config.parameters import Parameters
+from rose2_logs.model.outlines import room_outlines
 from rose2_logs.segmentation.baselines.stage import BASELINES, segment_by_baseline
-from rose2_logs.segmentation.floor_plan.rooms import room_outlines
 from rose2_logs.segmentation.pipeline import METHODS, analyse
 
 PARAMETERS = Parameters()

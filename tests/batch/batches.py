@@ -15,7 +15,7 @@ from saved_maps import save_run
 
 from rose2_logs.batch.driver import LogState
 from rose2_logs.batch.task import LogOutcome, LogTask, Progress, analyse_task
-from rose2_logs.workflows.analyze import TABLES
+from rose2_logs.runs.tables import TABLES
 
 TIMEOUT_S = 90.0
 SLOW = tuple(range(116, 222, 4))

@@ -35,7 +35,8 @@ from rose2_logs.batch.folders import locked
 from rose2_logs.batch.record import RECORD, BatchSettings
 from rose2_logs.batch.task import Progress
 from rose2_logs.errors import OutputError
-from rose2_logs.workflows.analyze import TABLES, RunOptions, analyse_log
+from rose2_logs.runs.tables import TABLES
+from rose2_logs.workflows.analyze import RunOptions, analyse_log
 
 GOOD = {"slow", "one_run", "two_run"}
 

@@ -19,8 +19,8 @@ from rose2_logs.batch.driver import BatchOptions, BatchResult, run_batch
 from rose2_logs.batch.folders import LOGS_FOLDER, REPLACED, WORK_FOLDER, put_in_place
 from rose2_logs.batch.record import RECORD, BatchSettings
 from rose2_logs.config.parameters import Parameters
+from rose2_logs.config.run_options import RECORDING_LAYERS
 from rose2_logs.errors import LogError, OutputError, ParameterError
-from rose2_logs.runs.sink import RECORDING_LAYERS
 
 QUIET = BatchSettings(recording=False, annotated_log=False)
 

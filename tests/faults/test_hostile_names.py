@@ -21,8 +21,8 @@ from faulty_logs import SEEN, START_NS, grid, room, write_mcap
 from finished_runs import SAMPLE_LOGS
 from mcap.reader import make_reader
 
+from rose2_logs.config.selection import Selection
 from rose2_logs.errors import OutputError
-from rose2_logs.io import Selection
 from rose2_logs.outputs.exports.formats import FORMATS
 from rose2_logs.outputs.report.page import write_report
 from rose2_logs.runs.folder import RunResults

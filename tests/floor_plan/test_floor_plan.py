@@ -7,11 +7,12 @@ import pytest
 import shapely
 
 from rose2_logs.config.parameters import FloorPlanParameters
+from rose2_logs.model.outlines import outline
 from rose2_logs.segmentation.floor_plan.doorways import find_doorways
 from rose2_logs.segmentation.floor_plan.edge_weights import EdgeEvidence, edge_evidence
 from rose2_logs.segmentation.floor_plan.faces import build_faces, rasterise
 from rose2_logs.segmentation.floor_plan.grouping import group_faces
-from rose2_logs.segmentation.floor_plan.rooms import adopt_left_out, outline, settle_borders
+from rose2_logs.segmentation.floor_plan.rooms import adopt_left_out, settle_borders
 from rose2_logs.segmentation.floor_plan.stage import make_floor_plan
 
 PARAMETERS = FloorPlanParameters()

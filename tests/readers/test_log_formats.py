@@ -32,8 +32,9 @@ from scipy.ndimage import binary_dilation
 from test_messages import SCHEMA, foxglove_message
 
 from rose2_logs.config.parameters import ReadingParameters
+from rose2_logs.config.selection import Selection
 from rose2_logs.errors import InvalidMapError, LogError, NoMapTopicError
-from rose2_logs.io import Selection, inspect_log, open_log
+from rose2_logs.io import inspect_log, open_log
 from rose2_logs.system.warnings import StrictError, gathered
 
 needs_shared = pytest.mark.skipif(

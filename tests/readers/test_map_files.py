@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from rose2_logs.config.selection import Selection
 from rose2_logs.errors import InvalidMapError, LogError, NoMapTopicError
-from rose2_logs.io import Selection, inspect_log, open_log
+from rose2_logs.io import inspect_log, open_log
 
 
 def save(path, pixels, *, image=None, **described):

@@ -11,7 +11,8 @@ import pytest
 from mcap.writer import Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from rose2_logs.io import Selection, open_log
+from rose2_logs.config.selection import Selection
+from rose2_logs.io import open_log
 from rose2_logs.io.poses import BASE_FRAMES, POSE_STEP_M, POSE_STEP_S
 
 PROJECT = Path(__file__).parents[2]

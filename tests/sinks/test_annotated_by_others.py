@@ -18,8 +18,9 @@ from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import Reader
 from saved_maps import save_run
 
+from rose2_logs.config.selection import Selection
 from rose2_logs.errors import OutputError
-from rose2_logs.io import Selection, open_log
+from rose2_logs.io import open_log
 from rose2_logs.outputs.mcap.annotated import ADDED
 from rose2_logs.outputs.mcap.viewer_layouts import offered
 from rose2_logs.workflows.analyze import RunOptions, analyse_log

@@ -42,7 +42,7 @@ LOGS = {
 
 
 def annotate(log: Path, folder: Path, **changes) -> Path:
-    from rose2_logs.io import Selection
+    from rose2_logs.config.selection import Selection
 
     options = RunOptions(selection=Selection(max_snapshots=3), recording=False, **changes)
     result = analyse_log(log, folder, options)

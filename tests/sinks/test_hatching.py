@@ -10,7 +10,7 @@ import shapely
 from drawn_rooms import drawn, rows
 
 from rose2_logs.drawing.hatching import HATCH_STEP_M, cells_within, hatch_unseen
-from rose2_logs.model.occupancy import straight_runs
+from rose2_logs.model.labels import straight_runs
 from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot
 
 RESOLUTION_M = 0.1

@@ -19,7 +19,7 @@ from looking import CHROMIUM, coloured_share, free_port, needs_chromium, needs_v
 from numpy.typing import NDArray
 from PIL import Image
 
-from rose2_logs.io import Selection
+from rose2_logs.config.selection import Selection
 from rose2_logs.workflows.analyze import RunOptions, analyse_log
 
 PROJECT = Path(__file__).parents[2]

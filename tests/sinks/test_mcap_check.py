@@ -107,7 +107,7 @@ def test_a_chunk_that_is_damaged_is_not_looked_into():
 
 def test_the_summary_tells_what_was_copied(tmp_path: Path):
     """Numbers as another reader counts them in the log; the added ones are one a map."""
-    from rose2_logs.io import Selection
+    from rose2_logs.config.selection import Selection
 
     options = RunOptions(recording=False, selection=Selection(max_snapshots=2))
     analyse_log(OFFICE, tmp_path / "out", options)

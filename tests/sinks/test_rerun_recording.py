@@ -14,8 +14,8 @@ import pytest
 from looking import free_port, needs_vulkan
 from saved_maps import save_run
 
+from rose2_logs.config.selection import Selection
 from rose2_logs.errors import OutputError
-from rose2_logs.io import Selection
 from rose2_logs.outputs.rerun.world import room_label
 from rose2_logs.tracking.registration import RigidMotion
 from rose2_logs.tracking.tracked_snapshot import MAP_TRACK, RoomEvent

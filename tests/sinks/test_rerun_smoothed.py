@@ -14,8 +14,8 @@ from drawn_rooms import drawn
 from finished_runs import SAMPLE_LOGS
 from rerun.chunk import RrdReader
 
+from rose2_logs.config.selection import Selection
 from rose2_logs.drawing.palette import track_colour
-from rose2_logs.io import Selection
 from rose2_logs.outputs.rerun.layers import Layers
 from rose2_logs.outputs.rerun.pictures import FILL_OPACITY
 from rose2_logs.outputs.rerun.projected import SmoothedWorld

@@ -11,6 +11,7 @@ from drawn_maps import office, snapshot
 
 from rose2_logs.config.parameters import Parameters, TrackingParameters
 from rose2_logs.model.occupancy import GridGeometry
+from rose2_logs.model.outlines import outline
 from rose2_logs.model.rooms import RoomMap
 from rose2_logs.outputs.mcap.ros_messages import (
     ROOMS_TYPE,
@@ -20,7 +21,6 @@ from rose2_logs.outputs.mcap.ros_messages import (
     ring_segments,
     ros2_typestore,
 )
-from rose2_logs.segmentation.floor_plan.rooms import outline
 from rose2_logs.segmentation.pipeline import METHODS, analyse
 from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot
 from rose2_logs.tracking.tracker import RoomTracker

@@ -14,7 +14,7 @@ from mcap.reader import make_reader
 from saved_maps import FREE, WALL, two_rooms
 
 from rose2_logs.model.occupancy import GridGeometry
-from rose2_logs.workflows.analyze import TABLES
+from rose2_logs.runs.tables import TABLES
 
 PROGRAM = """
 import sys

@@ -13,10 +13,13 @@ from scipy import fft
 
 from benchmarking.gauges import peak_allocated, peak_memory, timed
 from rose2_logs.config.parameters import Parameters
+from rose2_logs.config.selection import Selection
 from rose2_logs.evaluation.cases import Case
-from rose2_logs.io import Selection, open_log
-from rose2_logs.model.occupancy import BoolArray, OccupancySnapshot, classify, known_window
-from rose2_logs.segmentation.pipeline import SnapshotAnalysis, analyse
+from rose2_logs.io import open_log
+from rose2_logs.model.analysis import SnapshotAnalysis
+from rose2_logs.model.labels import known_window
+from rose2_logs.model.occupancy import BoolArray, OccupancySnapshot, classify
+from rose2_logs.segmentation.pipeline import analyse
 
 HOUGH_THRESHOLD = 20
 """Votes of a line in the floor's Hough transform: about a metre of wall at 5 cm."""

@@ -18,7 +18,8 @@ from benchmarking.gauges import ProcessTree, peak_memory
 from benchmarking.map_times import time_analysis
 from rose2_logs.config.parameters import Parameters
 from rose2_logs.errors import Rose2LogsError
-from rose2_logs.model.occupancy import GridGeometry, OccupancySnapshot, known_window
+from rose2_logs.model.labels import known_window
+from rose2_logs.model.occupancy import GridGeometry, OccupancySnapshot
 from rose2_logs.segmentation.pipeline import analyse
 
 START_NS = 1_700_000_000_000_000_000

@@ -8,6 +8,7 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
+from rose2_logs.config.run_options import RECORDING_LAYERS
 from rose2_logs.model.occupancy import FloatArray
 from rose2_logs.outputs.rerun.lanes import FINAL_IOU, FINAL_SHARE, LIVES, SHIFTS
 from rose2_logs.outputs.rerun.projected import SEEN_SHARE, SMOOTHED
@@ -26,7 +27,6 @@ from rose2_logs.outputs.rerun.world import (
     SPECTRUM,
     VORONOI,
 )
-from rose2_logs.runs.sink import RECORDING_LAYERS
 
 COVERAGE_UNIT = 1e-4
 """Step of the coverage timeline, which counts in whole numbers."""

@@ -17,7 +17,8 @@ from rose2_logs.comparison.room_changes import ROOM_STATUSES
 from rose2_logs.comparison.wall_changes import WALL_STATUSES
 from rose2_logs.drawing.layout_picture import ROOM_COLOURS, WALL_COLOURS
 from rose2_logs.drawing.palette import track_colour
-from rose2_logs.model.occupancy import UNKNOWN, FloatArray, known_window
+from rose2_logs.model.labels import known_window
+from rose2_logs.model.occupancy import UNKNOWN, FloatArray
 from rose2_logs.outputs.mcap.ros_messages import outer_rings
 from rose2_logs.outputs.rerun.blueprint import PAPER, eye_above
 from rose2_logs.outputs.rerun.world import OUTLINE_POINTS, OUTLINE_SHADE, lifted

@@ -10,7 +10,8 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from rose2_logs.drawing.palette import track_colour
-from rose2_logs.model.occupancy import FloatArray, OccupancySnapshot, known_window
+from rose2_logs.model.labels import known_window
+from rose2_logs.model.occupancy import FloatArray, OccupancySnapshot
 from rose2_logs.outputs.rerun.columns import Picture
 
 FILL_OPACITY = 0.6

@@ -10,6 +10,7 @@ from typing import Self
 
 import rerun as rr
 
+from rose2_logs.config.run_options import RECORDING_LAYERS
 from rose2_logs.drawing.event_text import event_text
 from rose2_logs.drawing.extent import Extent
 from rose2_logs.drawing.palette import track_colour
@@ -23,7 +24,7 @@ from rose2_logs.outputs.rerun.layers import CHUNK_BYTES, Layers
 from rose2_logs.outputs.rerun.projected import SmoothedWorld
 from rose2_logs.outputs.rerun.summary import summary_text
 from rose2_logs.outputs.rerun.world import World
-from rose2_logs.runs.sink import RECORDING_LAYERS, RunInfo
+from rose2_logs.runs.sink import RunInfo
 from rose2_logs.runs.tables import Tables
 from rose2_logs.system.files import part_of, writing
 from rose2_logs.system.text import percent

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rose2_logs.config.baselines import VoronoiMergeParameters
-from rose2_logs.model.occupancy import distinct_labels, roots
+from rose2_logs.model.labels import distinct_labels, roots
 from rose2_logs.segmentation.baselines.regions import ranks_by_size
 
 WALL = 0

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rose2_logs.config.parameters import FloorPlanParameters
-from rose2_logs.model.occupancy import FloatArray, roots
+from rose2_logs.model.labels import roots
+from rose2_logs.model.occupancy import FloatArray
 from rose2_logs.segmentation.floor_plan.edge_weights import EdgeEvidence
 
 Border = tuple[float, float, float]

@@ -6,12 +6,11 @@ import cv2
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from scipy.ndimage import find_objects
-from shapely.affinity import translate
 from shapely.geometry.base import BaseGeometry
 
 from rose2_logs.config.parameters import FloorPlanParameters
-from rose2_logs.model.occupancy import BoolArray, FloatArray, distinct_labels, label_sizes
+from rose2_logs.model.labels import distinct_labels, label_sizes
+from rose2_logs.model.occupancy import BoolArray, FloatArray
 from rose2_logs.segmentation.floor_plan.faces import FaceGraph, rasterise
 
 
@@ -153,26 +152,3 @@ def _without_empty_holes(shape: BaseGeometry, face_points: shapely.STRtree) -> B
     holes = shapely.polygons(rings[~first_of_part])
     taken = np.unique(face_points.query(holes, predicate="contains")[0])
     return shapely.union_all([shape, *np.delete(holes, taken)])
-
-
-def outline(mask: BoolArray, resolution_m: float) -> BaseGeometry:
-    """Outline of the cells of a mask as a polygon or multipolygon in the grid frame, metres."""
-    padded = np.pad(mask, 1).astype(np.uint8)
-    rows = np.diff(padded.astype(np.int8), axis=1)
-    row, start = np.nonzero(rows == 1)
-    _, end = np.nonzero(rows == -1)
-    boxes = shapely.box(start, row - 1, end, row)
-    return shapely.transform(shapely.union_all(boxes), lambda points: points * resolution_m)
-
-
-def room_outlines(labels: NDArray[np.int32], resolution_m: float) -> list[BaseGeometry]:
-    """Outlines of the cells of rooms 1.. in the grid frame, metres; empty for numbers without cells."""
-    shapes: list[BaseGeometry] = []
-    for room, window in enumerate(find_objects(labels), start=1):
-        if window is None:
-            shapes.append(shapely.Polygon())
-            continue
-        shape = outline(labels[window] == room, resolution_m)
-        corner = window[1].start * resolution_m, window[0].start * resolution_m
-        shapes.append(translate(shape, *corner))
-    return shapes

@@ -13,7 +13,8 @@ from skimage.morphology import skeletonize
 from skimage.segmentation import watershed
 
 from rose2_logs.config.parameters import TopologyParameters
-from rose2_logs.model.occupancy import BoolArray, FloatArray, roots, straight_runs
+from rose2_logs.model.labels import roots, straight_runs
+from rose2_logs.model.occupancy import BoolArray, FloatArray
 
 DRAWN_BLOCK = 2
 """The graph is drawn by every so many cells: a passage of 30 cm is three of 10 cm wide."""
