@@ -8,15 +8,15 @@ from mcap.reader import make_reader
 from mcap.writer import Writer
 
 from rose2_logs.config.selection import Selection
-from rose2_logs.workflows.analyze import RunOptions, analyse_log
+from rose2_logs.workflows.analyze import RunOptions, analyze_log
 
 SAMPLE_LOGS = Path(__file__).parents[1] / "sample_logs"
 
 
 def run_of(log: Path, folder: Path, snapshots: int = 6, **options) -> Path:
-    """Analyse some maps of a log; return the folder of its results."""
+    """Analyze some maps of a log; return the folder of its results."""
     selection = Selection(max_snapshots=snapshots)
-    return analyse_log(log, folder, RunOptions(selection=selection, recording=False, **options)).folder
+    return analyze_log(log, folder, RunOptions(selection=selection, recording=False, **options)).folder
 
 
 def renamed_topic(log: Path, topic: str, to: Path) -> Path:

@@ -11,7 +11,7 @@ from rose2_logs.comparison.final_layout import FinalLayout
 from rose2_logs.comparison.placement import PlacedMap
 from rose2_logs.config.parameters import Parameters
 from rose2_logs.model.occupancy import OccupancySnapshot
-from rose2_logs.segmentation.pipeline import analyse
+from rose2_logs.segmentation.pipeline import analyze
 
 RESOLUTION_M = 0.05
 ROOM_1, ROOM_2, CORRIDOR = (2.5, 4.0), (7.5, 4.0), (5.0, 1.0)
@@ -20,7 +20,7 @@ ROOM_1, ROOM_2, CORRIDOR = (2.5, 4.0), (7.5, 4.0), (5.0, 1.0)
 
 def layout_of(map_: OccupancySnapshot, method: str = "rose2") -> FinalLayout:
     """The layout that a run with this last map ends with; rooms are numbered as in the map."""
-    analysis = analyse(map_, Parameters(), method)
+    analysis = analyze(map_, Parameters(), method)
     tracks = tuple(range(1, len(analysis.rooms) + 1))
     placed = PlacedMap(map_, Parameters().occupancy)
     return FinalLayout(

@@ -34,8 +34,8 @@ def free_port() -> int:
         return int(probe.getsockname()[1])
 
 
-def coloured_share(picture: Path, window: tuple[slice, slice]) -> float:
-    """Share of a picture's pixels in a window, of rows and columns, that have a colour."""
+def colored_share(picture: Path, window: tuple[slice, slice]) -> float:
+    """Share of a picture's pixels in a window, of rows and columns, that have a color."""
     pixels = np.asarray(Image.open(picture).convert("RGB")).astype(int)[window]
     return float(((pixels.max(-1) - pixels.min(-1)) > 40).mean())
 

@@ -13,7 +13,7 @@ WALL, FREE, UNKNOWN = 0, 254, 205
 
 
 def two_rooms(seen_columns: int = 240) -> NDArray[np.uint8]:
-    """Grey image of two rooms of 5 x 5 m with a door of 1 m between them, seen up to a column."""
+    """Gray image of two rooms of 5 x 5 m with a door of 1 m between them, seen up to a column."""
     image = np.full((120, 240), UNKNOWN, np.uint8)
     for left in (10, 116):
         image[8:112, left : left + 108] = WALL

@@ -53,5 +53,5 @@ def test_as_scipy_on_three_turns_of_the_circle(
 
 
 @pytest.mark.parametrize("values", [[], [1.0], [1.0, 1.0]])
-def test_no_peak_without_a_lower_neighbour(values: list[float]) -> None:
+def test_no_peak_without_a_lower_neighbor(values: list[float]) -> None:
     assert len(circular_peaks(np.array(values))) == 0

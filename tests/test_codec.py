@@ -15,11 +15,11 @@ from shapely.geometry import MultiPolygon, Polygon, box
 from rose2_logs.config.parameters import Parameters
 from rose2_logs.model.analysis import SnapshotAnalysis
 from rose2_logs.model.occupancy import CellValues, GridGeometry
-from rose2_logs.model.room_quality import RoomEvidence, room_evidence
+from rose2_logs.model.room_quality import RoomQuality, room_quality
 from rose2_logs.runs.codec import Codec, dataclasses_within
-from rose2_logs.segmentation.pipeline import analyse
+from rose2_logs.segmentation.pipeline import analyze
 
-CODEC = Codec([SnapshotAnalysis, RoomEvidence])
+CODEC = Codec([SnapshotAnalysis, RoomQuality])
 
 
 def assert_equal(one: object, other: object) -> None:
@@ -47,9 +47,9 @@ def assert_equal(one: object, other: object) -> None:
 def test_an_analysis_comes_back_as_it_was(method: str):
     cells, _ = office(turn_rad=0.3, clutter=5, pad=(7, 3))
     taken = snapshot(cells, origin_xy_m=(-3.1, 0.2), yaw_rad=0.1)
-    analysis = analyse(taken, Parameters(), method)
+    analysis = analyze(taken, Parameters(), method)
     assert len(analysis.rooms) > 1
-    found = (analysis, room_evidence(taken, analysis.rooms, Parameters().occupancy))
+    found = (analysis, room_quality(taken, analysis.rooms, Parameters().occupancy))
     data = CODEC.encode(found)
     assert_equal(CODEC.decode(data), found)
 
@@ -83,7 +83,7 @@ def test_what_an_analysis_is_made_of_comes_back(value: object):
 
 
 def test_the_known_types_are_those_of_the_annotations():
-    names = set(dataclasses_within([SnapshotAnalysis, RoomEvidence]))
+    names = set(dataclasses_within([SnapshotAnalysis, RoomQuality]))
     assert {"SnapshotAnalysis", "RoomMap", "Doorway", "Structure", "CellValues", "Walls", "FloorPlan"} < names
 
 

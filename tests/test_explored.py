@@ -12,7 +12,7 @@ from saved_maps import two_rooms
 from rose2_logs.config.parameters import OccupancyParameters, Parameters
 from rose2_logs.model.explored import ExploredPart, block_side
 from rose2_logs.model.occupancy import GridGeometry, OccupancySnapshot, is_same_to_analysis
-from rose2_logs.segmentation.pipeline import analyse
+from rose2_logs.segmentation.pipeline import analyze
 
 FREE, OCCUPIED, UNKNOWN = 0, 100, -1
 
@@ -82,7 +82,7 @@ def test_finer_cells_give_the_same_rooms(side: int):
     found = []
     for values, resolution_m in ((cells, 0.05), (finer, 0.05 / side)):
         geometry = GridGeometry(resolution_m, (-3.0, 1.0), math.radians(20), "map", values.shape)
-        found.append(analyse(OccupancySnapshot(0, 0, 0, "/map", values, geometry), Parameters()))
+        found.append(analyze(OccupancySnapshot(0, 0, 0, "/map", values, geometry), Parameters()))
     coarse, fine = found
     np.testing.assert_array_equal(coarse.rooms.labels.repeat(side, 0).repeat(side, 1), fine.rooms.labels)
     np.testing.assert_allclose(coarse.rooms.areas_m2, fine.rooms.areas_m2)
@@ -94,13 +94,13 @@ def test_finer_cells_give_the_same_rooms(side: int):
         assert one.symmetric_difference(other).area < 1e-6
 
 
-def test_a_large_map_is_analysed_coarser_and_labelled_at_its_own_resolution():
+def test_a_large_map_is_analyzed_coarser_and_labeled_at_its_own_resolution():
     image = np.flipud(two_rooms(240))
     cells = np.select([image == 254, image == 0], [FREE, OCCUPIED], UNKNOWN).astype(np.int8)
     geometry = GridGeometry(0.05, (0.0, 0.0), 0.0, "map", cells.shape)
     snapshot = OccupancySnapshot(0, 0, 0, "/map", cells, geometry)
-    whole = analyse(snapshot, Parameters())
-    blocks = analyse(snapshot, Parameters().replaced({"occupancy": {"analysed_max_cells": 20_000}}))
+    whole = analyze(snapshot, Parameters())
+    blocks = analyze(snapshot, Parameters().replaced({"occupancy": {"analyzed_max_cells": 20_000}}))
     assert (whole.resolution_m, blocks.resolution_m) == (0.05, 0.1)
     assert len(whole.rooms) == len(blocks.rooms) == 2
     assert blocks.rooms.labels.shape == cells.shape

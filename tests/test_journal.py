@@ -13,9 +13,9 @@ from drawn_maps import office, snapshot
 from rose2_logs.config.parameters import Parameters
 from rose2_logs.errors import InvalidMapError, OutputError
 from rose2_logs.model.occupancy import OccupancySnapshot
-from rose2_logs.model.room_quality import room_evidence
+from rose2_logs.model.room_quality import room_quality
 from rose2_logs.runs.journal import MAGIC, Found, Journal, JournaledWorkers, kept_maps
-from rose2_logs.segmentation.pipeline import analyse
+from rose2_logs.segmentation.pipeline import analyze
 from rose2_logs.system.workers import Workers
 
 FACTS = {"topic": "/map", "parameters": {"walls": {"a": 0.1}}}
@@ -31,8 +31,8 @@ def at(index: int) -> OccupancySnapshot:
 def work(taken: OccupancySnapshot) -> Found:
     if taken.index == 1:
         return InvalidMapError("map 1 is bad")
-    analysis = analyse(taken, Parameters())
-    return analysis, room_evidence(taken, analysis.rooms, Parameters().occupancy)
+    analysis = analyze(taken, Parameters())
+    return analysis, room_quality(taken, analysis.rooms, Parameters().occupancy)
 
 
 @pytest.fixture(scope="module")
@@ -123,8 +123,8 @@ def test_maps_of_another_log_are_refused(whole, tmp_path: Path):
 
 
 @pytest.mark.parametrize("workers", [1, 2])
-def test_only_maps_that_are_not_known_are_analysed(whole, tmp_path: Path, workers: int):
-    """Those that are like the one before are neither analysed nor kept."""
+def test_only_maps_that_are_not_known_are_analyzed(whole, tmp_path: Path, workers: int):
+    """Those that are like the one before are neither analyzed nor kept."""
     data, ends = whole
     path = tmp_path / "journal"
     path.write_bytes(data[: ends[2]])

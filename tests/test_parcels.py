@@ -1,4 +1,4 @@
-"""Values come out of their parcels as they went in, and nothing is left behind."""
+"""Values come out as they went in, and nothing is left behind."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from drawn_maps import office, snapshot
 
 from rose2_logs.config.parameters import Parameters
 from rose2_logs.model.analysis import SnapshotAnalysis
-from rose2_logs.segmentation.pipeline import analyse
+from rose2_logs.segmentation.pipeline import analyze
 from rose2_logs.system.shared_memory import (
     ALIGNMENT_BYTES,
     LARGE_BYTES,
-    ParcelError,
+    SharedMemoryError,
     pack,
-    parcel_folders,
+    shared_memory_folders,
     unpack,
 )
 
@@ -26,12 +26,12 @@ from rose2_logs.system.shared_memory import (
 def test_an_analysis_comes_out_as_it_went_in(tmp_path: Path):
     """Its large arrays through the file, which is gone once it is opened; all else in the pickle."""
     cells, _ = office(turn_rad=0.3, clutter=5, resolution_m=0.03)
-    made = analyse(snapshot(cells, 0.03), Parameters())
-    parcel = pack(made, [str(tmp_path)])
+    made = analyze(snapshot(cells, 0.03), Parameters())
+    packed = pack(made, [str(tmp_path)])
     assert made.structure is not None
-    assert len(parcel.pickled) < made.rooms.labels.nbytes / 4
-    assert len(parcel.spans) >= 2
-    found: SnapshotAnalysis = unpack(parcel)
+    assert len(packed.pickled) < made.rooms.labels.nbytes / 4
+    assert len(packed.spans) >= 2
+    found: SnapshotAnalysis = unpack(packed)
     assert not list(tmp_path.iterdir())
     assert found.structure is not None
     for one, other in (
@@ -68,17 +68,17 @@ def test_arrays_of_any_order_and_kind(tmp_path: Path, order):
 
 
 def test_without_large_arrays_there_is_no_file(tmp_path: Path):
-    parcel = pack([1, "two", np.arange(3)], [str(tmp_path / "nowhere")])
-    assert parcel.file is None
-    assert unpack(parcel)[1] == "two"
+    packed = pack([1, "two", np.arange(3)], [str(tmp_path / "nowhere")])
+    assert packed.file is None
+    assert unpack(packed)[1] == "two"
 
 
 def test_the_next_folder_is_taken_where_the_first_has_no_room(tmp_path: Path):
     value = np.zeros(LARGE_BYTES, np.int8)
-    parcel = pack(value, [str(tmp_path / "nowhere"), str(tmp_path)])
-    assert Path(str(parcel.file)).parent == tmp_path
-    np.testing.assert_array_equal(unpack(parcel), value)
-    with pytest.raises(ParcelError, match=r"no room for 0 MB in .*nowhere"):
+    packed = pack(value, [str(tmp_path / "nowhere"), str(tmp_path)])
+    assert Path(str(packed.file)).parent == tmp_path
+    np.testing.assert_array_equal(unpack(packed), value)
+    with pytest.raises(SharedMemoryError, match=r"no room for 0 MB in .*nowhere"):
         pack(value, [str(tmp_path / "nowhere")])
 
 
@@ -86,11 +86,11 @@ def test_where_no_folder_has_room_it_says_so_and_leaves_nothing(tmp_path: Path):
     """With the greatest size of a file set low, as on a full disk."""
     script = f"""
 import resource, numpy as np
-from rose2_logs.system.shared_memory import pack, ParcelError
+from rose2_logs.system.shared_memory import pack, SharedMemoryError
 resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
 try:
     pack(np.ones(1_000_000), [{str(tmp_path)!r}])
-except ParcelError as error:
+except SharedMemoryError as error:
     print(error)
 """
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
@@ -99,7 +99,7 @@ except ParcelError as error:
 
 
 def test_what_was_not_taken_out_goes_with_the_folders():
-    with parcel_folders() as folders:
+    with shared_memory_folders() as folders:
         pack(np.zeros(LARGE_BYTES, np.int8), folders)
         assert list(Path(folders[0]).iterdir())
     assert not any(Path(folder).exists() for folder in folders)

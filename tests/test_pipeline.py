@@ -7,13 +7,13 @@ from drawn_maps import agreement, office, snapshot
 
 from rose2_logs.config.parameters import Parameters
 from rose2_logs.errors import ParameterError
-from rose2_logs.segmentation.pipeline import analyse
+from rose2_logs.segmentation.pipeline import analyze
 
 PARAMETERS = Parameters()
 
 
 def labels_of(cells, resolution_m=0.05):
-    return analyse(snapshot(cells, resolution_m), PARAMETERS).rooms.labels
+    return analyze(snapshot(cells, resolution_m), PARAMETERS).rooms.labels
 
 
 @pytest.mark.parametrize("turn_deg", [0, 17, 45, 110])
@@ -25,7 +25,7 @@ def test_the_rooms_of_a_drawn_office_are_found_at_any_angle(turn_deg):
 
 
 def test_the_doors_of_the_office_are_found_with_their_width():
-    rooms = analyse(snapshot(office()[0]), PARAMETERS).rooms
+    rooms = analyze(snapshot(office()[0]), PARAMETERS).rooms
     assert len(rooms.doorways) == 2
     assert len(rooms.adjacency) == 2
     assert len({room for pair in rooms.adjacency for room in pair}) == 3
@@ -58,11 +58,11 @@ def test_a_map_of_twice_the_resolution_has_the_same_rooms():
 
 def test_shapes_lie_where_the_map_lies_in_the_world():
     cells, _ = office()
-    turned = analyse(snapshot(cells, origin_xy_m=(10.0, -5.0), yaw_rad=0.5), PARAMETERS)
+    turned = analyze(snapshot(cells, origin_xy_m=(10.0, -5.0), yaw_rad=0.5), PARAMETERS)
     rooms, geometry = turned.rooms, turned.geometry
     for number, shape in enumerate(rooms.polygons, start=1):
         rows, columns = np.nonzero(rooms.labels == number)
-        inside = shapely.contains_xy(shape, geometry.cell_centres(rows, columns))
+        inside = shapely.contains_xy(shape, geometry.cell_centers(rows, columns))
         assert shape.is_valid
         assert inside.mean() > 0.97
     directions = np.sort(turned.structure.directions_rad % (np.pi / 2))
@@ -71,27 +71,27 @@ def test_shapes_lie_where_the_map_lies_in_the_world():
 
 def test_the_unseen_part_of_a_room_is_predicted():
     cells, _ = office()
-    whole = analyse(snapshot(cells), PARAMETERS)
+    whole = analyze(snapshot(cells), PARAMETERS)
     seen = cells.copy()
     right = whole.rooms.labels == whole.rooms.labels[150, 190]
     columns = np.flatnonzero(right.any(0))
     # A quarter of the room that lies in the shadow of a cupboard.
     seen[170:200, columns[-40] : columns[-15]] = -1
-    partial = analyse(snapshot(seen), PARAMETERS)
+    partial = analyze(snapshot(seen), PARAMETERS)
     number = partial.rooms.labels[150, 190]
     assert partial.rooms.polygons[number - 1].area > partial.rooms.areas_m2[number - 1] + 1.0
 
 
 def test_the_same_map_gives_the_same_bytes():
     cells, _ = office(turn_rad=0.3, clutter=40)
-    one, two = (analyse(snapshot(cells), PARAMETERS) for _ in range(2))
+    one, two = (analyze(snapshot(cells), PARAMETERS) for _ in range(2))
     assert one.rooms.labels.tobytes() == two.rooms.labels.tobytes()
     assert [shape.wkb for shape in one.rooms.polygons] == [shape.wkb for shape in two.rooms.polygons]
 
 
 def test_rooms_are_numbered_free_and_measured():
     cells, _ = office(clutter=25)
-    rooms = analyse(snapshot(cells), PARAMETERS).rooms
+    rooms = analyze(snapshot(cells), PARAMETERS).rooms
     assert (cells[rooms.labels > 0] == 0).all()
     assert np.unique(rooms.labels).tolist() == list(range(len(rooms) + 1))
     sizes = np.bincount(rooms.labels.ravel())[1:] * 0.05**2
@@ -134,7 +134,7 @@ def three_cells():
     ids=["field", "unknown", "occupied", "one free", "one unknown", "hall", "wall", "three", "noise"],
 )
 def test_maps_without_structure_give_few_rooms_and_no_error(cells, most):
-    analysis = analyse(snapshot(cells), PARAMETERS)
+    analysis = analyze(snapshot(cells), PARAMETERS)
     assert len(analysis.rooms) <= most
     assert len(analysis.rooms) == analysis.rooms.labels.max(initial=0)
 
@@ -145,4 +145,4 @@ def test_a_field_without_walls_is_one_room():
 
 def test_a_method_that_does_not_exist_is_named():
     with pytest.raises(ParameterError, match="no method 'magic'"):
-        analyse(snapshot(three_cells()), PARAMETERS, "magic")
+        analyze(snapshot(three_cells()), PARAMETERS, "magic")

@@ -12,7 +12,7 @@ from drawn_rooms import rows
 
 from rose2_logs.config.parameters import OccupancyParameters
 from rose2_logs.model.occupancy import OccupancySnapshot
-from rose2_logs.model.room_quality import RoomEvidence, room_evidence
+from rose2_logs.model.room_quality import RoomQuality, room_quality
 from rose2_logs.model.rooms import RoomMap
 
 PARAMETERS = OccupancyParameters()
@@ -24,7 +24,7 @@ def rooms_with(map_: OccupancySnapshot, labels: np.ndarray, *polygons: shapely.P
 
 def frontiers(labels: np.ndarray, cells: np.ndarray, resolution_m: float = 1.0) -> list[float]:
     map_ = snapshot(cells, resolution_m)
-    return room_evidence(map_, RoomMap.from_labels(labels, map_.geometry), PARAMETERS).frontier_m.tolist()
+    return room_quality(map_, RoomMap.from_labels(labels, map_.geometry), PARAMETERS).frontier_m.tolist()
 
 
 def test_a_frontier_is_counted_in_cell_sides():
@@ -48,23 +48,23 @@ def test_an_unknown_hole_is_a_frontier_too():
 
 @pytest.mark.parametrize("turn_deg", [0, 33])
 def test_outlines_along_walls_are_backed_and_others_are_not(turn_deg: int):
-    """A room's outline is wall but for its door; the same room drawn two metres off has hardly any."""
+    """A room's outline is wall but for its door; the same room drawn two meters off has hardly any."""
     turn = float(np.deg2rad(turn_deg))
     cells, labels = office(turn_rad=turn)
     map_ = snapshot(cells, origin_xy_m=(3.0, -7.0))
-    centre = map_.geometry.corners_m().mean(axis=0)
+    center = map_.geometry.corners_m().mean(axis=0)
 
     def box(x0: float, y0: float, x1: float, y1: float) -> shapely.Polygon:
         plain = shapely.affinity.translate(shapely.box(x0, y0, x1, y1), -5.0, -3.0)
         turned = shapely.affinity.rotate(plain, turn, origin=(0, 0), use_radians=True)
-        return shapely.affinity.translate(turned, *centre)
+        return shapely.affinity.translate(turned, *center)
 
     right, off, nothing = box(0, 2, 5, 6), box(2, 3.5, 4.2, 5.2), shapely.Polygon()
-    found = room_evidence(map_, rooms_with(map_, labels, right, off, nothing), PARAMETERS)
+    found = room_quality(map_, rooms_with(map_, labels, right, off, nothing), PARAMETERS)
     outline = 2 * (5 + 4)
-    assert found.outline_wall_share[0] == pytest.approx((outline - 0.5) / outline, abs=0.03)
-    assert found.outline_wall_share[1] < 0.1
-    assert np.isnan(found.outline_wall_share[2])
+    assert found.wall_support[0] == pytest.approx((outline - 0.5) / outline, abs=0.03)
+    assert found.wall_support[1] < 0.1
+    assert np.isnan(found.wall_support[2])
 
 
 def test_an_outline_beyond_the_map_is_not_backed():
@@ -72,13 +72,13 @@ def test_an_outline_beyond_the_map_is_not_backed():
     cells = np.full((20, 20), 100)
     map_ = snapshot(cells)
     labels = np.ones((20, 20), np.int32)
-    found = room_evidence(map_, rooms_with(map_, labels, shapely.box(-0.5, 0.3, 0.5, 0.7)), PARAMETERS)
-    assert found.outline_wall_share[0] == pytest.approx(0.5, abs=0.05)
+    found = room_quality(map_, rooms_with(map_, labels, shapely.box(-0.5, 0.3, 0.5, 0.7)), PARAMETERS)
+    assert found.wall_support[0] == pytest.approx(0.5, abs=0.05)
 
 
 def test_a_map_without_rooms_has_no_evidence():
     """Empty arrays, no error."""
     map_ = snapshot(np.full((5, 5), -1))
-    found = room_evidence(map_, RoomMap.from_labels(np.zeros((5, 5), np.int32), map_.geometry), PARAMETERS)
-    assert isinstance(found, RoomEvidence)
-    assert len(found.outline_wall_share) == len(found.frontier_m) == 0
+    found = room_quality(map_, RoomMap.from_labels(np.zeros((5, 5), np.int32), map_.geometry), PARAMETERS)
+    assert isinstance(found, RoomQuality)
+    assert len(found.wall_support) == len(found.frontier_m) == 0

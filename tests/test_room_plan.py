@@ -51,7 +51,7 @@ def test_bounds_hold_shapes_and_known_cells():
 
 
 def test_bounds_leave_out_rays_and_keep_what_a_robot_fits_in():
-    """A strip of a few cells that leaves the rooms, against one of half a metre that belongs to no room."""
+    """A strip of a few cells that leaves the rooms, against one of half a meter that belongs to no room."""
     plan = two_rooms_plan()
     cells = plan.map.cells.copy()
     cells[20:22, 70:100] = 0

@@ -21,7 +21,7 @@ def point_of(labels, polygon=None) -> np.ndarray:
 def test_the_name_of_a_corridor_stands_in_its_middle():
     labels = np.zeros(GEOMETRY.shape, np.int32)
     labels[10:15, 4:94] = 1
-    np.testing.assert_allclose(point_of(labels), GEOMETRY.cell_centres(np.array(12), np.array(48)), atol=0.11)
+    np.testing.assert_allclose(point_of(labels), GEOMETRY.cell_centers(np.array(12), np.array(48)), atol=0.11)
 
 
 def test_the_name_stands_in_the_seen_part_however_large_the_prediction():

@@ -18,7 +18,7 @@ from rose2_logs.config.selection import Selection
 from rose2_logs.errors import LogError, OutputError, ParameterError
 from rose2_logs.runs.provenance import fingerprint, log_files
 from rose2_logs.runs.tables import TABLES
-from rose2_logs.workflows.analyze import RunOptions, analyse_log, log_stem, seconds_into_log
+from rose2_logs.workflows.analyze import RunOptions, analyze_log, log_stem, seconds_into_log
 
 SHARED_BAGS = Path(__file__).parents[2] / "shared" / "bags"
 TABLES_ONLY = RunOptions(recording=False, annotated_log=False)
@@ -33,7 +33,7 @@ def run(tmp_path_factory) -> Path:
     """Log in ``maps``, its results in ``out``."""
     folder = tmp_path_factory.mktemp("run")
     save_run(folder / "maps")
-    analyse_log(folder / "maps", folder / "out", TABLES_ONLY)
+    analyze_log(folder / "maps", folder / "out", TABLES_ONLY)
     return folder
 
 
@@ -52,7 +52,7 @@ def test_both_rooms_are_found_and_keep_their_numbers(run: Path):
     assert len(last) == 2
     assert all(row["area_m2"] == pytest.approx(26, rel=0.1) for row in last.values())
     assert last[1]["label_x_m"] < last[2]["label_x_m"]
-    assert last[1]["neighbours"] == [2]
+    assert last[1]["neighbors"] == [2]
     assert {row["snapshot"] for row in rooms if row["track"] == 1} == {0, 1, 2}
 
 
@@ -61,7 +61,7 @@ def test_rooms_have_evidence_and_a_past(run: Path):
     tracks = pq.read_table(run / "out" / "tracks.parquet").to_pylist()
     assert [row["in_last_map"] for row in tracks] == [True, True]
     assert tracks[0]["first_coverage"] < tracks[1]["first_coverage"]
-    assert all(row["outline_wall_share"] > 0.8 for row in tracks)
+    assert all(row["wall_support"] > 0.8 for row in tracks)
     snapshots = pq.read_table(run / "out" / "snapshots.parquet").to_pylist()
     assert snapshots[0]["frontier_m"] > 2 > snapshots[2]["frontier_m"]
     assert snapshots[0]["final_iou"] < 0.6 < snapshots[2]["final_iou"] == 1.0
@@ -86,14 +86,14 @@ def test_the_summary_tells_what_the_run_was_made_of(run: Path):
 def test_any_number_of_workers_gives_the_same_bytes(run: Path, tmp_path: Path):
     """Two worker processes write what one process wrote."""
     options = RunOptions(recording=False, annotated_log=False, workers=2)
-    result = analyse_log(run / "maps", tmp_path, options)
+    result = analyze_log(run / "maps", tmp_path, options)
     assert result.totals.snapshots == 3
     assert table_bytes(tmp_path) == table_bytes(run / "out")
 
 
 @pytest.mark.parametrize("workers", [1, 2])
-def test_a_map_that_did_not_change_is_not_analysed_again(tmp_path: Path, monkeypatch, workers: int):
-    """Probabilities that pass no threshold change nothing: the same bytes as if each map were analysed."""
+def test_a_map_that_did_not_change_is_not_analyzed_again(tmp_path: Path, monkeypatch, workers: int):
+    """Probabilities that pass no threshold change nothing: the same bytes as if each map were analyzed."""
     folder = tmp_path / "maps"
     for number, (columns, free) in enumerate([(180, 0), (180, 12), (180, 3), (240, 3), (240, 30)]):
         image = two_rooms(columns)
@@ -101,33 +101,33 @@ def test_a_map_that_did_not_change_is_not_analysed_again(tmp_path: Path, monkeyp
         path = save_map(folder, f"map{number}", percent)
         path.write_text(path.read_text() + "mode: raw\n")
     options = dataclasses.replace(TABLES_ONLY, workers=workers)
-    result = analyse_log(folder, tmp_path / "out", options)
+    result = analyze_log(folder, tmp_path / "out", options)
     assert (result.totals.snapshots, result.totals.unchanged) == (5, 2)
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert summary["results"]["unchanged_maps"] == 2
     monkeypatch.setattr("rose2_logs.runs.stream.is_same_to_analysis", lambda before, now, parameters: False)
-    each = analyse_log(folder, tmp_path / "each", options)
+    each = analyze_log(folder, tmp_path / "each", options)
     assert (each.totals.snapshots, each.totals.unchanged) == (5, 0)
     assert table_bytes(tmp_path / "out") == table_bytes(tmp_path / "each")
 
 
-def test_a_run_of_large_maps_says_once_that_they_are_analysed_coarser(run: Path, tmp_path: Path, caplog):
-    small = {"occupancy": {"analysed_max_cells": 20_000}}
+def test_a_run_of_large_maps_says_once_that_they_are_analyzed_coarser(run: Path, tmp_path: Path, caplog):
+    small = {"occupancy": {"analyzed_max_cells": 20_000}}
     options = dataclasses.replace(TABLES_ONLY, parameters=Parameters().replaced(small))
-    analyse_log(run / "maps", tmp_path, options)
+    analyze_log(run / "maps", tmp_path, options)
     said = [record.getMessage() for record in caplog.records if "20000 explored cells" in record.getMessage()]
     assert len(said) == 1
-    assert "analysed at 0.1 m instead of 0.05 m" in said[0]
+    assert "analyzed at 0.1 m instead of 0.05 m" in said[0]
     snapshots = pq.read_table(tmp_path / "snapshots.parquet").to_pandas()
-    assert snapshots["analysed_resolution_m"].iloc[-1] == 0.1
+    assert snapshots["analyzed_resolution_m"].iloc[-1] == 0.1
     assert (snapshots["resolution_m"] == 0.05).all()
 
 
 def test_progress_ends_at_one(run: Path, tmp_path: Path):
     """Each snapshot is told with the share of the log's time that is done."""
     told = []
-    analyse_log(
-        run / "maps", tmp_path, TABLES_ONLY, lambda frame, share: told.append((frame.snapshot.index, share))
+    analyze_log(
+        run / "maps", tmp_path, TABLES_ONLY, lambda step, share: told.append((step.snapshot.index, share))
     )
     assert told == [(0, 0.0), (1, 0.5), (2, 1.0)]
 
@@ -136,14 +136,14 @@ def test_earlier_results_are_not_replaced_unasked(run: Path):
     """The file that is in the way is named, and --overwrite."""
     before = table_bytes(run / "out")
     with pytest.raises(OutputError, match=r"snapshots\.parquet: exists already.*--overwrite"):
-        analyse_log(run / "maps", run / "out", TABLES_ONLY)
+        analyze_log(run / "maps", run / "out", TABLES_ONLY)
     assert table_bytes(run / "out") == before
 
 
 def test_a_selection_is_written_into_the_summary(run: Path, tmp_path: Path):
     """What was left out can be seen later."""
     options = RunOptions(recording=False, annotated_log=False, selection=Selection(max_snapshots=2))
-    analyse_log(run / "maps", tmp_path, options)
+    analyze_log(run / "maps", tmp_path, options)
     summary = json.loads((tmp_path / "summary.json").read_text())
     assert summary["selection"]["max_snapshots"] == 2
     assert summary["results"]["snapshots"] == 2
@@ -205,6 +205,6 @@ def test_one_run_in_three_formats_gives_the_same_tables(tmp_path: Path):
     options = RunOptions(recording=False, annotated_log=False, selection=Selection(max_snapshots=3))
     written = []
     for name in ("fr79.bag", "fr79.ros2_mcap", "fr79.ros2_sqlite3_zstd"):
-        analyse_log(SHARED_BAGS / name, tmp_path / name, options)
+        analyze_log(SHARED_BAGS / name, tmp_path / name, options)
         written.append(table_bytes(tmp_path / name))
     assert written[0] == written[1] == written[2]

@@ -29,7 +29,7 @@ MODULES = (
 """They make objects of bytes, serve, or read XML with all its entities."""
 ALLOWED = {
     # Between a run and its own workers, over pipes and files that only they can open: nobody else's bytes.
-    "parcels.py": ("imports pickle",),
+    "packed.py": ("imports pickle",),
     # Of pictures that were drawn here, see the next tests.
     "report/page.py": ("markupsafe.Markup",),
 }

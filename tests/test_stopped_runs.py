@@ -23,7 +23,7 @@ from rose2_logs.errors import AlreadyWholeError, InvalidMapError, OutputError
 from rose2_logs.runs.output_folder import OutputFolder, difference
 from rose2_logs.runs.tables import TABLES
 from rose2_logs.system.files import locked
-from rose2_logs.workflows.analyze import RunOptions, analyse_log
+from rose2_logs.workflows.analyze import RunOptions, analyze_log
 
 SEEN = (110, 130, 150, 170, 190, 210, 240)
 OPTIONS = {"recording": False, "annotated_log": True}
@@ -32,7 +32,7 @@ JOURNAL, PART, LOCK = ".out.journal", ".out.part", ".out.lock"
 KILLED = """
 import os, signal, sys
 from pathlib import Path
-from rose2_logs.workflows.analyze import RunOptions, analyse_log
+from rose2_logs.workflows.analyze import RunOptions, analyze_log
 
 log, folder, moment, overwrite, recording = sys.argv[1:]
 kill = lambda: os.kill(os.getpid(), signal.SIGKILL)
@@ -68,7 +68,7 @@ Path.unlink = remove
 options = RunOptions(
     recording=recording == "True", annotated_log=recording != "True", overwrite=overwrite == "True"
 )
-analyse_log(Path(log), Path(folder), options, count_frames)
+analyze_log(Path(log), Path(folder), options, count_frames)
 """
 
 
@@ -81,7 +81,7 @@ def log(tmp_path_factory) -> Path:
 def fresh(log: Path, tmp_path_factory) -> dict[str, bytes]:
     """What a run gives that nobody stops."""
     folder = tmp_path_factory.mktemp("fresh") / "out"
-    analyse_log(log, folder, RunOptions(**OPTIONS))
+    analyze_log(log, folder, RunOptions(**OPTIONS))
     return contents(folder)
 
 
@@ -90,7 +90,7 @@ def contents(folder: Path) -> dict[str, bytes]:
     found = {file.name: file.read_bytes() for file in folder.iterdir()}
     summary = json.loads(found["summary.json"])
     assert set(found) == {"summary.json", *summary["files"]}
-    del summary["seconds"], summary["log_place"]["from_results"]
+    del summary["seconds"], summary["log_location"]["from_results"]
     return found | {"summary.json": json.dumps(summary).encode()}
 
 
@@ -108,14 +108,14 @@ def names(folder: Path) -> list[str]:
 def test_a_killed_run_leaves_no_results_and_goes_on_to_the_same(
     log: Path, fresh, tmp_path: Path, caplog, monkeypatch, moment: str, kept: int
 ):
-    """In the first map, in the middle, with all written but nothing in place. Known maps are not analysed."""
+    """In the first map, in the middle, with all written but nothing in place. Known maps are not analyzed."""
     kill_at(moment, log, tmp_path / "out")
     assert names(tmp_path) == [JOURNAL, LOCK, PART]
-    analysed = []
-    count_calls(monkeypatch, analysed)
-    analyse_log(log, tmp_path / "out", RunOptions(**OPTIONS, resume=True))
+    analyzed = []
+    count_calls(monkeypatch, analyzed)
+    analyze_log(log, tmp_path / "out", RunOptions(**OPTIONS, resume=True))
     assert f"goes on after the {kept} maps" in caplog.text
-    assert analysed == list(range(kept, len(SEEN)))
+    assert analyzed == list(range(kept, len(SEEN)))
     assert contents(tmp_path / "out") == fresh
     assert names(tmp_path) == ["out"]
 
@@ -124,33 +124,33 @@ def test_a_killed_run_leaves_no_results_and_goes_on_to_the_same(
 def test_results_that_only_the_earlier_run_has_made_go_with_it(log: Path, tmp_path: Path, is_log: bool):
     """A table beside a recording of other parameters would be taken for its own; but no log is removed."""
     out = tmp_path / "out"
-    analyse_log(log, out, RunOptions(**OPTIONS))
+    analyze_log(log, out, RunOptions(**OPTIONS))
     before = set(names(out))
     (out / "notes.txt").write_text("mine")
     annotated = out / "maps.rose2.mcap"
     tables = RunOptions(recording=False, annotated_log=False, overwrite=True, topic="/map")
-    analyse_log(annotated if is_log else log, out, tables)
+    analyze_log(annotated if is_log else log, out, tables)
     kept = {"summary.json", "notes.txt", *(f"{table}.parquet" for table in TABLES)}
     assert set(names(out)) == kept | ({annotated.name} if is_log else set())
     assert annotated.name in before - kept
 
 
-def count_calls(monkeypatch, analysed: list[int]) -> None:
+def count_calls(monkeypatch, analyzed: list[int]) -> None:
     from rose2_logs.runs import stream as tracked_stream
 
-    real = tracked_stream.analyse
+    real = tracked_stream.analyze
 
-    def analyse(snapshot, *arguments, **options):
-        analysed.append(snapshot.index)
+    def analyze(snapshot, *arguments, **options):
+        analyzed.append(snapshot.index)
         return real(snapshot, *arguments, **options)
 
-    monkeypatch.setattr(tracked_stream, "analyse", analyse)
+    monkeypatch.setattr(tracked_stream, "analyze", analyze)
 
 
 @pytest.fixture(scope="module")
 def fresh_recording(log: Path, tmp_path_factory) -> dict[str, list[Row]]:
     folder = tmp_path_factory.mktemp("fresh") / "out"
-    analyse_log(log, folder, RunOptions(annotated_log=False))
+    analyze_log(log, folder, RunOptions(annotated_log=False))
     return recorded(folder / "maps.rrd")
 
 
@@ -184,7 +184,7 @@ def test_the_recording_of_a_run_that_went_on_holds_what_that_of_a_fresh_one_does
     """Every row of every entity, by Rerun's own reader; the killed run's file does not appear."""
     kill_at(moment, log, tmp_path / "out", recording=True)
     assert names(tmp_path) == [JOURNAL, LOCK, PART]
-    analyse_log(log, tmp_path / "out", RunOptions(annotated_log=False, resume=True))
+    analyze_log(log, tmp_path / "out", RunOptions(annotated_log=False, resume=True))
     found = recorded(tmp_path / "out" / "maps.rrd")
     assert set(found) == set(fresh_recording) >= {"/world/map", "/run/coverage", "/summary", "/room/001"}
     for entity, rows in found.items():
@@ -197,7 +197,7 @@ def test_a_run_killed_after_all_is_in_place_is_whole(log: Path, fresh, tmp_path:
     kill_at("journal", log, tmp_path / "out")
     assert contents(tmp_path / "out") == fresh
     with pytest.raises(AlreadyWholeError, match="whole already"):
-        analyse_log(log, tmp_path / "out", RunOptions(**OPTIONS, resume=True))
+        analyze_log(log, tmp_path / "out", RunOptions(**OPTIONS, resume=True))
     assert names(tmp_path) == ["out"]
     assert contents(tmp_path / "out") == fresh
 
@@ -207,12 +207,12 @@ def test_results_that_are_being_replaced_have_no_summary_until_they_are_whole(
 ):
     """Killed between two files: told apart from whole results, and completed."""
     out = tmp_path / "out"
-    analyse_log(log, out, RunOptions(**OPTIONS, parameters=Parameters().replaced(SMALL_ROOMS)))
+    analyze_log(log, out, RunOptions(**OPTIONS, parameters=Parameters().replaced(SMALL_ROOMS)))
     kill_at("file 3", log, out, overwrite=True)
     assert not (out / "summary.json").exists()
     with pytest.raises(OutputError, match="exists already"):
-        analyse_log(log, out, RunOptions(**OPTIONS))
-    analyse_log(log, out, RunOptions(**OPTIONS, resume=True))
+        analyze_log(log, out, RunOptions(**OPTIONS))
+    analyze_log(log, out, RunOptions(**OPTIONS, resume=True))
     assert contents(out) == fresh
     assert names(tmp_path) == ["out"]
 
@@ -237,24 +237,24 @@ def test_a_run_that_was_interrupted_keeps_its_maps_and_says_so(log: Path, fresh,
     out = tmp_path / "out"
     for resume, number in ((False, 2), (True, 4)):
         with pytest.raises(KeyboardInterrupt):
-            analyse_log(log, out, RunOptions(**OPTIONS, resume=resume), stop(number, KeyboardInterrupt))
+            analyze_log(log, out, RunOptions(**OPTIONS, resume=resume), stop(number, KeyboardInterrupt))
         assert f"{number} maps are done; --resume goes on after them" in caplog.text
         assert names(tmp_path) == [JOURNAL]
-    analyse_log(log, out, RunOptions(**OPTIONS, resume=True, workers=2))
+    analyze_log(log, out, RunOptions(**OPTIONS, resume=True, workers=2))
     assert contents(out) == fresh
 
 
 @pytest.mark.parametrize("kind", [InvalidMapError, ZeroDivisionError])
 def test_what_would_come_again_leaves_nothing(log: Path, tmp_path: Path, kind: type[Exception]):
     with pytest.raises(kind):
-        analyse_log(log, tmp_path / "out", RunOptions(**OPTIONS), stop(2, kind))
+        analyze_log(log, tmp_path / "out", RunOptions(**OPTIONS), stop(2, kind))
     assert names(tmp_path) == []
 
 
 def test_a_fresh_start_says_that_the_stopped_run_could_have_gone_on(log: Path, fresh, tmp_path: Path, caplog):
     with pytest.raises(KeyboardInterrupt):
-        analyse_log(log, tmp_path / "out", RunOptions(**OPTIONS), stop(2, KeyboardInterrupt))
-    analyse_log(log, tmp_path / "out", RunOptions(**OPTIONS))
+        analyze_log(log, tmp_path / "out", RunOptions(**OPTIONS), stop(2, KeyboardInterrupt))
+    analyze_log(log, tmp_path / "out", RunOptions(**OPTIONS))
     assert "stopped here after 2 maps; --resume would have gone on" in caplog.text
     assert contents(tmp_path / "out") == fresh
 
@@ -262,17 +262,17 @@ def test_a_fresh_start_says_that_the_stopped_run_could_have_gone_on(log: Path, f
 def test_another_run_is_not_gone_on_with(log: Path, tmp_path: Path):
     """The first difference is named; without --resume the run begins anew."""
     with pytest.raises(KeyboardInterrupt):
-        analyse_log(log, tmp_path / "out", RunOptions(**OPTIONS), stop(2, KeyboardInterrupt))
+        analyze_log(log, tmp_path / "out", RunOptions(**OPTIONS), stop(2, KeyboardInterrupt))
     other = Parameters().replaced(SMALL_ROOMS)
     options = {**OPTIONS, "parameters": other}
     with pytest.raises(
         OutputError, match=r"another one \(parameters\.floor_plan\.room_min_area_m2 was .*0\.5"
     ):
-        analyse_log(log, tmp_path / "out", RunOptions(**options, resume=True))
+        analyze_log(log, tmp_path / "out", RunOptions(**options, resume=True))
     assert JOURNAL in names(tmp_path)
     with pytest.raises(OutputError, match="method was rose2, is voronoi"):
-        analyse_log(log, tmp_path / "out", RunOptions(**OPTIONS, method="voronoi", resume=True))
-    analyse_log(log, tmp_path / "out", RunOptions(**options))
+        analyze_log(log, tmp_path / "out", RunOptions(**OPTIONS, method="voronoi", resume=True))
+    analyze_log(log, tmp_path / "out", RunOptions(**options))
     assert names(tmp_path) == ["out"]
 
 
@@ -281,7 +281,7 @@ def test_two_runs_do_not_write_to_one_folder(log: Path, tmp_path: Path):
         locked(tmp_path / LOCK, "first"),
         pytest.raises(OutputError, match="another run is writing"),
     ):
-        analyse_log(log, tmp_path / "out", RunOptions(**OPTIONS))
+        analyze_log(log, tmp_path / "out", RunOptions(**OPTIONS))
     assert names(tmp_path) == []
 
 
@@ -293,14 +293,14 @@ def test_a_log_is_never_written_over(log: Path, tmp_path: Path):
     for folder in (maps, maps / "inside", tmp_path / "other" / ".." / "maps"):
         (tmp_path / "other").mkdir(exist_ok=True)
         with pytest.raises(OutputError, match="lies in the log"):
-            analyse_log(maps, folder, replace_all)
+            analyze_log(maps, folder, replace_all)
     single = save_map(tmp_path / "single", "flat", two_rooms())
     for make in (Path.symlink_to, Path.hardlink_to):
         out = tmp_path / make.__name__
         out.mkdir()
         make(out / "summary.json", single)
         with pytest.raises(OutputError, match="is a file of the log itself"):
-            analyse_log(single, out, replace_all)
+            analyze_log(single, out, replace_all)
         assert single.read_text().startswith("image:")
     assert hash_of(maps) == before
 
@@ -321,7 +321,7 @@ def test_differences_are_told_by_name():
 def test_a_folder_that_is_a_file_is_told(log: Path, tmp_path: Path):
     (tmp_path / "file").write_text("")
     with pytest.raises(OutputError, match="file"):
-        analyse_log(log, tmp_path / "file" / "out", RunOptions(**OPTIONS))
+        analyze_log(log, tmp_path / "file" / "out", RunOptions(**OPTIONS))
     assert OutputFolder(tmp_path / "x", ["a"]).files == (tmp_path / "x" / "a",)
 
 
@@ -372,7 +372,7 @@ def test_killed_and_interrupted_commands_end_with_their_workers(tmp_path: Path, 
             main()
         assert not ended.value.code
         assert said in capsys.readouterr().out
-    analyse_log(many, tmp_path / "fresh", RunOptions(**OPTIONS))
+    analyze_log(many, tmp_path / "fresh", RunOptions(**OPTIONS))
     assert contents(tmp_path / "o" / "maps") == contents(tmp_path / "fresh")
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from rose2_logs.errors import InvalidMapError
-from rose2_logs.system import shared_memory as parcels
+from rose2_logs.system import shared_memory as packed
 from rose2_logs.system.workers import (
     LOOK_AHEAD_PER_WORKER,
     WorkerError,
@@ -67,7 +67,7 @@ def test_an_item_like_the_one_before_gets_its_result(workers: int):
 
 def test_large_results_come_through_shared_memory_and_leave_nothing(tmp_path, monkeypatch):
     """Also where the stream is left before its end."""
-    monkeypatch.setattr(parcels, "SHARED_MEMORY", tmp_path)
+    monkeypatch.setattr(packed, "SHARED_MEMORY", tmp_path)
     with Workers(layers, 2) as processes:
         for number, (item, result) in enumerate(processes.map(range(9))):
             assert (result == item).all()

@@ -27,7 +27,7 @@ class CarmenScan:
     time_s : float
         The log's stamp, seconds; since the epoch or since a robot's start, as the log has it.
     laser_pose, robot_pose, odometry : (3,) float
-        x, y in metres and heading in radians: corrected pose of the laser and of the robot, and the raw pose
+        x, y in meters and heading in radians: corrected pose of the laser and of the robot, and the raw pose
         of the wheels. Where the log has no raw pose, `odometry` repeats the corrected one.
     bearings_rad : (B,) float
         Angle of each ray to the laser's heading.

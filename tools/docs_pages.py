@@ -27,8 +27,8 @@ TABLES = {
     "tracks.parquet": (table_schemas.TRACKS, "One row a room over the run."),
     "events.parquet": (table_schemas.EVENTS, "One row an event."),
     "doorways.parquet": (table_schemas.DOORWAYS, "One row a doorway and map."),
-    "smoothed.parquet (analyze --smooth)": (
-        table_schemas.SMOOTHED,
+    "back_projected.parquet (analyze --back-project)": (
+        table_schemas.BACK_PROJECTED,
         "One row a room of the last map and map that shows some of it.",
     ),
     "room_changes.parquet": (
@@ -120,7 +120,7 @@ def tables_page() -> str:
     lines = [
         "# Tables",
         "",
-        "All tables are Parquet. Lengths are metres in the frame of the map, or as the column says. The "
+        "All tables are Parquet. Lengths are meters in the frame of the map, or as the column says. The "
         "files hold these descriptions as well: `pyarrow.parquet.read_schema(path).field(name).metadata`.",
     ]
     for name, (schema, about) in TABLES.items():

@@ -46,7 +46,7 @@ def quality_of_service(topic: str) -> Qos:
 
 
 class _Storage(Protocol):
-    """A log file that takes serialised messages."""
+    """A log file that takes serialized messages."""
 
     typestore: Typestore
 
@@ -179,7 +179,7 @@ class RobotLog:
         time_s : float
             Seconds since the log's start.
         pose_in_map, odometry : (3,) float
-            x, y in metres and heading in radians, in the frames ``map`` and ``odom``.
+            x, y in meters and heading in radians, in the frames ``map`` and ``odom``.
         """
         t, time_ns = self._types, self._time_ns(time_s)
         turn = pose_in_map[2] - odometry[2]

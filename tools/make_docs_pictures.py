@@ -24,7 +24,7 @@ from PIL import Image as PillowImage
 
 from rose2_logs.config.parameters import Parameters, ReadingParameters
 from rose2_logs.config.selection import Selection
-from rose2_logs.drawing.case_picture import room_colours
+from rose2_logs.drawing.case_picture import room_colors
 from rose2_logs.drawing.pixels import as_pixels
 from rose2_logs.drawing.plan import PANEL, draw_plan
 from rose2_logs.io import open_log
@@ -34,17 +34,17 @@ from rose2_logs.model.labels import known_window
 from rose2_logs.model.occupancy import UNKNOWN, BoolArray, FloatArray, OccupancySnapshot
 from rose2_logs.runs.folder import RunResults
 from rose2_logs.segmentation.floor_plan.stage import make_floor_plan
-from rose2_logs.segmentation.pipeline import analyse
+from rose2_logs.segmentation.pipeline import analyze
 from rose2_logs.segmentation.rose.spectrum import Spectrum, compute_spectrum
 from rose2_logs.segmentation.rose.stage import find_structure
 from rose2_logs.segmentation.topology.splitting import split_rooms
 from rose2_logs.segmentation.topology.voronoi import voronoi_graph
 from rose2_logs.segmentation.walls.stage import count_walls, find_walls
-from rose2_logs.workflows.analyze import RunOptions, analyse_log, seconds_into_log
+from rose2_logs.workflows.analyze import RunOptions, analyze_log, seconds_into_log
 from rose2_logs.workflows.compare import compare_runs
 
 Image = NDArray[np.uint8]
-Colour = tuple[int, int, int]
+Color = tuple[int, int, int]
 Scalar = TypeVar("Scalar", bound=np.generic)
 
 SAMPLES = Path(__file__).resolve().parents[1] / "sample_logs"
@@ -58,11 +58,11 @@ GROWTH_PANEL_PX = 700
 SCALE = 2
 """Pixels along a cell."""
 MARGIN_CELLS = 24
-PALETTE_COLOURS = 256
-"""Colours of a stored picture: flat drawings lose nothing, and take a third of the bytes."""
+PALETTE_COLORS = 256
+"""Colors of a stored picture: flat drawings lose nothing, and take a third of the bytes."""
 SPECTRUM_SIDE_PX, SPECTRUM_REACH_PER_M = 700, 4.0
-"""The spectrum is drawn up to this frequency, cycles per metre: waves of 25 cm."""
-WALL, PAPER, GREY, REMOVED, MARK = (
+"""The spectrum is drawn up to this frequency, cycles per meter: waves of 25 cm."""
+WALL, PAPER, GRAY, REMOVED, MARK = (
     (20, 20, 20),
     (255, 255, 255),
     (170, 170, 170),
@@ -89,40 +89,40 @@ class Painter:
         cells = self._snapshot.cells[self._window]
         if faint:
             return self.cells(self._snapshot.cells > 50, (205, 205, 205), np.full((1, 1, 3), 255, np.uint8))
-        grey = np.where(cells < 0, 205, 254 - cells * 2.54).astype(np.uint8)
-        return self._scaled(np.repeat(grey[..., None], 3, axis=2))
+        gray = np.where(cells < 0, 205, 254 - cells * 2.54).astype(np.uint8)
+        return self._scaled(np.repeat(gray[..., None], 3, axis=2))
 
-    def cells(self, mask: BoolArray, colour: Colour, image: Image) -> Image:
+    def cells(self, mask: BoolArray, color: Color, image: Image) -> Image:
         """Paint cells (H, W) of the canvas over a picture."""
         inside = self._scaled(mask[self._window])
         painted = np.broadcast_to(image, (*inside.shape, 3)).copy()
-        painted[inside] = colour
+        painted[inside] = color
         return painted
 
     def values(self, values: NDArray[np.float32], colormap: int) -> Image:
-        """Draw values in [0, 1] of the cells above 0 in a colour map on white."""
+        """Draw values in [0, 1] of the cells above 0 in a color map on white."""
         part = self._scaled(values[self._window])
-        coloured = cv2.applyColorMap((255 * part.clip(0, 1)).astype(np.uint8), colormap)[..., ::-1]
-        return np.where((part > 0)[..., None], coloured, np.uint8(255))
+        colored = cv2.applyColorMap((255 * part.clip(0, 1)).astype(np.uint8), colormap)[..., ::-1]
+        return np.where((part > 0)[..., None], colored, np.uint8(255))
 
     def rooms(self, labels: NDArray[np.int32], image: Image) -> Image:
-        """Fill the rooms of a label image (H, W) of the canvas with colours of their own."""
+        """Fill the rooms of a label image (H, W) of the canvas with colors of their own."""
         part = self._scaled(labels[self._window])
-        colours = room_colours(int(labels.max(initial=0))).astype(float)
-        blended = ROOM_OPACITY * colours[part] + (1 - ROOM_OPACITY) * image
+        colors = room_colors(int(labels.max(initial=0))).astype(float)
+        blended = ROOM_OPACITY * colors[part] + (1 - ROOM_OPACITY) * image
         return np.where((part > 0)[..., None], blended, image).astype(np.uint8)
 
     def lines(
-        self, image: Image, ends_m: FloatArray, colours: Sequence[Colour], widths: Sequence[int]
+        self, image: Image, ends_m: FloatArray, colors: Sequence[Color], widths: Sequence[int]
     ) -> Image:
-        """Draw segments (N, 4), each with a colour and a width in pixels."""
+        """Draw segments (N, 4), each with a color and a width in pixels."""
         painted = image.copy()
         points = self._pixels(ends_m.reshape(-1, 2)).reshape(-1, 2, 2)
-        for (start, end), colour, width in zip(points.tolist(), colours, widths, strict=True):
-            cv2.line(painted, start, end, colour, width, cv2.LINE_AA)
+        for (start, end), color, width in zip(points.tolist(), colors, widths, strict=True):
+            cv2.line(painted, start, end, color, width, cv2.LINE_AA)
         return painted
 
-    def outlines(self, image: Image, shapes: Sequence[shapely.Geometry], colour: Colour) -> Image:
+    def outlines(self, image: Image, shapes: Sequence[shapely.Geometry], color: Color) -> Image:
         """Draw the rings of shapes in the world."""
         painted = image.copy()
         rings = [
@@ -130,7 +130,7 @@ class Painter:
             for shape in shapes
             for ring in shapely.get_rings(shape)
         ]
-        cv2.polylines(painted, rings, True, colour, SCALE, cv2.LINE_AA)
+        cv2.polylines(painted, rings, True, color, SCALE, cv2.LINE_AA)
         return painted
 
     def _pixels(self, points_m: FloatArray) -> NDArray[np.int32]:
@@ -143,7 +143,7 @@ class Painter:
 
 def method_pictures(snapshot: OccupancySnapshot, parameters: Parameters) -> Iterator[tuple[str, Image]]:
     """Yield name and picture of each stage of the method on one map."""
-    painter, analysis = Painter(snapshot), analyse(snapshot, parameters)
+    painter, analysis = Painter(snapshot), analyze(snapshot, parameters)
     structure, walls, plan = analysis.structure, analysis.walls, analysis.floor_plan
     if structure is None or walls is None or plan is None:
         raise RuntimeError("the method pictures show the stages of rose2")
@@ -155,7 +155,7 @@ def method_pictures(snapshot: OccupancySnapshot, parameters: Parameters) -> Iter
     yield "method_3_score", painter.values(structure.score, cv2.COLORMAP_VIRIDIS)
     removed = painter.cells(occupied, REMOVED, np.full((1, 1, 3), 255, np.uint8))
     yield "method_4_clean_map", painter.cells(structure.clean, WALL, removed)
-    of_cluster = _spread_colours(int(walls.segment_cluster.max(initial=-1)) + 2)
+    of_cluster = _spread_colors(int(walls.segment_cluster.max(initial=-1)) + 2)
     segments = [of_cluster[cluster + 1] for cluster in walls.segment_cluster.tolist()]
     yield "method_5_segments", painter.lines(faint, walls.segments_m, segments, [SCALE] * len(segments))
     by_weight = [_mixed((205, 215, 240), (20, 60, 180), weight) for weight in walls.line_weight.tolist()]
@@ -228,8 +228,8 @@ def _spectrum_picture(spectrum: Spectrum, directions_rad: FloatArray) -> Image:
     )
     shown = np.log1p(values)
     low, high = np.quantile(shown, [0.05, 0.998])
-    grey = (255 * ((shown - low) / (high - low)).clip(0, 1)).astype(np.uint8)
-    image = np.ascontiguousarray(cv2.applyColorMap(grey, cv2.COLORMAP_MAGMA)[..., ::-1])
+    gray = (255 * ((shown - low) / (high - low)).clip(0, 1)).astype(np.uint8)
+    image = np.ascontiguousarray(cv2.applyColorMap(gray, cv2.COLORMAP_MAGMA)[..., ::-1])
     for direction in directions_rad.tolist():
         # A wall's waves run across it.
         across = np.array([np.cos(direction + np.pi / 2), -np.sin(direction + np.pi / 2)])
@@ -243,7 +243,7 @@ def _spectrum_picture(spectrum: Spectrum, directions_rad: FloatArray) -> Image:
 def growth_picture(log: Path) -> tuple[str, Image]:
     """Draw the rooms at some coverages of a run, side by side, as `figure` and the report do."""
     with tempfile.TemporaryDirectory() as name:
-        folder = analyse_log(log, Path(name) / "run", RunOptions(recording=False)).folder
+        folder = analyze_log(log, Path(name) / "run", RunOptions(recording=False)).folder
         results = RunResults(folder)
         with results.open_maps() as maps:
             plans = [results.plan(results.choose(coverage=each), maps) for each in TUTORIAL_COVERAGES]
@@ -260,19 +260,19 @@ def comparison_picture(log: Path) -> tuple[str, Image]:
         _, end_ns = seconds_into_log(log, None, HALF_WAY_S, ReadingParameters())
         for run, selection in (("half", Selection(end_ns=end_ns)), ("whole", Selection())):
             options = RunOptions(selection=selection, recording=False)
-            analyse_log(log, folder / run, options)
+            analyze_log(log, folder / run, options)
         compare_runs(folder / "half", folder / "whole", folder / "changes", recording=False)
         with PillowImage.open(folder / "changes" / "comparison.png") as picture:
             return "compare", np.asarray(picture)
 
 
-def _spread_colours(count: int) -> list[Colour]:
-    colours: list[Colour] = [GREY]
-    colours += [(int(r), int(g), int(b)) for r, g, b in room_colours(count)[1:]]
-    return colours
+def _spread_colors(count: int) -> list[Color]:
+    colors: list[Color] = [GRAY]
+    colors += [(int(r), int(g), int(b)) for r, g, b in room_colors(count)[1:]]
+    return colors
 
 
-def _mixed(low: Colour, high: Colour, share: float) -> Colour:
+def _mixed(low: Color, high: Color, share: float) -> Color:
     red, green, blue = (
         round(low_value + (high_value - low_value) * share)
         for low_value, high_value in zip(low, high, strict=True)
@@ -282,7 +282,7 @@ def _mixed(low: Colour, high: Colour, share: float) -> Colour:
 
 def save(path: Path, image: Image) -> None:
     """Store a drawing as a PNG with a palette."""
-    picture = PillowImage.fromarray(image).quantize(PALETTE_COLOURS, dither=PillowImage.Dither.NONE)
+    picture = PillowImage.fromarray(image).quantize(PALETTE_COLORS, dither=PillowImage.Dither.NONE)
     picture.save(path, optimize=True)
 
 

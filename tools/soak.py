@@ -1,4 +1,4 @@
-"""A long run: many maps of a small building, analysed while memory and open files are watched.
+"""A long run: many maps of a small building, analyzed while memory and open files are watched.
 
 ``python tools/soak.py --snapshots 20000 -o DIR`` prints a table; the log and the results stay in the folder.
 """
@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from rose2_logs.model.occupancy import GridGeometry
 from rose2_logs.system.workers import keep_freed_memory
 from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot
-from rose2_logs.workflows.analyze import RunOptions, RunResult, analyse_log
+from rose2_logs.workflows.analyze import RunOptions, RunResult, analyze_log
 
 RESOLUTION_M = 0.1
 ROOMS = (2, 2)
@@ -53,7 +53,7 @@ class Sample:
 
 
 def building() -> NDArray[np.int8]:
-    """Cells (H, W) of a few rooms with a door to each neighbour: 0 free, 100 occupied."""
+    """Cells (H, W) of a few rooms with a door to each neighbor: 0 free, 100 occupied."""
     rows, columns = (rooms * cells + 1 for rooms, cells in zip(ROOMS, ROOM_CELLS, strict=True))
     cells = np.zeros((rows, columns), np.int8)
     cells[:: ROOM_CELLS[0]] = 100
@@ -99,19 +99,19 @@ def write_long_log(path: Path, snapshots: int) -> None:
 
 
 def watch(log: Path, folder: Path, snapshots: int, options: RunOptions) -> tuple[RunResult, list[Sample]]:
-    """Analyse a log and look at this process at each percent of its maps."""
+    """Analyze a log and look at this process at each percent of its maps."""
     samples: list[Sample] = []
     start = time.perf_counter()
     seen = 0
 
-    def look(frame: TrackedSnapshot, share: float) -> None:
+    def look(step: TrackedSnapshot, share: float) -> None:
         nonlocal seen
         seen += 1
         if seen % max(1, snapshots // 100) == 0:
             files = len(os.listdir("/proc/self/fd"))  # noqa: PTH208
             samples.append(Sample(seen, memory_now(), files, time.perf_counter() - start))
 
-    return analyse_log(log, folder, options, look), samples
+    return analyze_log(log, folder, options, look), samples
 
 
 def table(samples: Sequence[Sample]) -> str:
@@ -124,7 +124,7 @@ def table(samples: Sequence[Sample]) -> str:
 
 
 def main() -> None:
-    """Make the log if it is not there, analyse it, print the figures."""
+    """Make the log if it is not there, analyze it, print the figures."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("-o", "--out", type=Path, required=True, help="folder of the log and the results")
     parser.add_argument("--snapshots", type=int, default=20_000)

@@ -12,7 +12,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from rose2_logs.batch.remote import EXTRA
-from rose2_logs.batch.task import LogOutcome, LogTask, Progress, analyse_task
+from rose2_logs.batch.task import LogOutcome, LogTask, Progress, analyze_task
 from rose2_logs.errors import ParameterError
 from rose2_logs.system.workers import WorkerError
 
@@ -79,7 +79,7 @@ class DaskWorkers:
     def submit(self, task: LogTask) -> None:
         """Take a task."""
         key = f"rose2-logs-{task.name}-{uuid.uuid4().hex}"
-        future = self._client.submit(analyse_on_worker, task, self._topic, key=key, pure=False)
+        future = self._client.submit(analyze_on_worker, task, self._topic, key=key, pure=False)
         self._tasks[future] = task
         future.add_done_callback(self._told.put)
 
@@ -150,9 +150,9 @@ class DaskWorkers:
         return LogOutcome(task.name, "failed", reason=reason, details=str(error))
 
 
-def analyse_on_worker(task: LogTask, topic: str) -> LogOutcome:
+def analyze_on_worker(task: LogTask, topic: str) -> LogOutcome:
     """Do a task in a Dask worker, with its progress told through the scheduler."""
     from distributed import get_worker
 
     worker = get_worker()
-    return analyse_task(task, lambda told: worker.log_event(topic, [told.name, told.share]))
+    return analyze_task(task, lambda told: worker.log_event(topic, [told.name, told.share]))

@@ -14,7 +14,7 @@ from typing import Any
 import pyarrow as pa
 
 from rose2_logs.batch.folders import LOGS_FOLDER
-from rose2_logs.runs.tables import SMOOTHED, SUMMARY, TABLES
+from rose2_logs.runs.tables import BACK_PROJECTED, SUMMARY, TABLES
 from rose2_logs.system.files import part_of, replacing, writing
 
 TABLES_FOLDER = "tables"
@@ -30,8 +30,8 @@ SUMMARY_COLUMNS: dict[str, tuple[pa.DataType, str]] = {
     "sha256": (pa.string(), "fingerprint of the log"),
     "method": (pa.string(), "segmentation method"),
     "version": (pa.string(), "version of rose2-logs"),
-    "snapshots": (pa.int32(), "maps that were analysed"),
-    "invalid_maps": (pa.int32(), "maps that could not be analysed"),
+    "snapshots": (pa.int32(), "maps that were analyzed"),
+    "invalid_maps": (pa.int32(), "maps that could not be analyzed"),
     "first_log_time_ns": (pa.int64(), "of the first map, nanoseconds since the epoch"),
     "last_log_time_ns": (pa.int64(), "of the last map, nanoseconds since the epoch"),
     "coverage_first": (
@@ -53,18 +53,18 @@ def publish_tables(out: Path, name: str) -> None:
     """Make the tables of a finished log part of the data set: ``tables/TABLE/log=NAME/TABLE.parquet``.
 
     They share the bytes on the disk with those in the log's folder where the file system can. Of a log that
-    was not smoothed there is no such table.
+    was not projected back there is no such table.
 
     Raises
     ------
     OutputError
         If they cannot be written.
     """
-    for table in (*TABLES, SMOOTHED):
+    for table in (*TABLES, BACK_PROJECTED):
         source = out / LOGS_FOLDER / name / f"{table}.parquet"
         target = out / TABLES_FOLDER / table / f"{PARTITION}={name}" / f"{table}.parquet"
         with writing(target):
-            if table == SMOOTHED and not source.exists():
+            if table == BACK_PROJECTED and not source.exists():
                 shutil.rmtree(target.parent, ignore_errors=True)
                 continue
             if _is_same(source, target):

@@ -23,7 +23,7 @@ from rose2_logs.batch.record import BatchSettings, Record, Signature, local_sign
 from rose2_logs.batch.task import LogOutcome, LogTask, Progress
 from rose2_logs.errors import LogError, OutputError, ParameterError
 from rose2_logs.io.discovery import BAG_DESCRIPTION
-from rose2_logs.runs.tables import SMOOTHED, SUMMARY, TABLES
+from rose2_logs.runs.tables import BACK_PROJECTED, SUMMARY, TABLES
 from rose2_logs.system.files import require_utf8
 
 logger = logging.getLogger(__name__)
@@ -46,7 +46,7 @@ class BatchOptions:
     overwrite : bool
         Whether results of other settings, or of a log that has changed, may be replaced.
     rerun : bool
-        Whether to analyse also what is up to date; implies `overwrite`.
+        Whether to analyze also what is up to date; implies `overwrite`.
     """
 
     settings: BatchSettings = dataclasses.field(default_factory=BatchSettings)
@@ -126,9 +126,9 @@ class Workers(AbstractContextManager["Workers"], Protocol):
 
 
 def run_batch(arguments: Sequence[str], out: Path, options: BatchOptions, listener: Listener) -> BatchResult:
-    """Analyse many logs into one folder.
+    """Analyze many logs into one folder.
 
-    Each log's results go to ``out/logs/NAME``, as `analyse_log` writes them; the tables of all logs to
+    Each log's results go to ``out/logs/NAME``, as `analyze_log` writes them; the tables of all logs to
     ``out/tables``, partitioned by log; one line a log to ``out/summary.parquet`` and ``out/summary.csv``.
     Logs whose results are there already, of the same content and settings, are left as they are. A log that
     fails does not stop the others, and leaves what was there before.
@@ -278,7 +278,7 @@ class _Batch:
             return False
         wanted += ["*.rrd"] if asked.recording else []
         wanted += ["*.rose2.mcap"] if asked.annotated_log else []
-        wanted += [f"{SMOOTHED}.parquet"] if asked.smooth else []
+        wanted += [f"{BACK_PROJECTED}.parquet"] if asked.back_project else []
         wanted += [BAG_DESCRIPTION] if asked.bag else []
         folder = self._out / LOGS_FOLDER / name
         return all(next(folder.glob(each), None) for each in wanted)

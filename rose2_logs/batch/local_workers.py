@@ -14,7 +14,7 @@ from multiprocessing.context import SpawnProcess
 from types import TracebackType
 from typing import Self
 
-from rose2_logs.batch.task import LogOutcome, LogTask, Progress, analyse_task
+from rose2_logs.batch.task import LogOutcome, LogTask, Progress, analyze_task
 from rose2_logs.system.workers import limit_process_to_one_thread, usable_processes
 
 DEATH_TIMEOUT_S = 5.0
@@ -122,7 +122,7 @@ def _serve(connection: Connection) -> None:
             task = connection.recv()
         except EOFError:
             return
-        connection.send(analyse_task(task, connection.send))
+        connection.send(analyze_task(task, connection.send))
 
 
 def _end_with_parent() -> None:

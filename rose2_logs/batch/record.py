@@ -44,7 +44,7 @@ class BatchSettings:
         Whether to write the Rerun recording and the annotated MCAP.
     layers : tuple of str
         Those of `RECORDING_LAYERS` that the recordings get.
-    smooth : bool
+    back_project : bool
         Whether to tell how much of the last map's rooms each map shows.
     bag : bool
         Whether each folder becomes a bag of ROS 2 that holds the annotated MCAP.
@@ -63,7 +63,7 @@ class BatchSettings:
     recording: bool = True
     annotated_log: bool = True
     layers: tuple[str, ...] = RECORDING_LAYERS
-    smooth: bool = False
+    back_project: bool = False
     bag: bool = False
     strict: bool = False
 

@@ -23,7 +23,7 @@ from rose2_logs import __version__
 from rose2_logs.batch.location import Location
 from rose2_logs.batch.record import BatchSettings, Record, Signature, signature_of
 from rose2_logs.errors import LogError, OutputError, Rose2LogsError
-from rose2_logs.system.warnings import PACKAGE, Notices, gathered
+from rose2_logs.system.warnings import PACKAGE, WarningLog, collect_warnings
 
 RETRY_PAUSE_S = 2.0
 """Before the second try after a fault of storage or network; doubled for each further one."""
@@ -159,7 +159,7 @@ class BatchOverError(Rose2LogsError):
 Report = Callable[[Progress], None]
 
 
-def analyse_task(task: LogTask, report: Report) -> LogOutcome:
+def analyze_task(task: LogTask, report: Report) -> LogOutcome:
     """Do a task; whatever goes wrong becomes part of the outcome.
 
     Parameters
@@ -169,9 +169,9 @@ def analyse_task(task: LogTask, report: Report) -> LogOutcome:
     report : callable
         Told of the progress.
     """
-    with gathered() as notices, _own_messages():
+    with collect_warnings() as warning_log, _own_messages():
         try:
-            outcome = _analyse(task, report, notices)
+            outcome = _analyze(task, report, warning_log)
         except Exception as error:
             known = isinstance(error, Rose2LogsError)
             outcome = LogOutcome(
@@ -181,9 +181,9 @@ def analyse_task(task: LogTask, report: Report) -> LogOutcome:
                 is_transient=is_transient(error),
                 details=traceback.format_exc(),
             )
-    told = notices.texts()[:MOST_WARNINGS]
-    if notices.count > len(told):
-        told.append(f"{notices.count - len(told)} more warnings")
+    told = warning_log.texts()[:MOST_WARNINGS]
+    if warning_log.count > len(told):
+        told.append(f"{warning_log.count - len(told)} more warnings")
     return dataclasses.replace(outcome, warnings=tuple(told))
 
 
@@ -200,7 +200,7 @@ def is_transient(error: BaseException | None) -> bool:
     return False
 
 
-def _analyse(task: LogTask, report: Report, notices: Notices) -> LogOutcome:
+def _analyze(task: LogTask, report: Report, warning_log: WarningLog) -> LogOutcome:
     if task.version != __version__:
         raise Rose2LogsError(f"the worker runs rose2-logs {__version__}, the batch {task.version}")
     if task.attempt > 1:
@@ -210,7 +210,7 @@ def _analyse(task: LogTask, report: Report, notices: Notices) -> LogOutcome:
         return LogOutcome(task.name, "unchanged", record=_confirmed(task, task.known, signature))
     with _local_copy(task.log) as path:
         try:
-            return _analyse_local(task, path, signature, report)
+            return _analyze_local(task, path, signature, report)
         except Rose2LogsError as error:
             # A copy's place would tell nothing.
             if task.log.is_remote and str(path) in str(error):
@@ -218,14 +218,14 @@ def _analyse(task: LogTask, report: Report, notices: Notices) -> LogOutcome:
             raise
         finally:
             if task.log.is_remote:
-                notices.rename(str(path), task.log.address)
+                warning_log.rename(str(path), task.log.address)
 
 
-def _analyse_local(task: LogTask, path: Path, signature: Signature, report: Report) -> LogOutcome:
+def _analyze_local(task: LogTask, path: Path, signature: Signature, report: Report) -> LogOutcome:
     from rose2_logs.config.selection import Selection
     from rose2_logs.runs.provenance import fingerprint
     from rose2_logs.runs.tables import SUMMARY
-    from rose2_logs.workflows.analyze import RunOptions, analyse_log, seconds_into_log
+    from rose2_logs.workflows.analyze import RunOptions, analyze_log, seconds_into_log
 
     if task.known is not None:
         is_same = fingerprint(path)["sha256"] == task.known.sha256
@@ -244,7 +244,7 @@ def _analyse_local(task: LogTask, path: Path, signature: Signature, report: Repo
             recording=asked.recording,
             layers=asked.layers,
             annotated_log=asked.annotated_log,
-            smooth=asked.smooth,
+            back_project=asked.back_project,
             bag=asked.bag,
             strict=asked.strict,
             journal=False,  # a log that was stopped is begun anew, in another folder
@@ -262,7 +262,7 @@ def _analyse_local(task: LogTask, path: Path, signature: Signature, report: Repo
                 report(Progress(task.name, share))
 
         report(Progress(task.name, 0.0))
-        analyse_log(path, folder, options, on_snapshot)
+        analyze_log(path, folder, options, on_snapshot)
         if not task.log.is_remote and signature_of(task.log).files != signature.files:
             raise LogError(f"{task.log.address}: changed while it was read; run again when it is whole")
         summary = json.loads((folder / SUMMARY).read_text(encoding="utf-8"))

@@ -104,7 +104,7 @@ def batch(
     no_mcap: NoAnnotatedLog = False,
     strict: Strict = False,
     layers: Layers = "all",
-    smooth: Smooth = False,
+    back_project: Smooth = False,
     bag: Bag = False,
     debug: Debug = False,
 ) -> None:
@@ -125,7 +125,7 @@ def batch(
         recording=not no_rrd,
         annotated_log=not no_mcap,
         layers=chosen_layers(layers),
-        smooth=smooth,
+        back_project=back_project,
         bag=wanted_bag(bag, no_mcap),
         strict=strict,
     )

@@ -162,7 +162,7 @@ def analyze(
     no_mcap: NoAnnotatedLog = False,
     strict: Strict = False,
     layers: Layers = "all",
-    smooth: Smooth = False,
+    back_project: Smooth = False,
     bag: Bag = False,
     debug: Debug = False,
 ) -> None:
@@ -170,7 +170,7 @@ def analyze(
     from rose2_logs.cli import printing as reporting
     from rose2_logs.config.selection import Selection
     from rose2_logs.system.workers import keep_freed_memory
-    from rose2_logs.workflows.analyze import RunOptions, analyse_log, log_stem, seconds_into_log
+    from rose2_logs.workflows.analyze import RunOptions, analyze_log, log_stem, seconds_into_log
 
     keep_freed_memory()
     parameters = resolve_parameters(config, settings, method)
@@ -192,14 +192,14 @@ def analyze(
                 layers=shown,
                 annotated_log=not no_mcap,
                 bag=wanted_bag(bag, no_mcap),
-                smooth=smooth,
+                back_project=back_project,
                 live=live,
                 overwrite=overwrite,
                 strict=strict,
                 resume=resume,
             )
             with reporting.run_progress(name) as on_snapshot:
-                result = analyse_log(log, out / name, options, on_snapshot)
+                result = analyze_log(log, out / name, options, on_snapshot)
             reporting.print_run(result)
         except AlreadyWholeError as whole:
             reporting.print_text(str(whole))

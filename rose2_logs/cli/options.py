@@ -87,9 +87,9 @@ Strict = Annotated[
 Smooth = Annotated[
     bool,
     typer.Option(
-        "--smooth",
+        "--back-project",
         help="Read the maps once more in the end and tell how much of each of the last map's rooms every "
-        "map shows: smoothed.parquet, a tab in the recording, a section in the report.",
+        "map shows: back_projected.parquet, a tab in the recording, a section in the report.",
     ),
 ]
 Config = Annotated[

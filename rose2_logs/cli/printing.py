@@ -104,12 +104,12 @@ def run_progress(name: str) -> Iterator[OnSnapshot]:
         task = progress.add_task(name, total=1.0, note="opening")
         seen = 0
 
-        def on_snapshot(frame: TrackedSnapshot, share: float) -> None:
+        def on_snapshot(step: TrackedSnapshot, share: float) -> None:
             nonlocal seen
             seen += 1
             elapsed = progress.tasks[task].elapsed or 0.0
             rate = f"{seen / elapsed:.2f} maps/s" if elapsed > 0 else ""
-            note = f"map {seen}, {rate}, {len(frame.track_ids)} rooms"
+            note = f"map {seen}, {rate}, {len(step.track_ids)} rooms"
             progress.update(task, completed=share, note=note)
 
         yield on_snapshot
@@ -147,7 +147,7 @@ def print_run(result: RunResult) -> None:
     totals = result.totals
     events = totals.events
     table = Table(box=None, show_header=False, pad_edge=False)
-    left_out = f" ({totals.invalid} could not be analysed)" if totals.invalid else ""
+    left_out = f" ({totals.invalid} could not be analyzed)" if totals.invalid else ""
     table.add_row("maps", f"{totals.snapshots}{left_out}")
     table.add_row("coverage", f"{totals.coverage_first:.1%} to {totals.coverage_last:.1%}")
     table.add_row("rooms at the end", f"{totals.rooms_last} ({totals.tracks} over the run)")
@@ -186,8 +186,8 @@ def print_static_map(result: StaticMapResult) -> None:
     for number, (area, predicted) in enumerate(
         zip(rooms.areas_m2, rooms.predicted_areas_m2, strict=True), start=1
     ):
-        neighbours = ", ".join(str(other) for other in rooms.neighbours(number))
-        table.add_row(str(number), f"{area:.1f}", f"{predicted:.1f}", neighbours)
+        neighbors = ", ".join(str(other) for other in rooms.neighbors(number))
+        table.add_row(str(number), f"{area:.1f}", f"{predicted:.1f}", neighbors)
     _out.print(table)
     _out.print(f"results in [bold]{escape(str(result.folder))}[/]", soft_wrap=True)
     for file in result.files:
@@ -251,7 +251,7 @@ def print_tracks(runs: Mapping[str, RunTrackScores]) -> None:
         table.add_column(heading, justify="right")
     for group, run in runs.items():
         table.add_row(f"[bold]{escape(group)}")
-        rows = {"rooms found": run.found, "smoothed": run.smoothed, "true rooms": run.true_rooms}
+        rows = {"rooms found": run.found, "back_projected": run.back_projected, "true rooms": run.true_rooms}
         for name, scores in rows.items():
             shares = (scores.idf1, scores.idf1_bound, scores.idp, scores.idr)
             counts = (str(scores.id_switches), str(scores.fragmentations))
@@ -260,8 +260,8 @@ def print_tracks(runs: Mapping[str, RunTrackScores]) -> None:
     _out.print(table)
     for group, run in runs.items():
         _out.print(
-            f"smoothed: the rooms of the last map carried over to those before, {escape(group)}: "
-            f"mean iou_sym {run.smoothed_iou_sym:.2f}"
+            f"back_projected: the rooms of the last map carried over to those before, {escape(group)}: "
+            f"mean iou_sym {run.back_projected_iou_sym:.2f}"
         )
 
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 MOST_BARS = 10
 """Logs in work that have a bar of their own; a cluster may have hundreds."""
-COLOURS = {"done": "green", "up to date": "green", "failed": "bold red"}
+COLORS = {"done": "green", "up to date": "green", "failed": "bold red"}
 
 
 class BatchDisplay:
@@ -107,15 +107,15 @@ def print_batch(result: BatchResult) -> None:
         table.add_column(heading, justify="right", no_wrap=True)
     table.add_column("why", overflow="fold")
     for state in result.states:
-        row, colour = state.row, COLOURS[state.status]
+        row, color = state.row, COLORS[state.status]
         figures = [
             "" if row[name] is None else str(row[name]) for name in ("snapshots", "rooms_last", "tracks")
         ]
         seconds = "" if row["run_s"] is None else f"{row['run_s']:.1f}"
-        status = f"[{colour}]{state.status}[/]"
+        status = f"[{color}]{state.status}[/]"
         table.add_row(escape(state.name), status, *figures, seconds, escape(row["reason"] or ""))
     print_table(table)
-    counts = {status: sum(state.status == status for state in result.states) for status in COLOURS}
+    counts = {status: sum(state.status == status for state in result.states) for status in COLORS}
     print_line(", ".join(f"{count} {status}" for status, count in counts.items() if count))
     print_line(f"results in [bold]{escape(str(result.out))}[/]")
     for file in result.files:

@@ -70,10 +70,10 @@ def figure(
     snapshot: Snapshot = None,
     coverage: Coverage = None,
     last: Last = False,
-    smoothed: Annotated[
+    back_projected: Annotated[
         bool,
         typer.Option(
-            "--smoothed", help="The rooms of the last map as far as this one shows them, not its own."
+            "--back-projected", help="The rooms of the last map as far as this one shows them, not its own."
         ),
     ] = False,
     out: Annotated[
@@ -97,7 +97,9 @@ def figure(
     from rose2_logs.workflows.figure import write_figure
 
     choice = _choice(snapshot, coverage, last)
-    picture = write_figure(folder, out, *choice, smoothed=smoothed, width_px=width, overwrite=overwrite)
+    picture = write_figure(
+        folder, out, *choice, back_projected=back_projected, width_px=width, overwrite=overwrite
+    )
     reporting.print_file(picture)
 
 

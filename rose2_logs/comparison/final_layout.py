@@ -26,7 +26,7 @@ class FinalLayout:
     tracks : tuple of R int
         Numbers of the rooms.
     shapes : tuple of R shapely Polygon or MultiPolygon
-        Their shapes with the predicted part, metres in the map's frame.
+        Their shapes with the predicted part, meters in the map's frame.
     areas_m2 : (R,) float
         Their areas as far as they were seen.
     walls : Walls or None

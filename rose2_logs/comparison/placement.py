@@ -93,7 +93,7 @@ class PlacedMap:
         self.snapshot = snapshot
         self.free, self.occupied = classify(snapshot.cells, occupancy)
         self._occupancy = occupancy
-        occupied_m = snapshot.geometry.cell_centres(*np.nonzero(self.occupied))
+        occupied_m = snapshot.geometry.cell_centers(*np.nonzero(self.occupied))
         self.tree = cKDTree(occupied_m)
         self.reach_m = max(WALL_REACH_M, REACH_MIN_CELLS * self.resolution_m)
         faces_m = wall_faces(self.free, self.occupied, snapshot.geometry)
@@ -154,11 +154,11 @@ class PlacedMap:
         return shifted
 
     def free_points(self, cell_m: float) -> FloatArray:
-        """Centres (K, 2) of free space, about one for every square of a side, metres."""
+        """Centers (K, 2) of free space, about one for every square of a side, meters."""
         step = max(1, round(cell_m / self.resolution_m))
         offset = step // 2
         rows, columns = np.nonzero(self.free[offset::step, offset::step])
-        return self.snapshot.geometry.cell_centres(rows * step + offset, columns * step + offset)
+        return self.snapshot.geometry.cell_centers(rows * step + offset, columns * step + offset)
 
 
 def place(moving: PlacedMap, fixed: PlacedMap) -> Placement | None:
@@ -177,14 +177,14 @@ def place(moving: PlacedMap, fixed: PlacedMap) -> Placement | None:
     counter = _Agreement(moving, fixed)
     scored = sorted(((counter.of(motion), motion) for motion in settled), key=lambda each: -each[0][2])
     (agreement, common, score), motion = scored[0]
-    centre = moving.walls.mean(axis=0)
-    others = [figures[2] for figures, other in scored[1:] if not _is_same(motion, other, centre)]
+    center = moving.walls.mean(axis=0)
+    others = [figures[2] for figures, other in scored[1:] if not _is_same(motion, other, center)]
     return Placement(motion, agreement, common, score, max(others, default=0.0))
 
 
-def _is_same(one: RigidMotion, other: RigidMotion, centre_m: FloatArray) -> bool:
+def _is_same(one: RigidMotion, other: RigidMotion, center_m: FloatArray) -> bool:
     turn = math.remainder(one.turn_rad - other.turn_rad, 2 * math.pi)
-    apart = float(np.linalg.norm(one.points(centre_m) - other.points(centre_m)))
+    apart = float(np.linalg.norm(one.points(center_m) - other.points(center_m)))
     return abs(turn) < SAME_TURN_RAD and apart < SAME_PLACE_M
 
 
@@ -251,8 +251,8 @@ class _ShiftSearch:
     def __init__(self, moving: PlacedMap, fixed: PlacedMap, cell_m: float) -> None:
         self._cell_m = cell_m
         self._walls, self._space = moving.walls, moving.free_points(cell_m)
-        self._centre = moving.walls.mean(axis=0)
-        reach = np.linalg.norm(np.concatenate([self._walls, self._space]) - self._centre, axis=1).max()
+        self._center = moving.walls.mean(axis=0)
+        reach = np.linalg.norm(np.concatenate([self._walls, self._space]) - self._center, axis=1).max()
         self._side = 2 * int(np.ceil(reach / cell_m)) + 3
         space = fixed.free_points(cell_m)
         everything = np.concatenate([fixed.walls, space])
@@ -276,7 +276,7 @@ class _ShiftSearch:
     def best(self, turn_rad: float) -> list[tuple[float, RigidMotion]]:
         """Best places of the map at a turn, with their scores."""
         half = self._side * self._cell_m / 2
-        turned = RigidMotion.moving(self._centre, np.full(2, half), turn_rad)
+        turned = RigidMotion.moving(self._center, np.full(2, half), turn_rad)
         shape = (self._side, self._side)
         wall = self._raster(turned.points(self._walls), shape)
         free = self._raster(turned.points(self._space), shape) * (_nearness(wall, self._cell_m) == 0)
@@ -295,7 +295,7 @@ class _ShiftSearch:
                 ]
             )
             target = self._low + shift * self._cell_m + half
-            found.append((score, RigidMotion.moving(self._centre, target, turn_rad)))
+            found.append((score, RigidMotion.moving(self._center, target, turn_rad)))
             rows, columns = (
                 np.arange(at - gap, at + gap + 1) % size
                 for at, size in ((row, self._padded[0]), (column, self._padded[1]))

@@ -40,7 +40,7 @@ PART_MIN_SHARE = 0.5
 EXPLORED_MIN_SHARE = 0.5
 """A room is missing where the other run has explored most of its place."""
 SAMPLE_M = 0.1
-"""What is explored is looked up every so many metres: two cells of usual maps."""
+"""What is explored is looked up every so many meters: two cells of usual maps."""
 SAMPLES_MOST = 250_000
 """Most points that are looked up for one room; they are further apart in larger halls than 50 m by 50 m."""
 
@@ -124,7 +124,7 @@ def compare_rooms(a: FinalLayout, b: FinalLayout, b_to_a: RigidMotion) -> tuple[
 
 
 def _common_areas(ones: tuple[BaseGeometry, ...], others: tuple[BaseGeometry, ...]) -> FloatArray:
-    """Area (A, B) in square metres that each pair of shapes shares."""
+    """Area (A, B) in square meters that each pair of shapes shares."""
     common = np.zeros((len(ones), len(others)))
     if ones and others:
         first, second = np.array(ones, object), np.array(others, object)

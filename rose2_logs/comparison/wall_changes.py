@@ -27,7 +27,7 @@ WALL_STATUSES: dict[WallStatus, str] = {
 """What became of walls, and what each of these means; the order of the tables."""
 
 STEP_M = 0.1
-"""Walls are looked at every so many metres: two cells of usual maps."""
+"""Walls are looked at every so many meters: two cells of usual maps."""
 CHANGE_MIN_LENGTH_M = 0.5
 """Shorter stretches are no change: the least jamb beside a door is as long."""
 GAP_MAX_M = 0.3
@@ -51,7 +51,7 @@ class WallChange:
     status : WallStatus
         What became of it.
     ends_a_m, ends_b_m : (4,) float or None
-        Ends x0, y0, x1, y1 of the stretch in each layout, metres.
+        Ends x0, y0, x1, y1 of the stretch in each layout, meters.
     shift_m : float or None
         How far a moved wall is from where it was, across it.
     """
@@ -63,7 +63,7 @@ class WallChange:
 
     @property
     def length_m(self) -> float:
-        """Length in metres; of a moved wall, that of the longer stretch."""
+        """Length in meters; of a moved wall, that of the longer stretch."""
         return max(float(_lengths(ends)) for ends in (self.ends_a_m, self.ends_b_m) if ends is not None)
 
 
@@ -87,7 +87,7 @@ class WallComparison:
 
     @property
     def lengths_m(self) -> dict[WallStatus, float]:
-        """Length of the walls of each status that occurs, metres."""
+        """Length of the walls of each status that occurs, meters."""
         lengths: dict[WallStatus, float] = {}
         for change in self.changes:
             lengths[change.status] = lengths.get(change.status, 0.0) + change.length_m
@@ -126,7 +126,7 @@ def compare_walls(a: FinalLayout, b: FinalLayout, b_to_a: RigidMotion) -> WallCo
 def _look_up(
     walls: Walls, other: FinalLayout, own: FinalLayout, to_other: RigidMotion
 ) -> tuple[FloatArray, float, float]:
-    """Stretches (K, 4) of walls where the other map is free; the lengths compared and kept, metres."""
+    """Stretches (K, 4) of walls where the other map is free; the lengths compared and kept, meters."""
     if len(walls.segments_m) == 0:
         return np.zeros((0, 4)), 0.0, 0.0
     points, segment, beyond = _along(walls.segments_m)
@@ -223,7 +223,7 @@ def _runs(gone: BoolArray, there: BoolArray) -> list[tuple[int, int]]:
 
 
 def _side_by_side(ones: FloatArray, others: FloatArray) -> list[tuple[int, int, float]]:
-    """Pairs of stretches (A, 4) and (B, 4) that may be one wall that moved, and how far it did, metres."""
+    """Pairs of stretches (A, 4) and (B, 4) that may be one wall that moved, and how far it did, meters."""
     lengths, other_lengths = _lengths(ones)[:, None], _lengths(others)
     along = (ones[:, 2:] - ones[:, :2]) / lengths
     across = np.column_stack([-along[:, 1], along[:, 0]])
@@ -240,6 +240,6 @@ def _side_by_side(ones: FloatArray, others: FloatArray) -> list[tuple[int, int, 
 
 
 def _lengths(ends: FloatArray) -> FloatArray:
-    """Length of each of some stretches (..., 4), metres."""
+    """Length of each of some stretches (..., 4), meters."""
     lengths: FloatArray = np.hypot(ends[..., 2] - ends[..., 0], ends[..., 3] - ends[..., 1])
     return lengths

@@ -32,11 +32,11 @@ class VoronoiBaselineParameters:
     room_max_area_m2: float = number(1e6, "m2", "Greatest area of a piece; the survey's value: any.")
     clear_rounds: int = number(2, "rounds", "The graph keeps this many cells clear of obstacles.", 0, 100)
     prune_passes: int = number(100, "passes", "Loose ends of the graph shorter than this go.", 0, 10**5)
-    neighbourhood_cells2: float = number(
-        280.0, "cells^2", "Cells of a neighbourhood times the distance from obstacles; the survey's value.", 1
+    neighborhood_cells2: float = number(
+        280.0, "cells^2", "Cells of a neighborhood times the distance from obstacles; the survey's value.", 1
     )
-    neighbourhood_max_rounds: int = number(
-        150, "rounds", "Most steps from a neighbourhood's centre; the survey's value.", 0, 10**5
+    neighborhood_max_rounds: int = number(
+        150, "rounds", "Most steps from a neighborhood's center; the survey's value.", 0, 10**5
     )
     critical_min_gap: float = number(
         0.5, "1", "Closer critical points, by their distance from obstacles, compete; the survey's value."
@@ -50,8 +50,8 @@ class VoronoiMergeParameters:
     Borders and walls are shares of a perimeter.
     """
 
-    dead_end_max_area_m2: float = number(12.5, "m2", "Area of a room with one neighbour; the survey's value.")
-    dead_end_max_wall: float = number(0.75, "share", "Wall of a room with one neighbour.", 0, 1)
+    dead_end_max_area_m2: float = number(12.5, "m2", "Area of a room with one neighbor; the survey's value.")
+    dead_end_max_wall: float = number(0.75, "share", "Wall of a room with one neighbor.", 0, 1)
     small_max_area_m2: float = number(2.0, "m2", "Area of a small room.")
     small_min_border: float = number(0.2, "share", "Border of a small room with its target.", 0, 1)
     small_target_max_wall: float = number(0.8, "share", "Wall of a small room's target.", 0, 1)
@@ -59,7 +59,7 @@ class VoronoiMergeParameters:
     niche_min_wall: float = number(0.5, "share", "Wall of a niche.", 0, 1)
     niche_min_border: float = number(0.15, "share", "Border of a niche with its target.", 0, 1)
     niche_target_min_cover: float = number(
-        0.95, "share", "Wall and two longest borders of a niche's target with more than two neighbours.", 0, 1
+        0.95, "share", "Wall and two longest borders of a niche's target with more than two neighbors.", 0, 1
     )
     open_min_border: float = number(0.2, "share", "Border of a room that is open to its target.", 0, 1)
     half_open_min_border: float = number(0.1, "share", "The same where walls fit a corridor's piece.", 0, 1)

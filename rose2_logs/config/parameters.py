@@ -1,6 +1,6 @@
 """Every number that a result depends on: one frozen block per stage, with unit, default and reason.
 
-Lengths are metres (``_m``, ``_m2``), angles radians (``_rad``), times seconds (``_s``); shares lie in [0, 1].
+Lengths are meters (``_m``, ``_m2``), angles radians (``_rad``), times seconds (``_s``); shares lie in [0, 1].
 A configuration file is TOML with one table per block; ``resolved`` gives the same shape back.
 """
 
@@ -54,15 +54,15 @@ class OccupancyParameters:
         19.6, "%", "Known cells below are free; map_server's default free_thresh.", 0, 100
     )
     working_resolution_m: float = number(
-        0.05, "m", "Finer maps are analysed in blocks up to this size: SLAM's usual cell.", 0.0
+        0.05, "m", "Finer maps are analyzed in blocks up to this size: SLAM's usual cell.", 0.0
     )
-    analysed_max_cells: int = number(
-        20_000_000, "cells", "Explored parts with more are analysed in blocks; 220 m squared at 5 cm.", 10_000
+    analyzed_max_cells: int = number(
+        20_000_000, "cells", "Explored parts with more are analyzed in blocks; 220 m squared at 5 cm.", 10_000
     )
 
     def unblocked(self) -> OccupancyParameters:
         """Return the same, for methods that take every map at its own resolution."""
-        return dataclasses.replace(self, working_resolution_m=0.0, analysed_max_cells=2**62)
+        return dataclasses.replace(self, working_resolution_m=0.0, analyzed_max_cells=2**62)
 
 
 @dataclass(frozen=True)
@@ -240,7 +240,7 @@ class TrackingParameters:
     shift_min_share: float = number(
         0.5, "share", "A motion of the map is believed when it brings most of its walls together.", 0, 1
     )
-    smoothed_min_area_m2: float = number(
+    back_projected_min_area_m2: float = number(
         1.5, "m2", "A lesser glimpse of a room of the last map is no room yet: half the least room.", 0.0
     )
 

@@ -23,7 +23,7 @@ RECORDING_LAYERS = (
 
 NOT_IN_JOURNAL = (
     *("topic", "selection", "parameters", "workers", "recording", "layers", "annotated_log", "bag"),
-    *("live", "smooth", "origin", "home", "overwrite", "resume", "journal", "strict"),
+    *("live", "back_project", "origin", "home", "overwrite", "resume", "journal", "strict"),
 )
 """Options that the analysis does not depend on, or that a journal names otherwise."""
 
@@ -51,7 +51,7 @@ class RunOptions:
         Whether the folder becomes a bag of ROS 2 that holds the annotated MCAP.
     layers : tuple of str
         Those of `RECORDING_LAYERS` that the recording gets.
-    smooth : bool
+    back_project : bool
         Whether to go through the maps once more in the end and tell how much of the last map's rooms each
         shows.
     live : bool
@@ -79,7 +79,7 @@ class RunOptions:
     annotated_log: bool = True
     bag: bool = False
     layers: tuple[str, ...] = RECORDING_LAYERS
-    smooth: bool = False
+    back_project: bool = False
     live: bool = False
     overwrite: bool = False
     resume: bool = False

@@ -25,7 +25,7 @@ class Selection:
     every_s : float, optional
         Least time between two taken messages, seconds; the first one is taken.
     min_change_m2 : float, optional
-        Least area that became known, or unknown again, since the last taken map, square metres.
+        Least area that became known, or unknown again, since the last taken map, square meters.
     max_snapshots : int, optional
         Most messages to take, spread evenly over those that are left; the first and the last one stay in
         (of 1, the last one stays).

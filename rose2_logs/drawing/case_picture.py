@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 from PIL import Image as PillowImage
 from PIL import ImageDraw, ImageFont
 
-from rose2_logs.drawing.palette import track_colour
+from rose2_logs.drawing.palette import track_color
 from rose2_logs.evaluation.case_errors import Comparison, Mark
 from rose2_logs.evaluation.scores import Scores
 from rose2_logs.model.labels import known_window
 
 Image = NDArray[np.uint8]
-Colour = tuple[int, int, int]
+Color = tuple[int, int, int]
 Scalar = TypeVar("Scalar", bound=np.generic)
 
 SIDE_MIN_PX = 620
@@ -31,16 +31,16 @@ TEXT_GROWS_FROM_PX = 900
 OCCUPIED_MIN_PERCENT = 50
 """Cells above are drawn as walls over the rooms."""
 STRIPE_PX, STRIPE_EVERY_PX = 3, 12
-"""Found rooms without a partner are striped: their colour alone might pass for a true room's."""
+"""Found rooms without a partner are striped: their color alone might pass for a true room's."""
 
 PAPER, INK = (255, 255, 255), (0, 0, 0)
-UNKNOWN_COLOUR, FREE_COLOUR, OCCUPIED_COLOUR, BORDER_COLOUR = (
+UNKNOWN_COLOR, FREE_COLOR, OCCUPIED_COLOR, BORDER_COLOR = (
     (205, 205, 205),
     (254, 254, 254),
     (0, 0, 0),
     (70, 70, 70),
 )
-MARK_COLOURS: dict[Mark, Colour] = {
+MARK_COLORS: dict[Mark, Color] = {
     Mark.RIGHT: (222, 236, 222),
     Mark.MERGED: (214, 39, 40),
     Mark.SPLIT: (255, 150, 20),
@@ -103,7 +103,7 @@ def draw_panels(
 ) -> tuple[Image, Image, Image, Image]:
     """Draw the four panels map, truth, found and errors, all of the same size, without any caption.
 
-    A found room has the colour of its partner, and a colour of its own, striped, where it has none.
+    A found room has the color of its partner, and a color of its own, striped, where it has none.
     """
     drawn = (cells >= 0) | (comparison.truth > 0) | (comparison.found > 0)
     window = _with_margin(known_window(drawn), drawn.shape)
@@ -113,47 +113,47 @@ def draw_panels(
     plain = _scaled(_plain(cells), scale)
     walls = _scaled(cells > OCCUPIED_MIN_PERCENT, scale)
 
-    truth_colours = room_colours(int(comparison.truth.max(initial=0)))
-    found_colours, alone = _found_colours(comparison, len(truth_colours))
-    mark_colours = np.zeros((len(Mark), 3), np.uint8)
-    for mark, colour in MARK_COLOURS.items():
-        mark_colours[mark] = colour
+    truth_colors = room_colors(int(comparison.truth.max(initial=0)))
+    found_colors, alone = _found_colors(comparison, len(truth_colors))
+    mark_colors = np.zeros((len(Mark), 3), np.uint8)
+    for mark, color in MARK_COLORS.items():
+        mark_colors[mark] = color
 
     truth, found, marks = _scaled(truth, scale), _scaled(found, scale), _scaled(marks, scale)
     striped = alone[found] & _stripes(found.shape)
     panels = []
-    for labels, colours in ((truth, truth_colours), (found, found_colours)):
-        panel = np.where((labels > 0)[..., None], colours[labels], plain)
+    for labels, colors in ((truth, truth_colors), (found, found_colors)):
+        panel = np.where((labels > 0)[..., None], colors[labels], plain)
         if labels is found:
             panel[striped] = PAPER
-        panel[walls] = OCCUPIED_COLOUR
-        panel[_borders(labels)] = BORDER_COLOUR
+        panel[walls] = OCCUPIED_COLOR
+        panel[_borders(labels)] = BORDER_COLOR
         panels.append(_numbered(panel, labels) if numbered else panel)
-    errors: Image = np.where((marks != Mark.NONE)[..., None], mark_colours[marks], plain)
-    errors[walls] = OCCUPIED_COLOUR
+    errors: Image = np.where((marks != Mark.NONE)[..., None], mark_colors[marks], plain)
+    errors[walls] = OCCUPIED_COLOR
     return plain, panels[0], panels[1], errors
 
 
-def room_colours(count: int) -> Image:
-    """Colours (count + 1, 3) of labels, RGB; label 0 has none."""
-    return np.array([(0, 0, 0), *(track_colour(number) for number in range(1, count + 1))], np.uint8)
+def room_colors(count: int) -> Image:
+    """Colors (count + 1, 3) of labels, RGB; label 0 has none."""
+    return np.array([(0, 0, 0), *(track_color(number) for number in range(1, count + 1))], np.uint8)
 
 
-def _found_colours(comparison: Comparison, used: int) -> tuple[Image, NDArray[np.bool_]]:
-    """Colour of each found room, its partner's where it has one; and which rooms have none."""
+def _found_colors(comparison: Comparison, used: int) -> tuple[Image, NDArray[np.bool_]]:
+    """Color of each found room, its partner's where it has one; and which rooms have none."""
     partner = comparison.partner_of_found
     alone = partner == 0
     alone[0] = False
     own = np.cumsum(alone) + used - 1
-    colours = room_colours(int(own[-1]))
-    return colours[np.where(alone, own, partner)], alone
+    colors = room_colors(int(own[-1]))
+    return colors[np.where(alone, own, partner)], alone
 
 
 def _plain(cells: NDArray[np.int8]) -> Image:
     image = np.empty((*cells.shape, 3), np.uint8)
-    image[:] = UNKNOWN_COLOUR
-    grey = np.array(FREE_COLOUR) * (1 - cells[..., None] / 100)
-    image[cells >= 0] = np.round(grey[cells >= 0])
+    image[:] = UNKNOWN_COLOR
+    gray = np.array(FREE_COLOR) * (1 - cells[..., None] / 100)
+    image[cells >= 0] = np.round(gray[cells >= 0])
     return image
 
 
@@ -176,7 +176,7 @@ def _stripes(shape: tuple[int, ...]) -> NDArray[np.bool_]:
 
 
 def _borders(labels: NDArray[np.integer]) -> NDArray[np.bool_]:
-    """Pixels of rooms whose right or lower neighbour has another label."""
+    """Pixels of rooms whose right or lower neighbor has another label."""
     borders = np.zeros(labels.shape, bool)
     borders[:-1] |= labels[:-1] != labels[1:]
     borders[:, :-1] |= labels[:, :-1] != labels[:, 1:]
@@ -241,13 +241,13 @@ def tiled(panels: Sequence[Image], columns: int) -> Image:
 
 
 def _legend(comparison: Comparison, width: int, size_px: float) -> Image:
-    """Draw what the colours of the errors panel mean, and how many of the rooms' cells have each."""
+    """Draw what the colors of the errors panel mean, and how many of the rooms' cells have each."""
     total = max(1, int(np.count_nonzero(comparison.marks)))
     font, box = ImageFont.load_default(size_px), round(size_px)
     step = box + GAP_PX
     entries = [
-        (colour, f"{MARK_WORDS[mark]} ({comparison.count(mark) / total:.1%})")
-        for mark, colour in MARK_COLOURS.items()
+        (color, f"{MARK_WORDS[mark]} ({comparison.count(mark) / total:.1%})")
+        for mark, color in MARK_COLORS.items()
     ]
     # Entries flow into as many lines as the width asks for.
     places, line, left = [], 0, GAP_PX
@@ -259,7 +259,7 @@ def _legend(comparison: Comparison, width: int, size_px: float) -> Image:
         left += needed
     image = PillowImage.new("RGB", (width, (line + 1) * step + GAP_PX), PAPER)
     draw = ImageDraw.Draw(image)
-    for (colour, text), (left, top) in zip(entries, places, strict=True):
-        draw.rectangle((left, top, left + box, top + box), colour, INK)
+    for (color, text), (left, top) in zip(entries, places, strict=True):
+        draw.rectangle((left, top, left + box, top + box), color, INK)
         draw.text((left + step // 2 + box // 2, top + box // 2), text, INK, font, anchor="lm")
     return np.asarray(image)

@@ -85,7 +85,7 @@ def _tile(cells: NDArray[np.int8], comparison: Comparison, result: CaseResult) -
 
 
 def _fitted(panel: Image) -> Image:
-    """Shrink a panel to a tile's part, centred on white."""
+    """Shrink a panel to a tile's part, centered on white."""
     import cv2
 
     width, height = TILE_PX

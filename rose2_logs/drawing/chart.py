@@ -1,4 +1,4 @@
-"""Charts as SVG within an HTML page, which gives text and axes their colour: so they fit light and dark."""
+"""Charts as SVG within an HTML page, which gives text and axes their color: so they fit light and dark."""
 
 from __future__ import annotations
 
@@ -41,13 +41,13 @@ class Series:
     name : str
     values : (N,) float
         NaN where there is none; the curve has a gap there.
-    colour : str
+    color : str
         As CSS has it.
     """
 
     name: str
     values: FloatArray
-    colour: str
+    color: str
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class ShareLane:
         What stands beside it, and what it says when pointed at.
     shares : (N,) float
         In [0, 1].
-    colour : str
+    color : str
         As CSS has it.
     reached : int, optional
         Index of the value that is marked by a line across the lane.
@@ -78,7 +78,7 @@ class ShareLane:
     name: str
     text: str
     shares: FloatArray
-    colour: str
+    color: str
     reached: int | None = None
 
 
@@ -121,12 +121,12 @@ def line_chart(
         shares = (each.values - y_axis.low) / (y_axis.high - y_axis.low)
         heights = HEIGHT - BOTTOM - shares * (HEIGHT - TOP - BOTTOM)
         parts.append(
-            f'<path class="curve" stroke="{escape(each.colour)}" '
+            f'<path class="curve" stroke="{escape(each.color)}" '
             f'd="{_path(columns[chosen], heights[chosen])}"/>'
         )
         if len(x) <= DOTS_MAX:
             parts += [
-                f'<circle cx="{column:.1f}" cy="{row:.1f}" r="2.4" fill="{escape(each.colour)}">'
+                f'<circle cx="{column:.1f}" cy="{row:.1f}" r="2.4" fill="{escape(each.color)}">'
                 f"<title>{escape(each.name)}: {value:.3g} at {place:.4g}</title></circle>"
                 for column, row, value, place in zip(columns, heights, each.values, x, strict=True)
                 if np.isfinite(value)
@@ -138,7 +138,7 @@ def lane_chart(
     x: FloatArray,
     states: IntArray,
     names: Sequence[str],
-    colours: Sequence[Mapping[str, str]],
+    colors: Sequence[Mapping[str, str]],
     *,
     title: str,
     x_label: str,
@@ -152,12 +152,12 @@ def lane_chart(
     x : (N,) float
         Where the maps stand, ascending.
     states : (R, N) int
-        State of each room at each map, which lasts until the next map: its place in `colours`, from 1 on; 0
+        State of each room at each map, which lasts until the next map: its place in `colors`, from 1 on; 0
         where the room is not there.
     names : sequence of R str
         Of the rooms.
-    colours : sequence of R mappings
-        For each room, the colour of each state by the state's name.
+    colors : sequence of R mappings
+        For each room, the color of each state by the state's name.
     title, x_label, marks, x_range
         As of `line_chart`.
     """
@@ -165,7 +165,7 @@ def lane_chart(
     height = TOP + BOTTOM + LANE * len(names)
     parts = [*_frame(x_axis, None, (), x_label, height), *_marks(marks, x_axis, height)]
     ends = np.append(x[1:], x_axis.high)
-    for lane, (name, colour) in enumerate(zip(names, colours, strict=True)):
+    for lane, (name, color) in enumerate(zip(names, colors, strict=True)):
         y = TOP + LANE * lane
         parts.append(
             f'<text class="lane" x="{LEFT - 5:.0f}" y="{y + 0.8 * LANE:.1f}" text-anchor="end">'
@@ -175,7 +175,7 @@ def lane_chart(
         for first, stop in pairwise(edges):
             if not states[lane, first]:
                 continue
-            state, tint = list(colour.items())[states[lane, first] - 1]
+            state, tint = list(color.items())[states[lane, first] - 1]
             left, right = (_column(value, x_axis) for value in (x[first], ends[stop - 1]))
             parts.append(
                 f'<rect x="{left:.1f}" y="{y + 1:.1f}" width="{max(right - left, 1.5):.1f}" '
@@ -215,7 +215,7 @@ def share_lanes(
 
 def _share_lane(columns: FloatArray, lane: ShareLane, top: float, bottom: float) -> list[str]:
     """Name, tint from the first share on, the shares as steps, and the line across."""
-    fill = escape(lane.colour)
+    fill = escape(lane.color)
     parts = [f'<text x="{LEFT - 5:.0f}" y="{bottom - 2:.1f}" text-anchor="end">{escape(lane.name)}</text>']
     seen = np.flatnonzero(lane.shares > 0)
     if len(seen):

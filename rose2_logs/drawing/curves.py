@@ -15,7 +15,7 @@ from rose2_logs.evaluation.along import RunPoint
 from rose2_logs.model.occupancy import FloatArray
 
 Image = NDArray[np.uint8]
-Colour = tuple[int, int, int]
+Color = tuple[int, int, int]
 
 WIDTH_PX, HEIGHT_PX = 900, 360
 LEFT_PX, RIGHT_PX, TOP_PX, BOTTOM_PX = 60, 190, 40, 50
@@ -24,7 +24,7 @@ TEXT_PX, LINE_PX, DOT_PX = 14, 2, 3
 SMOOTHING = 2
 """Drawn so many times as large and then reduced: lines without steps."""
 PAPER, INK, GRID = (255, 255, 255), (0, 0, 0), (225, 225, 225)
-LINE_COLOURS: tuple[Colour, ...] = (
+LINE_COLORS: tuple[Color, ...] = (
     (31, 119, 180),
     (214, 39, 40),
     (44, 160, 44),
@@ -128,13 +128,13 @@ def draw_curves(
     draw.text((left, upper / 2), title, INK, ImageFont.load_default((TEXT_PX + 3) * s), anchor="lm")
     draw.text(((left + right) / 2, (HEIGHT_PX - TEXT_PX) * s), x_label, INK, font, anchor="mm")
     for number, curve in enumerate(curves):
-        colour = LINE_COLOURS[number % len(LINE_COLOURS)]
+        color = LINE_COLORS[number % len(LINE_COLORS)]
         pixels = [to_pixels(x, y) for x, y in zip(curve.x.tolist(), curve.y.tolist(), strict=True)]
         if curve.is_joined:
-            draw.line(pixels, colour, LINE_PX * s, joint="curve")
+            draw.line(pixels, color, LINE_PX * s, joint="curve")
         for x, y in pixels:
-            draw.ellipse((x - DOT_PX * s, y - DOT_PX * s, x + DOT_PX * s, y + DOT_PX * s), colour)
+            draw.ellipse((x - DOT_PX * s, y - DOT_PX * s, x + DOT_PX * s, y + DOT_PX * s), color)
         beside = upper + (number + 0.5) * 1.6 * TEXT_PX * s
-        draw.line((right + 10 * s, beside, right + 34 * s, beside), colour, LINE_PX * s)
+        draw.line((right + 10 * s, beside, right + 34 * s, beside), color, LINE_PX * s)
         draw.text((right + 42 * s, beside), curve.name, INK, font, anchor="lm")
     return np.asarray(image.reduce(s))

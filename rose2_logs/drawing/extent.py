@@ -15,16 +15,16 @@ class Extent:
     Attributes
     ----------
     low_m, high_m : (2,) float
-        Its corners in world metres; those of the first map while there has been no room.
+        Its corners in world meters; those of the first map while there has been no room.
     """
 
     def __init__(self) -> None:
         self.low_m, self.high_m = np.full(2, np.inf), np.full(2, -np.inf)
         self._has_rooms = False
 
-    def add(self, frame: TrackedSnapshot) -> None:
+    def add(self, step: TrackedSnapshot) -> None:
         """Take one map."""
-        shapes = [shape for shape in frame.analysis.rooms.polygons if not shape.is_empty]
+        shapes = [shape for shape in step.analysis.rooms.polygons if not shape.is_empty]
         has_rooms = len(shapes) > 0
         if has_rooms and not self._has_rooms:
             self._has_rooms = True
@@ -32,7 +32,7 @@ class Extent:
         if has_rooms:
             self._grow(shapely.total_bounds(shapes).reshape(2, 2))
         elif not self._has_rooms:
-            self._grow(frame.analysis.geometry.corners_m())
+            self._grow(step.analysis.geometry.corners_m())
 
     def _grow(self, points_m: FloatArray) -> None:
         self.low_m = np.minimum(self.low_m, points_m.min(axis=0))

@@ -16,28 +16,28 @@ from rose2_logs.model.occupancy import UNKNOWN, BoolArray, FloatArray, GridGeome
 from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot
 
 HATCH_STEP_M = 0.4
-"""Distance of the lines along a row of cells: told from a fill, and a niche of a metre gets some."""
+"""Distance of the lines along a row of cells: told from a fill, and a niche of a meter gets some."""
 HATCH_MIN_M = 0.3
 """Shorter lines are left out: gaps between rays and the inside of walls and chairs."""
 
 
-def hatch_unseen(frame: TrackedSnapshot) -> tuple[FloatArray, NDArray[np.intp]]:
+def hatch_unseen(step: TrackedSnapshot) -> tuple[FloatArray, NDArray[np.intp]]:
     """Hatch what the rooms' shapes hold of unknown cells.
 
-    The lines lie on the diagonals of the grid, so those of neighbouring rooms go on in one another.
+    The lines lie on the diagonals of the grid, so those of neighboring rooms go on in one another.
 
     Returns
     -------
     lines_m : (N, 4) float
-        x0, y0, x1, y1, world metres.
+        x0, y0, x1, y1, world meters.
     room : (N,) int
         Index of the room of each.
     """
-    geometry = frame.analysis.geometry
+    geometry = step.analysis.geometry
     period = max(2, round(HATCH_STEP_M / geometry.resolution_m))
     shortest = HATCH_MIN_M / np.sqrt(2) / geometry.resolution_m
-    shapes = cells_within(frame.analysis.rooms.polygons, geometry)
-    hatched = _to_hatch(frame.snapshot.cells, shapes, period)
+    shapes = cells_within(step.analysis.rooms.polygons, geometry)
+    hatched = _to_hatch(step.snapshot.cells, shapes, period)
     # Cells of all rooms together, each room's moved so far along the rows that no line reaches the next.
     apart = hatched.cells.shape[0] + hatched.cells.shape[1]
     rows, columns = [np.zeros(0, np.intp)], [np.zeros(0, np.intp)]
@@ -51,7 +51,7 @@ def hatch_unseen(frame: TrackedSnapshot) -> tuple[FloatArray, NDArray[np.intp]]:
     is_long = last[:, 0] - first[:, 0] >= shortest
     ends = np.stack([first[is_long], last[is_long]], axis=1)
     rooms, column = np.divmod(ends[..., 1], apart)
-    lines = geometry.cell_centres(ends[..., 0] + hatched.corner[0], column + hatched.corner[1])
+    lines = geometry.cell_centers(ends[..., 0] + hatched.corner[0], column + hatched.corner[1])
     return lines.reshape(-1, 4), rooms[:, 0]
 
 

@@ -1,4 +1,4 @@
-"""Label images: rooms as the grey values of a PNG."""
+"""Label images: rooms as the gray values of a PNG."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ MAX_8_BIT, MAX_16_BIT = 255, 65535
 
 
 def write_label_image(path: Path, labels: NDArray[np.integer]) -> None:
-    """Write labels as a grey PNG of 8 bit, or of 16 bit where there are more than 255.
+    """Write labels as a gray PNG of 8 bit, or of 16 bit where there are more than 255.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def write_label_image(path: Path, labels: NDArray[np.integer]) -> None:
 
 
 def write_image(path: Path, pixels: NDArray[np.uint8] | NDArray[np.uint16]) -> None:
-    """Write grey (H, W) or RGB (H, W, 3) pixels as a PNG, beside its final name and then renamed.
+    """Write gray (H, W) or RGB (H, W, 3) pixels as a PNG, beside its final name and then renamed.
 
     Raises
     ------

@@ -15,7 +15,7 @@ from shapely.geometry.base import BaseGeometry
 from rose2_logs.comparison.room_changes import RoomStatus
 from rose2_logs.comparison.wall_changes import WallStatus
 from rose2_logs.drawing.case_picture import text_line
-from rose2_logs.drawing.palette import track_colour
+from rose2_logs.drawing.palette import track_color
 from rose2_logs.model.labels import known_window
 from rose2_logs.model.occupancy import UNKNOWN, FloatArray, GridGeometry
 from rose2_logs.tracking.matching import resample_labels
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from rose2_logs.comparison.layouts import LayoutComparison
 
 Image = NDArray[np.uint8]
-Colour = tuple[int, int, int]
+Color = tuple[int, int, int]
 
 SIDE_PX = 1000
 """Longer side of the panel of what differs; the layouts are drawn half as large."""
@@ -37,14 +37,14 @@ WIDE = 1.6
 ROOM_OPACITY = 0.6
 STRIPE_PX, STRIPE_EVERY_PX = 3, 12
 LINE_PX = 5
-PAPER, INK, UNKNOWN_COLOUR, OUTLINE, FAINT = (
+PAPER, INK, UNKNOWN_COLOR, OUTLINE, FAINT = (
     (255, 255, 255),
     (0, 0, 0),
     (225, 225, 225),
     (70, 70, 70),
     (150, 150, 150),
 )
-ROOM_COLOURS: dict[RoomStatus, Colour] = {
+ROOM_COLORS: dict[RoomStatus, Color] = {
     "same": (200, 228, 200),
     "partly seen": (224, 236, 200),
     "changed": (250, 214, 120),
@@ -55,7 +55,7 @@ ROOM_COLOURS: dict[RoomStatus, Colour] = {
     "new": (140, 186, 244),
     "unseen": (238, 238, 238),
 }
-WALL_COLOURS: dict[WallStatus, Colour] = {
+WALL_COLORS: dict[WallStatus, Color] = {
     "missing": (205, 25, 25),
     "new": (20, 80, 215),
     "moved": (225, 120, 0),
@@ -68,7 +68,7 @@ def draw_layout_comparison(comparison: LayoutComparison) -> Image:
     Returns
     -------
     (H, W, 3) uint8
-        RGB, row 0 at the top as in the world. Rooms that belong together have one colour in A and B.
+        RGB, row 0 at the top as in the world. Rooms that belong together have one color in A and B.
     """
     b_to_a = comparison.placement.motion
     large, small = _Canvas(comparison, SIDE_PX), _Canvas(comparison, (SIDE_PX - GAP_PX) // 2)
@@ -126,14 +126,14 @@ class _Canvas:
     def layout(
         self, layout: FinalLayout, motion: RigidMotion, tracks_of: Literal["tracks_a", "tracks_b"]
     ) -> Image:
-        """Draw a layout with its rooms in the colours of what they belong to, with their numbers."""
+        """Draw a layout with its rooms in the colors of what they belong to, with their numbers."""
         image = self._map(layout, motion)
         groups = [getattr(change, tracks_of) for change in self._changes]
         group_of = {track: number for number, tracks in enumerate(groups, start=1) for track in tracks}
         named = sorted(zip(layout.tracks, layout.shapes_moved(motion), strict=True), key=lambda each: each[0])
         for track, shape in named:
-            self._fill(image, shape, track_colour(group_of[track]))
-        return self._labelled(image, ((str(track), shape) for track, shape in named))
+            self._fill(image, shape, track_color(group_of[track]))
+        return self._labeled(image, ((str(track), shape) for track, shape in named))
 
     def differences(self, comparison: LayoutComparison) -> Image:
         """Draw what became of rooms and walls."""
@@ -147,7 +147,7 @@ class _Canvas:
             image[self._resampled(layout.map.occupied.astype(np.int32), layout, motion) > 0] = FAINT
         for change in comparison.rooms:
             whole = shapely.union(change.shape_a, change.shape_b)
-            self._fill(image, whole, ROOM_COLOURS[change.status], striped=change.status == "unseen")
+            self._fill(image, whole, ROOM_COLORS[change.status], striped=change.status == "unseen")
         for change in comparison.rooms:
             for shape in (change.shape_a, change.shape_b):
                 cv2.polylines(image, self._rings(shape), True, OUTLINE, 1, cv2.LINE_AA)
@@ -157,8 +157,8 @@ class _Canvas:
                     # Where a moved wall was is drawn thin.
                     width = thickness if wall.status == "moved" else LINE_PX
                     points = self._pixels(ends.reshape(2, 2))
-                    cv2.polylines(image, [points], False, WALL_COLOURS[wall.status], width, cv2.LINE_AA)
-        return self._labelled(
+                    cv2.polylines(image, [points], False, WALL_COLORS[wall.status], width, cv2.LINE_AA)
+        return self._labeled(
             image,
             (
                 (_pair_name(change.tracks_a, change.tracks_b), shapely.union(change.shape_a, change.shape_b))
@@ -169,8 +169,8 @@ class _Canvas:
 
     def _map(self, layout: FinalLayout, motion: RigidMotion) -> Image:
         cells = self._resampled(layout.map.snapshot.cells.astype(np.int32) - UNKNOWN, layout, motion)
-        grey = 255 - (cells - 1).clip(0) * 2.55
-        return np.where((cells == 0)[..., None], UNKNOWN_COLOUR, grey[..., None]).astype(np.uint8)
+        gray = 255 - (cells - 1).clip(0) * 2.55
+        return np.where((cells == 0)[..., None], UNKNOWN_COLOR, gray[..., None]).astype(np.uint8)
 
     def _resampled(
         self, labels: NDArray[np.int32], layout: FinalLayout, motion: RigidMotion
@@ -187,7 +187,7 @@ class _Canvas:
         areal = parts[shapely.get_type_id(parts) == shapely.GeometryType.POLYGON]
         return [self._pixels(shapely.get_coordinates(ring)) for ring in shapely.get_rings(areal)]
 
-    def _fill(self, image: Image, shape: BaseGeometry, colour: Colour, striped: bool = False) -> None:
+    def _fill(self, image: Image, shape: BaseGeometry, color: Color, striped: bool = False) -> None:
         """Fill a shape so that what lies below shows through, and draw its outline."""
         import cv2
 
@@ -201,11 +201,11 @@ class _Canvas:
             rows, columns = np.indices(mask.shape)
             image[inside & ((rows + columns) % STRIPE_EVERY_PX < STRIPE_PX)] = FAINT
         else:
-            blend = ROOM_OPACITY * np.array(colour) + (1 - ROOM_OPACITY) * image[inside]
+            blend = ROOM_OPACITY * np.array(color) + (1 - ROOM_OPACITY) * image[inside]
             image[inside] = blend.astype(np.uint8)
         cv2.polylines(image, rings, True, OUTLINE, 1, cv2.LINE_AA)
 
-    def _labelled(self, image: Image, labels: Iterable[tuple[str, BaseGeometry]]) -> Image:
+    def _labeled(self, image: Image, labels: Iterable[tuple[str, BaseGeometry]]) -> Image:
         picture = PillowImage.fromarray(image)
         draw, font = ImageDraw.Draw(picture), ImageFont.load_default(NUMBER_PX)
         for text, shape in labels:
@@ -228,18 +228,18 @@ def _known_corners(layout: FinalLayout) -> FloatArray:
 
 
 def _legend(comparison: LayoutComparison, width: int) -> Image:
-    """Draw what the colours mean, of the statuses that occur."""
+    """Draw what the colors mean, of the statuses that occur."""
     font = ImageFont.load_default(TEXT_PX)
     counts = comparison.room_counts
-    boxes: list[tuple[Colour, str, bool]] = [
-        (ROOM_COLOURS[status], f"{status}: {counts[status]}", False)
-        for status in ROOM_COLOURS
+    boxes: list[tuple[Color, str, bool]] = [
+        (ROOM_COLORS[status], f"{status}: {counts[status]}", False)
+        for status in ROOM_COLORS
         if status in counts
     ]
     lengths = {} if comparison.walls is None else comparison.walls.lengths_m
     boxes += [
-        (WALL_COLOURS[status], f"wall {status}: {lengths[status]:.1f} m", True)
-        for status in WALL_COLOURS
+        (WALL_COLORS[status], f"wall {status}: {lengths[status]:.1f} m", True)
+        for status in WALL_COLORS
         if status in lengths
     ]
     places, line, left = [], 0, GAP_PX
@@ -251,11 +251,11 @@ def _legend(comparison: LayoutComparison, width: int) -> Image:
         left += needed
     image = PillowImage.new("RGB", (width, (line + 1) * (TEXT_PX + GAP_PX) + GAP_PX), PAPER)
     draw = ImageDraw.Draw(image)
-    for (colour, text, is_line), (x, y) in zip(boxes, places, strict=True):
+    for (color, text, is_line), (x, y) in zip(boxes, places, strict=True):
         middle = y + TEXT_PX // 2
         if is_line:
-            draw.line((x, middle, x + TEXT_PX, middle), colour, LINE_PX)
+            draw.line((x, middle, x + TEXT_PX, middle), color, LINE_PX)
         else:
-            draw.rectangle((x, y, x + TEXT_PX, y + TEXT_PX), colour, INK)
+            draw.rectangle((x, y, x + TEXT_PX, y + TEXT_PX), color, INK)
         draw.text((x + TEXT_PX + GAP_PX // 2, middle), text, INK, font, anchor="lm")
     return np.asarray(image)

@@ -1,23 +1,23 @@
-"""Colours of tracks: readable, well apart for neighbouring numbers, the same in every output."""
+"""Colors of tracks: readable, well apart for neighboring numbers, the same in every output."""
 
 from __future__ import annotations
 
 import colorsys
 
 GOLDEN_RATIO = 0.618033988749895
-"""Steps of the hue by this share of the circle keep any number of successive colours well apart."""
+"""Steps of the hue by this share of the circle keep any number of successive colors well apart."""
 FIRST_HUE = 0.58
 SATURATIONS = (0.62, 0.45, 0.75)
 VALUES = (0.90, 0.98, 0.78)
 
 FORMING, SHAPED, SETTLED = "forming", "shape right", "settled"
 STATE_TINTS = {FORMING: 0.3, SHAPED: 0.65, SETTLED: 1.0}
-"""States of a room's life, and the share of its colour, on white, that each is shown with."""
+"""States of a room's history, and the share of its color, on white, that each is shown with."""
 
 
-def state_colours(track: int) -> dict[str, tuple[int, int, int]]:
-    """Colours of a track while its room forms, once its shape was right, and once its area has settled."""
-    red, green, blue = track_colour(track)
+def state_colors(track: int) -> dict[str, tuple[int, int, int]]:
+    """Colors of a track while its room forms, once its shape was right, and once its area has settled."""
+    red, green, blue = track_color(track)
     return {
         state: (
             round(255 - (255 - red) * tint),
@@ -28,7 +28,7 @@ def state_colours(track: int) -> dict[str, tuple[int, int, int]]:
     }
 
 
-def track_colour(track: int) -> tuple[int, int, int]:
+def track_color(track: int) -> tuple[int, int, int]:
     """Red, green, blue in 0..255 of a track; it depends on the track's number alone."""
     hue = (FIRST_HUE + track * GOLDEN_RATIO) % 1.0
     kind = (track // 5) % len(SATURATIONS)

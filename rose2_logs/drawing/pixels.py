@@ -40,11 +40,11 @@ def as_pixels(drawing: Drawing, width_px: int) -> NDArray[np.uint8]:
                 _picture(image, shape, scale)
             case Area():
                 _area(image, shape, scale)
-            case Lines(geometry, colour, width):
+            case Lines(geometry, color, width):
                 for line in _lines(geometry):
                     draw.line(
                         [(x, y) for x, y in (line * scale).tolist()],
-                        colour,
+                        color,
                         max(1, round(width * scale)),
                         "curve",
                     )
@@ -107,16 +107,16 @@ def _text(draw: ImageDraw.ImageDraw, text: Text, scale: float) -> None:
     runs = [(part, size * share, rise * size) for part, share, rise in _runs(text.text)]
     fonts = [ImageFont.load_default(height) for _, height, _ in runs]
     x = text.x * scale
-    if text.is_centred:
+    if text.is_centered:
         x -= sum(font.getlength(part) for (part, _, _), font in zip(runs, fonts, strict=True)) / 2
     bold = round(BOLD_SHARE * size) if text.is_bold else 0
-    for colour, rim in (((255, 255, 255), round(text.rim * scale)), (text.colour, 0)):
-        if rim == 0 and colour != text.colour:
+    for color, rim in (((255, 255, 255), round(text.rim * scale)), (text.color, 0)):
+        if rim == 0 and color != text.color:
             continue
         place = x
         for (part, _, rise), font in zip(runs, fonts, strict=True):
             where = (place, text.y * scale - rise)
-            draw.text(where, part, colour, font, "lm", stroke_width=rim + bold, stroke_fill=colour)
+            draw.text(where, part, color, font, "lm", stroke_width=rim + bold, stroke_fill=color)
             place += font.getlength(part)
 
 

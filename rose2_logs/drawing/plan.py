@@ -1,4 +1,4 @@
-"""A floor plan drawn: the map in grey, rooms in the colour of their tracks, what was not seen hatched."""
+"""A floor plan drawn: the map in gray, rooms in the color of their tracks, what was not seen hatched."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from rose2_logs.drawing.palette import track_colour
-from rose2_logs.drawing.shapes import Area, Colour, Drawing, Lines, Picture, Text, hatching
+from rose2_logs.drawing.palette import track_color
+from rose2_logs.drawing.shapes import Area, Color, Drawing, Lines, Picture, Text, hatching
 from rose2_logs.model.labels import distinct_labels
 from rose2_logs.model.room_plan import PlanMap, PlanRoom, RoomPlan, predicted_parts
 from rose2_logs.model.room_quality import UNSURE_SIGN, unsure_sign
 from rose2_logs.system.text import percent
 
-UNKNOWN_GREY, FREE_GREY, OCCUPIED_GREY = 232, 255, 25
+UNKNOWN_GRAY, FREE_GRAY, OCCUPIED_GRAY = 232, 255, 25
 SEEN_OPACITY, PREDICTED_OPACITY, SHAPE_OPACITY = 0.55, 0.22, 0.5
-"""Of the colour on seen cells, on unseen parts, and on whole shapes where there is no map."""
+"""Of the color on seen cells, on unseen parts, and on whole shapes where there is no map."""
 OUTLINE_DARKER, HATCH_DARKER = 0.6, 0.8
-"""Shares of the brightness of a room's colour."""
-DOORWAY_COLOUR: Colour = (205, 45, 20)
-LABEL_GREY: Colour = (25, 25, 25)
+"""Shares of the brightness of a room's color."""
+DOORWAY_COLOR: Color = (205, 45, 20)
+LABEL_GRAY: Color = (25, 25, 25)
 MARGIN_M = 0.5
 TALLEST = 1.3
 """A plan is at most so many times as high as wide; a higher one is drawn narrower."""
@@ -98,32 +98,32 @@ def draw_plan(plan: RoomPlan, style: PlanStyle = FIGURE, bounds_m: Bounds | None
     strip = 3 * style.font if style.has_legend else 0.0
     drawing = Drawing(style.width, height + strip, plan.title)
 
-    # From world metres to the page.
+    # From world meters to the page.
     matrix = np.array([[scale, 0.0, left - x0 * scale], [0.0, -scale, y1 * scale]])
 
     def on_page(shape: BaseGeometry) -> BaseGeometry:
         return shapely.transform(shape, lambda xy: xy @ matrix[:, :2].T + matrix[:, 2])
 
     if plan.map is not None:
-        drawing.add(Area(shapely.box(0, 0, style.width, height), (UNKNOWN_GREY,) * 3))
+        drawing.add(Area(shapely.box(0, 0, style.width, height), (UNKNOWN_GRAY,) * 3))
         drawing.add(_picture(plan.map.cropped(), matrix, style.picture_most_px))
     shapes = {room.number: _simpler(on_page(room.shape), style.detail) for room in plan.rooms}
     predicted = predicted_parts(plan)
     # Names stand on what was seen.
     seen = dict(shapes)
     for room in plan.rooms:
-        shape, colour = shapes[room.number], track_colour(room.number)
+        shape, color = shapes[room.number], track_color(room.number)
         if plan.map is None:
-            drawing.add(Area(shape, colour, SHAPE_OPACITY, _told(room)))
+            drawing.add(Area(shape, color, SHAPE_OPACITY, _told(room)))
         elif room.number in predicted:
             part = _simpler(on_page(predicted[room.number]), style.detail)
             seen[room.number] = shape.difference(part)
-            lines = Lines(hatching(part, style.hatch_gap), _darker(colour, HATCH_DARKER), 0.7 * style.line)
-            drawing.add(Area(part, colour, PREDICTED_OPACITY), lines)
+            lines = Lines(hatching(part, style.hatch_gap), _darker(color, HATCH_DARKER), 0.7 * style.line)
+            drawing.add(Area(part, color, PREDICTED_OPACITY), lines)
     for number, shape in shapes.items():
-        drawing.add(Lines(shape, _darker(track_colour(number)), style.line))
+        drawing.add(Lines(shape, _darker(track_color(number)), style.line))
     doors = on_page(shapely.MultiLineString([door.ends_m for door in plan.doorways]))
-    drawing.add(Lines(doors, (255, 255, 255), 4 * style.line), Lines(doors, DOORWAY_COLOUR, 2.4 * style.line))
+    drawing.add(Lines(doors, (255, 255, 255), 4 * style.line), Lines(doors, DOORWAY_COLOR, 2.4 * style.line))
     if plan.map is not None and style.tells:
         # Nothing to be seen, but pointed at they tell what they are.
         white = (255, 255, 255)
@@ -152,7 +152,9 @@ def _simpler(shape: BaseGeometry, detail: float) -> BaseGeometry:
 
 
 def _told(room: PlanRoom) -> str:
-    sure = "" if room.confidence is None else f", {percent(room.confidence)} of its outline backed by walls"
+    sure = (
+        "" if room.wall_support is None else f", {percent(room.wall_support)} of its outline backed by walls"
+    )
     return f"{room.name}: {room.area_m2:.1f} m² seen of {room.predicted_area_m2:.1f} m²{sure}"
 
 
@@ -161,14 +163,14 @@ def _picture(below: PlanMap, to_page: NDArray[np.float64], most_px: int) -> Pict
     import cv2
 
     cells, labels = below.cells, below.labels
-    # The colour of each value of a cell, one row for each room after that of none.
+    # The color of each value of a cell, one row for each room after that of none.
     values = np.arange(2**8)
-    grey = np.interp(values, (0, 100), (FREE_GREY, OCCUPIED_GREY))
-    grey[values > 100] = UNKNOWN_GREY
+    gray = np.interp(values, (0, 100), (FREE_GRAY, OCCUPIED_GRAY))
+    gray[values > 100] = UNKNOWN_GRAY
     numbers = [number for number in distinct_labels(labels)[0].tolist() if number > 0]
-    tints = np.array([track_colour(number) for number in numbers], float).reshape(-1, 1, 3)
-    tinted = (1 - SEEN_OPACITY) * grey[:, None] + SEEN_OPACITY * tints
-    table = np.concatenate([np.repeat(grey[:, None], 3, axis=1)[None], tinted])
+    tints = np.array([track_color(number) for number in numbers], float).reshape(-1, 1, 3)
+    tinted = (1 - SEEN_OPACITY) * gray[:, None] + SEEN_OPACITY * tints
+    table = np.concatenate([np.repeat(gray[:, None], 3, axis=1)[None], tinted])
     row = np.zeros(max([0, *numbers]) + 1, np.uint16)
     row[numbers] = np.arange(1, len(numbers) + 1)
     pixels = np.round(table).astype(np.uint8)[row[labels], cells.view(np.uint8)]
@@ -178,8 +180,8 @@ def _picture(below: PlanMap, to_page: NDArray[np.float64], most_px: int) -> Pict
     if block > 1:
         pixels = np.asarray(cv2.resize(pixels, size, interpolation=cv2.INTER_AREA), np.uint8)
     geometry = below.geometry
-    metres = np.array([width / size[0], height / size[1]]) * geometry.resolution_m
-    to_world = np.column_stack([geometry.rotation * metres, geometry.origin_xy_m])
+    meters = np.array([width / size[0], height / size[1]]) * geometry.resolution_m
+    to_world = np.column_stack([geometry.rotation * meters, geometry.origin_xy_m])
     linear = to_page[:, :2] @ to_world
     linear[:, 2] += to_page[:, 2]
     return Picture(pixels, linear)
@@ -193,7 +195,7 @@ def _label(room: PlanRoom, shape: BaseGeometry, style: PlanStyle) -> list[Text]:
     (x, y), radius = shapely.get_coordinates(circle)[0].tolist(), float(shapely.length(circle))
     area = f"{room.area_m2:.0f} m²" if room.area_m2 >= 10 else f"{room.area_m2:.1f} m²"
     font, rim = style.font, 0.14 * style.font
-    sign = unsure_sign(room.confidence)
+    sign = unsure_sign(room.wall_support)
     number, name = f"{room.number}{sign}", f"{room.name}{sign}"
     if not style.has_names:
         return [Text(number, x, y, font, is_bold=True, rim=rim)]
@@ -223,11 +225,11 @@ def _legend(
     x, x1 = font, font + length_m * scale
     tick = 0.35 * font
     bar = [[(x, y), (x1, y)], [(x, y - tick), (x, y + tick)], [(x1, y - tick), (x1, y + tick)]]
-    shapes.append(Lines(shapely.MultiLineString(bar), LABEL_GREY, 1.3 * line))
-    shapes.append(Text(f"{length_m:g} m", x1 + 0.6 * font, y, font, is_centred=False))
+    shapes.append(Lines(shapely.MultiLineString(bar), LABEL_GRAY, 1.3 * line))
+    shapes.append(Text(f"{length_m:g} m", x1 + 0.6 * font, y, font, is_centered=False))
     x = x1 + 0.6 * font + 6 * LETTER_EM * font
     example = plan.rooms[0].number if plan.rooms else 1
-    colour = track_colour(example)
+    color = track_color(example)
     signs: list[tuple[str, str]] = [("room", "room, seen" if plan.map is not None else "room")]
     signs += [("predicted", "predicted, unseen")] if has_predicted else []
     signs += [("doorway", "doorway")] if plan.doorways else []
@@ -235,24 +237,22 @@ def _legend(
     for sign, text in signs:
         box = shapely.box(x, y - 0.5 * font, x + 1.8 * font, y + 0.5 * font)
         if sign == "doorway":
-            shapes.append(
-                Lines(shapely.LineString([(x, y), (x + 1.8 * font, y)]), DOORWAY_COLOUR, 2.4 * line)
-            )
+            shapes.append(Lines(shapely.LineString([(x, y), (x + 1.8 * font, y)]), DOORWAY_COLOR, 2.4 * line))
         elif sign == "unsure":
             shapes.append(Text(f"7{UNSURE_SIGN}", x + 0.9 * font, y, font, is_bold=True))
         elif sign == "predicted":
             shapes += [
-                Area(box, colour, PREDICTED_OPACITY),
-                Lines(hatching(box, style.hatch_gap), _darker(colour, HATCH_DARKER), 0.7 * line),
-                Lines(box, _darker(colour), line),
+                Area(box, color, PREDICTED_OPACITY),
+                Lines(hatching(box, style.hatch_gap), _darker(color, HATCH_DARKER), 0.7 * line),
+                Lines(box, _darker(color), line),
             ]
         else:
-            shapes += [Area(box, colour, SEEN_OPACITY), Lines(box, _darker(colour), line)]
-        shapes.append(Text(text, x + 2.3 * font, y, font, is_centred=False))
+            shapes += [Area(box, color, SEEN_OPACITY), Lines(box, _darker(color), line)]
+        shapes.append(Text(text, x + 2.3 * font, y, font, is_centered=False))
         x += 2.3 * font + (len(text) + 2.5) * LETTER_EM * font
     return shapes
 
 
-def _darker(colour: Colour, share: float = OUTLINE_DARKER) -> Colour:
-    red, green, blue = (round(value * share) for value in colour)
+def _darker(color: Color, share: float = OUTLINE_DARKER) -> Color:
+    red, green, blue = (round(value * share) for value in color)
     return red, green, blue

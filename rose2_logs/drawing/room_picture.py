@@ -21,12 +21,12 @@ GOLDEN_RATIO = 0.618034
 WIDE = 1.5
 """Width over height from which a map is drawn above its rooms and not beside them."""
 MARGIN_CELLS = 10
-UNKNOWN_GREY, FREE_GREY, OCCUPIED_GREY = 205, 254, 0
-WALL_COLOUR, OUTLINE_COLOUR, DOOR_COLOUR = (200, 30, 30), (40, 40, 40), (20, 120, 220)
+UNKNOWN_GRAY, FREE_GRAY, OCCUPIED_GRAY = 205, 254, 0
+WALL_COLOR, OUTLINE_COLOR, DOOR_COLOR = (200, 30, 30), (40, 40, 40), (20, 120, 220)
 
 
-def room_colours(count: int) -> NDArray[np.uint8]:
-    """Colours (count, 3) RGB, far apart for neighbouring numbers, the same for each call."""
+def room_colors(count: int) -> NDArray[np.uint8]:
+    """Colors (count, 3) RGB, far apart for neighboring numbers, the same for each call."""
     hues = [(number * GOLDEN_RATIO) % 1.0 for number in range(1, count + 1)]
     rgb = [colorsys.hsv_to_rgb(hue, 0.6, 0.95) for hue in hues]
     return np.array(np.round(np.reshape(rgb, (-1, 3)) * 255.0), np.uint8)
@@ -46,12 +46,12 @@ def draw_rooms(snapshot: OccupancySnapshot, analysis: SnapshotAnalysis) -> Image
     rooms = analysis.rooms
     known = (snapshot.cells >= 0) | (rooms.labels > 0)
     rows, columns = _window(known)
-    grey = np.where(snapshot.cells < 0, UNKNOWN_GREY, FREE_GREY - np.round(snapshot.cells * 2.54))
-    plain = np.repeat(grey[rows, columns].astype(np.uint8)[..., None], 3, axis=2)
+    gray = np.where(snapshot.cells < 0, UNKNOWN_GRAY, FREE_GRAY - np.round(snapshot.cells * 2.54))
+    plain = np.repeat(gray[rows, columns].astype(np.uint8)[..., None], 3, axis=2)
     labels = rooms.labels[rows, columns]
-    colours = np.concatenate([np.zeros((1, 3), np.uint8), room_colours(len(rooms))])
+    colors = np.concatenate([np.zeros((1, 3), np.uint8), room_colors(len(rooms))])
     filled = plain.copy()
-    blend = (1 - ROOM_OPACITY) * plain + ROOM_OPACITY * colours[labels]
+    blend = (1 - ROOM_OPACITY) * plain + ROOM_OPACITY * colors[labels]
     filled[labels > 0] = blend[labels > 0].astype(np.uint8)
 
     scale = max(1, int(np.ceil(SIDE_MIN_PX / max(labels.shape))))
@@ -67,12 +67,12 @@ def draw_rooms(snapshot: OccupancySnapshot, analysis: SnapshotAnalysis) -> Image
 
     for polygon in rooms.polygons:
         rings = [to_pixels(shapely.get_coordinates(ring)) for ring in shapely.get_rings(polygon)]
-        cv2.polylines(filled, rings, True, OUTLINE_COLOUR, 1, cv2.LINE_AA)
+        cv2.polylines(filled, rings, True, OUTLINE_COLOR, 1, cv2.LINE_AA)
     if analysis.walls is not None:
         lines = to_pixels(analysis.walls.segments_m.reshape(-1, 2)).reshape(-1, 2, 2)
-        cv2.polylines(filled, list(lines), False, WALL_COLOUR, 1, cv2.LINE_AA)
+        cv2.polylines(filled, list(lines), False, WALL_COLOR, 1, cv2.LINE_AA)
     for doorway in rooms.doorways:
-        cv2.polylines(filled, [to_pixels(doorway.ends_m)], False, DOOR_COLOUR, 3, cv2.LINE_AA)
+        cv2.polylines(filled, [to_pixels(doorway.ends_m)], False, DOOR_COLOR, 3, cv2.LINE_AA)
     for number, polygon in enumerate(rooms.polygons, start=1):
         if not polygon.is_empty:
             _write_number(filled, str(number), polygon.representative_point().coords[0], to_pixels)
@@ -94,8 +94,8 @@ def _write_number(
     x, y = to_pixels(np.array([place_m[:2]]))[0].tolist()
     (width, height), _ = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, 0.5, 1)
     where = (x - width // 2, y + height // 2)
-    for colour, thickness in (((255, 255, 255), 3), ((0, 0, 0), 1)):
-        cv2.putText(image, text, where, cv2.FONT_HERSHEY_SIMPLEX, 0.5, colour, thickness, cv2.LINE_AA)
+    for color, thickness in (((255, 255, 255), 3), ((0, 0, 0), 1)):
+        cv2.putText(image, text, where, cv2.FONT_HERSHEY_SIMPLEX, 0.5, color, thickness, cv2.LINE_AA)
 
 
 def _window(known: NDArray[np.bool_]) -> tuple[slice, slice]:

@@ -11,7 +11,7 @@ from shapely.geometry.base import BaseGeometry
 
 from rose2_logs.model.occupancy import FloatArray
 
-Colour = tuple[int, int, int]
+Color = tuple[int, int, int]
 """Red, green, blue in 0..255."""
 
 
@@ -39,7 +39,7 @@ class Area:
     ----------
     shape : shapely geometry
         On the page.
-    fill : Colour
+    fill : Color
     opacity : float
         In [0, 1].
     title : str
@@ -47,7 +47,7 @@ class Area:
     """
 
     shape: BaseGeometry
-    fill: Colour
+    fill: Color
     opacity: float = 1.0
     title: str = ""
 
@@ -60,13 +60,13 @@ class Lines:
     ----------
     shape : shapely geometry
         Lines, or polygons whose rings are drawn, on the page.
-    colour : Colour
+    color : Color
     width : float
         Units of the page.
     """
 
     shape: BaseGeometry
-    colour: Colour
+    color: Color
     width: float
 
 
@@ -81,8 +81,8 @@ class Text:
         Where its middle, or its left end, lies; y at the middle of its height.
     size : float
         Height of the font.
-    is_bold, is_centred : bool
-    colour : Colour
+    is_bold, is_centered : bool
+    color : Color
     rim : float
         Width of the rim, 0 for none.
     """
@@ -92,8 +92,8 @@ class Text:
     y: float
     size: float
     is_bold: bool = False
-    is_centred: bool = True
-    colour: Colour = (25, 25, 25)
+    is_centered: bool = True
+    color: Color = (25, 25, 25)
     rim: float = 0.0
 
 
@@ -110,14 +110,14 @@ class Drawing:
         Of the page, in its own units; y goes down.
     title : str
         What it shows, for those who cannot see it.
-    paper : Colour
+    paper : Color
     shapes : list of Shape
     """
 
     width: float
     height: float
     title: str = ""
-    paper: Colour = (255, 255, 255)
+    paper: Color = (255, 255, 255)
     shapes: list[Shape] = field(default_factory=list)
 
     def add(self, *shapes: Shape) -> None:

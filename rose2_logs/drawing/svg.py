@@ -12,11 +12,11 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from rose2_logs.drawing.shapes import Area, Colour, Drawing, Lines, Picture, Shape, Text
+from rose2_logs.drawing.shapes import Area, Color, Drawing, Lines, Picture, Shape, Text
 
 FONTS = "Helvetica, Arial, 'Liberation Sans', 'DejaVu Sans', sans-serif"
 DECIMALS = 2
-FEW_COLOURS = 128
+FEW_COLORS = 128
 MIDDLE_EM = 0.36
 """A text's baseline lies so far below the middle of its capitals: half their height in usual fonts."""
 
@@ -40,18 +40,18 @@ def as_svg(drawing: Drawing, *, is_inline: bool = False) -> str:
         f'aria-label={quoteattr(drawing.title)} font-family="{FONTS}">'
     )
     title = "" if is_inline else f"<title>{escape(drawing.title)}</title>"
-    paper = f'<rect width="{width}" height="{height}" fill="{_colour(drawing.paper)}"/>'
+    paper = f'<rect width="{width}" height="{height}" fill="{_color(drawing.paper)}"/>'
     body = "\n".join([head, title + paper, *(_element(shape) for shape in drawing.shapes), "</svg>"])
     return body if is_inline else f'<?xml version="1.0" encoding="UTF-8"?>\n{body}\n'
 
 
-def png_uri(pixels: NDArray[np.uint8], *, few_colours: bool = False) -> str:
-    """Return pixels (H, W, 3) as a PNG in a data URI, with few colours a third as large."""
+def png_uri(pixels: NDArray[np.uint8], *, few_colors: bool = False) -> str:
+    """Return pixels (H, W, 3) as a PNG in a data URI, with few colors a third as large."""
     from PIL import Image
 
     stream = io.BytesIO()
     image = Image.fromarray(pixels)
-    image = image.quantize(FEW_COLOURS, dither=Image.Dither.NONE) if few_colours else image
+    image = image.quantize(FEW_COLORS, dither=Image.Dither.NONE) if few_colors else image
     image.save(stream, format="PNG", optimize=True)
     return f"data:image/png;base64,{base64.b64encode(stream.getvalue()).decode()}"
 
@@ -68,10 +68,10 @@ def _element(shape: Shape) -> str:
         case Area(geometry, fill, opacity, title):
             inner = f"><title>{escape(title)}</title></path>" if title else "/>"
             shown = "" if opacity == 1 else f' fill-opacity="{opacity:g}"'
-            return f'<path d="{_path(geometry)}" fill="{_colour(fill)}"{shown} fill-rule="evenodd"{inner}'
-        case Lines(geometry, colour, thickness):
+            return f'<path d="{_path(geometry)}" fill="{_color(fill)}"{shown} fill-rule="evenodd"{inner}'
+        case Lines(geometry, color, thickness):
             return (
-                f'<path d="{_path(geometry)}" fill="none" stroke="{_colour(colour)}" '
+                f'<path d="{_path(geometry)}" fill="none" stroke="{_color(color)}" '
                 f'stroke-width="{_number(thickness)}" stroke-linejoin="round" stroke-linecap="butt"/>'
             )
         case Text():
@@ -86,8 +86,8 @@ def _text(text: Text) -> str:
     )
     return (
         f'<text x="{_number(text.x)}" y="{_number(text.y + MIDDLE_EM * text.size)}" '
-        f'font-size="{_number(text.size)}" fill="{_colour(text.colour)}"{rim}'
-        f"{' text-anchor=' + quoteattr('middle') if text.is_centred else ''}"
+        f'font-size="{_number(text.size)}" fill="{_color(text.color)}"{rim}'
+        f"{' text-anchor=' + quoteattr('middle') if text.is_centered else ''}"
         f"{' font-weight=' + quoteattr('bold') if text.is_bold else ''}>{escape(text.text)}</text>"
     )
 
@@ -123,5 +123,5 @@ def _number(value: float) -> str:
     return f"{round(value, DECIMALS) + 0.0:.{DECIMALS}f}".rstrip("0").rstrip(".")
 
 
-def _colour(colour: Colour) -> str:
-    return f"#{colour[0]:02x}{colour[1]:02x}{colour[2]:02x}"
+def _color(color: Color) -> str:
+    return f"#{color[0]:02x}{color[1]:02x}{color[2]:02x}"

@@ -67,13 +67,13 @@ def evaluate_cases(
 
 def evaluate_case(case: Case, method: str, parameters: Parameters) -> CaseResult:
     """Segment and score one case."""
-    from rose2_logs.segmentation.pipeline import analyse
+    from rose2_logs.segmentation.pipeline import analyze
 
     snapshot, truth = case.snapshot(), case.truth()
     if snapshot.cells.shape != truth.shape:
         raise CasesError(f"{case.rooms_path}: of shape {truth.shape}, but its map is {snapshot.cells.shape}")
     start = time.perf_counter()
-    analysis = analyse(snapshot, parameters, method)
+    analysis = analyze(snapshot, parameters, method)
     seconds = time.perf_counter() - start
     labels = np.ascontiguousarray(np.flipud(analysis.rooms.labels))
     return CaseResult(case, labels, score(truth, labels), analysis.free_area_m2, seconds)

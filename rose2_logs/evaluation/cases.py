@@ -1,7 +1,7 @@
 """Maps with true rooms, as a benchmark lists them in a JSON file.
 
 The file holds ``{"cases": [{"group", "name", "map", "rooms", "resolution_m"}, ...]}`` with paths relative to
-itself: `map` is an 8-bit grey image in the convention of ROS maps, `rooms` a label image of the same size.
+itself: `map` is an 8-bit gray image in the convention of ROS maps, `rooms` a label image of the same size.
 A case may say ``"origin_xy_m": [x, y]``, where the image's lower left corner lies in the world.
 Images have row 0 at the top, occupancy grids at the origin below; a case converts between the two.
 """
@@ -20,10 +20,10 @@ from PIL import Image, UnidentifiedImageError
 from rose2_logs.errors import CasesError
 from rose2_logs.model.occupancy import UNKNOWN, GridGeometry, OccupancySnapshot
 
-OCCUPIED_MAX_GREY = 89
-"""Darker is occupied: (255 - grey) / 255 above map_server's default occupied_thresh of 0.65."""
-FREE_MIN_GREY = 206
-"""Lighter is free: (255 - grey) / 255 below map_server's default free_thresh of 0.196; 205 is unknown."""
+OCCUPIED_MAX_GRAY = 89
+"""Darker is occupied: (255 - gray) / 255 above map_server's default occupied_thresh of 0.65."""
+FREE_MIN_GRAY = 206
+"""Lighter is free: (255 - gray) / 255 below map_server's default free_thresh of 0.196; 205 is unknown."""
 
 
 @dataclass(frozen=True)
@@ -55,15 +55,15 @@ class Case:
         Raises
         ------
         CasesError
-            If the image cannot be read or is not an 8-bit grey one.
+            If the image cannot be read or is not an 8-bit gray one.
         """
-        grey = _read_image(self.map_path)
-        if grey.ndim != 2 or grey.dtype != np.uint8:
-            raise CasesError(f"{self.map_path}: the map must be an 8-bit grey image")
-        cells = np.full(grey.shape, UNKNOWN, np.int8)
-        cells[grey <= OCCUPIED_MAX_GREY] = 100
-        cells[grey >= FREE_MIN_GREY] = 0
-        geometry = GridGeometry(self.resolution_m, self.origin_xy_m or (0.0, 0.0), 0.0, "map", grey.shape)
+        gray = _read_image(self.map_path)
+        if gray.ndim != 2 or gray.dtype != np.uint8:
+            raise CasesError(f"{self.map_path}: the map must be an 8-bit gray image")
+        cells = np.full(gray.shape, UNKNOWN, np.int8)
+        cells[gray <= OCCUPIED_MAX_GRAY] = 100
+        cells[gray >= FREE_MIN_GRAY] = 0
+        geometry = GridGeometry(self.resolution_m, self.origin_xy_m or (0.0, 0.0), 0.0, "map", gray.shape)
         return OccupancySnapshot(
             0, 0, 0, str(self.map_path), np.ascontiguousarray(np.flipud(cells)), geometry
         )

@@ -17,7 +17,7 @@ from rose2_logs.evaluation.scores import score
 from rose2_logs.evaluation.tracks import TrackComparison, TrackScores, TruthLinker
 from rose2_logs.model.occupancy import FloatArray, GridGeometry, OccupancySnapshot, classify
 from rose2_logs.model.rooms import RoomMap
-from rose2_logs.tracking.back_projection import Smoother, motions_to_last
+from rose2_logs.tracking.back_projection import BackProjector, motions_to_last
 from rose2_logs.tracking.overlap import overlap_of
 from rose2_logs.tracking.registration import MapAligner, RigidMotion
 from rose2_logs.tracking.tracker import RoomTracker
@@ -31,9 +31,9 @@ class RunTrackScores:
     ----------
     found : TrackScores
         Of the rooms that the method found.
-    smoothed : TrackScores
+    back_projected : TrackScores
         Of the rooms of the run's last map, carried over to the maps before it.
-    smoothed_iou_sym : float
+    back_projected_iou_sym : float
         Mean overlap, in percent, of these rooms with the true ones, see `Scores`.
     true_rooms : TrackScores
         Of the true rooms, given to the tracker without their numbers: what it reaches where the segmentation
@@ -41,8 +41,8 @@ class RunTrackScores:
     """
 
     found: TrackScores
-    smoothed: TrackScores
-    smoothed_iou_sym: float
+    back_projected: TrackScores
+    back_projected_iou_sym: float
     true_rooms: TrackScores
 
 
@@ -120,17 +120,17 @@ class _Run:
 
     def scores(self) -> RunTrackScores:
         found, true_rooms = (comparison.scores() for _, comparison in self._sides)
-        return RunTrackScores(found, *self._smoothed(), true_rooms)
+        return RunTrackScores(found, *self._back_projected(), true_rooms)
 
-    def _smoothed(self) -> tuple[TrackScores, float]:
+    def _back_projected(self) -> tuple[TrackScores, float]:
         parameters, last = self._parameters, self._past[-1]
         rooms = RoomMap.from_labels(self._last_labels, last.geometry)
-        smoother = Smoother(last.snapshot(), rooms, parameters.tracking, parameters.occupancy)
+        projector = BackProjector(last.snapshot(), rooms, parameters.tracking, parameters.occupancy)
         comparison, overlaps = TrackComparison(), []
         motions = motions_to_last([past.motion for past in self._past])
         for past, motion in zip(self._past, motions, strict=True):
             truth = _true_labels(past.case)
-            labels = smoother.rooms(past.snapshot(), motion).labels
+            labels = projector.rooms(past.snapshot(), motion).labels
             _compare(comparison, truth, past.true_track, labels, np.arange(1, len(rooms) + 1))
             overlaps.append(score(truth, labels).iou_sym)
         return comparison.scores(), float(np.mean(overlaps))

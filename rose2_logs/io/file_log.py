@@ -15,7 +15,7 @@ from rose2_logs.errors import LogError
 from rose2_logs.io.log_file import LogFile, Place
 from rose2_logs.io.messages import Decoder, Grid, Patch, decoder
 from rose2_logs.io.source import LoggedBytes, LoggedMap, LogInfo, MessageSource, TopicInfo
-from rose2_logs.system.warnings import notice
+from rose2_logs.system.warnings import log_warning
 
 logger = logging.getLogger(__name__)
 
@@ -99,7 +99,7 @@ class FileLog(MessageSource):
         if failures and not self._files:
             raise failures[0]
         for failure in failures:
-            notice(logger, "file_left_out", f"{failure}; the other files are read", file=failure.file)
+            log_warning(logger, "file_left_out", f"{failure}; the other files are read", file=failure.file)
 
     @property
     def files(self) -> tuple[LogFile, ...]:
@@ -150,7 +150,7 @@ class FileLog(MessageSource):
                             f"{file.path}: {topic} also has {count} messages of type {channel.schema_name} "
                             f"({channel.message_encoding}), which are no maps that can be read"
                         )
-                        notice(logger, "type_changes", text, file=file.path, topic=topic)
+                        log_warning(logger, "type_changes", text, file=file.path, topic=topic)
                 places = file.places([channel.id for channel in channels if channel.is_wanted])
                 self._look_at_clock(file, topic, places)
                 found += [(place, number) for place in places]
@@ -164,7 +164,7 @@ class FileLog(MessageSource):
         along_file = times[np.lexsort((order[:, 1], order[:, 0]))]
         if len(times) > 1 and times[0] == times[-1]:
             text = f"{file.path}: all {len(times)} messages on {topic} have the log time {times[0]} ns"
-            notice(logger, "clock_stands", text, file=file.path, topic=topic)
+            log_warning(logger, "clock_stands", text, file=file.path, topic=topic)
         back = np.flatnonzero(np.diff(along_file) < -CLOCK_SET_BACK_NS)
         for k in back:
             seconds = (int(along_file[k]) - int(along_file[k + 1])) / 1e9
@@ -172,7 +172,7 @@ class FileLog(MessageSource):
                 f"{file.path}: the log time on {topic} goes back by {seconds:.1f} s at message {k + 2} of "
                 "the file; messages are taken in the order of log time"
             )
-            notice(logger, "clock_set_back", text, file=file.path, topic=topic, index=int(k) + 2)
+            log_warning(logger, "clock_set_back", text, file=file.path, topic=topic, index=int(k) + 2)
 
     def _decode(self, number: int, place: Place) -> Grid | Patch | None:
         file = self._files[number]

@@ -16,7 +16,7 @@ from rose2_logs.io.messages import (
     Cells,
     Decoder,
     Grid,
-    Remark,
+    MapWarning,
     check_cells,
     make_grid,
     percent,
@@ -82,7 +82,7 @@ def _add_with_imports(pool: Any, files: dict[str, Any], name: str) -> None:
 
 
 def _grid(message: Any, most_cells: int) -> Grid | None:
-    remarks: list[Remark] = []
+    map_warnings: list[MapWarning] = []
     if len(message.frame_id) > LONGEST_NAME_BYTES:
         raise InvalidMapError(f"its frame_id is longer than {LONGEST_NAME_BYTES} bytes")
     # Of one that is no number neither equals the other; that is told below.
@@ -95,8 +95,8 @@ def _grid(message: Any, most_cells: int) -> Grid | None:
     stamp_ns = message.timestamp.seconds * 10**9 + message.timestamp.nanos
     values = _channel(message)
     check_cells(values.shape[0], values.shape[1], most_cells)
-    cells = _occupancy(values, remarks)
-    return make_grid(stamp_ns, message.frame_id, message.cell_size.x, pose, cells, remarks)
+    cells = _occupancy(values, map_warnings)
+    return make_grid(stamp_ns, message.frame_id, message.cell_size.x, pose, cells, map_warnings)
 
 
 def _channel(message: Any) -> NDArray[Any]:
@@ -128,7 +128,7 @@ def _channel(message: Any) -> NDArray[Any]:
     return np.ndarray((rows, columns), dtype, data, field.offset, (message.row_stride, cell))
 
 
-def _occupancy(values: NDArray[Any], remarks: list[Remark]) -> Cells:
+def _occupancy(values: NDArray[Any], map_warnings: list[MapWarning]) -> Cells:
     if values.dtype.kind == "f":
         if values.size and np.nanmax(values, initial=0) > 1:
             raise InvalidMapError(
@@ -137,6 +137,6 @@ def _occupancy(values: NDArray[Any], remarks: list[Remark]) -> Cells:
         known = values >= 0
         return np.where(known, np.round(np.where(known, values, 0) * 100), UNKNOWN).astype(np.int8)
     if values.dtype.itemsize == 1:
-        return percent(np.ascontiguousarray(values).view(np.int8), remarks)
+        return percent(np.ascontiguousarray(values).view(np.int8), map_warnings)
     known = (values >= 0) & (values <= 100)
     return np.where(known, values, UNKNOWN).astype(np.int8)

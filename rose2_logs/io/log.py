@@ -13,12 +13,12 @@ import numpy as np
 
 from rose2_logs.config.selection import Selection, Times
 from rose2_logs.errors import InvalidMapError, LogError, NoMapTopicError
-from rose2_logs.io.map_stream import MapStream, Oddities, ReadCounts
-from rose2_logs.io.messages import Patch, Remark, is_patch_type
+from rose2_logs.io.map_stream import MapChecks, MapStream, ReadCounts
+from rose2_logs.io.messages import MapWarning, Patch, is_patch_type
 from rose2_logs.io.poses import RobotPath
 from rose2_logs.io.source import DamagedMessageError, LoggedMap, LogInfo, MessageSource, TopicInfo
 from rose2_logs.model.occupancy import OccupancySnapshot
-from rose2_logs.system.warnings import notice
+from rose2_logs.system.warnings import log_warning
 
 __all__ = ["LogInfo", "LogReader", "ReadCounts", "Selection", "TopicInfo", "choose_topic"]
 
@@ -142,16 +142,18 @@ class LogReader:
         """Yield the distinct maps as they stand at the `chosen` times (sorted); `tell` what is odd."""
         wanted = set(chosen.tolist())
         stream = MapStream(self.topic, counts, min_change_m2)
-        oddities = Oddities()
+        map_checks = MapChecks()
         for message in self.source.read(self._topics, self._needed(chosen)):
             is_wanted = message.log_time_ns in wanted
-            remarks: tuple[Remark, ...] = ()
+            map_warnings: tuple[MapWarning, ...] = ()
             try:
                 decoded = message.decode()
                 if isinstance(decoded, Patch) and stream.is_empty:
-                    remarks = (Remark("patch_without_map", "a patch without a map before it; left out"),)
+                    map_warnings = (
+                        MapWarning("patch_without_map", "a patch without a map before it; left out"),
+                    )
                 else:
-                    remarks = oddities.of(decoded, message.log_time_ns)
+                    map_warnings = map_checks.of(decoded, message.log_time_ns)
                 stream.apply(decoded)
             except LogError as error:
                 is_damaged = isinstance(error, DamagedMessageError)
@@ -161,9 +163,9 @@ class LogReader:
                     stream.forget()
                 self._first_failure = self._first_failure or f"{self._place(message)}: {error}"
                 kind = "damaged_message" if is_damaged else "invalid_map"
-                self._tell(message, Remark(kind, f"{error}; it is left out"), tell)
+                self._tell(message, MapWarning(kind, f"{error}; it is left out"), tell)
                 continue
-            for remark in remarks:
+            for remark in map_warnings:
                 self._tell(message, remark, tell)
             if is_wanted and (snapshot := stream.snapshot(message.log_time_ns)) is not None:
                 yield snapshot
@@ -172,10 +174,12 @@ class LogReader:
         total = len(self.source.log_times(message.topic))
         return f"{self.info.path}: message {message.number} of {total} on {message.topic}"
 
-    def _tell(self, message: LoggedMap, remark: Remark, tell: bool) -> None:
+    def _tell(self, message: LoggedMap, remark: MapWarning, tell: bool) -> None:
         if tell:
             text = f"{self._place(message)}: {remark.text}"
-            notice(logger, remark.kind, text, file=message.file, topic=message.topic, index=message.number)
+            log_warning(
+                logger, remark.kind, text, file=message.file, topic=message.topic, index=message.number
+            )
 
     def _needed(self, chosen: Times) -> Times:
         """Times of the messages that the maps at the `chosen` times are made of.

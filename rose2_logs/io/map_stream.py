@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rose2_logs.errors import InvalidMapError
-from rose2_logs.io.messages import Cells, Grid, Patch, Remark
+from rose2_logs.io.messages import Cells, Grid, MapWarning, Patch
 from rose2_logs.model.occupancy import UNKNOWN, BoolArray, OccupancySnapshot
 
 
@@ -136,7 +136,7 @@ def _equal(one: Grid, other: Grid) -> bool:
 
 
 def known_area_change_m2(before: Grid, now: Grid) -> float:
-    """Area that is known in one of two maps only, in square metres.
+    """Area that is known in one of two maps only, in square meters.
 
     Grids of equal resolution, yaw and frame are laid over each other to the nearest cell; between others
     nothing can be compared and the change is infinite.
@@ -164,25 +164,25 @@ BACK_NS = 10**9
 """Stamps may go back by the time that maps wait for each other; by more, a clock was set."""
 
 
-class Oddities:
+class MapChecks:
     """Looks at the maps of a topic as they come."""
 
     def __init__(self) -> None:
         self._stamp_ns: int | None = None
         self._frame: str | None = None
 
-    def of(self, message: Grid | Patch | None, log_time_ns: int) -> tuple[Remark, ...]:
+    def of(self, message: Grid | Patch | None, log_time_ns: int) -> tuple[MapWarning, ...]:
         """Tell what is odd about a map or a patch with its log time, and what changed since the last one."""
         if message is None:
-            return (Remark("no_cells", "a map without cells; left out"),)
-        remarks = list(message.remarks)
+            return (MapWarning("no_cells", "a map without cells; left out"),)
+        map_warnings = list(message.map_warnings)
         before, self._stamp_ns = self._stamp_ns, message.stamp_ns
         # Of what carries no time at all, as saved maps, that is known.
         if message.stamp_ns == 0 and log_time_ns != 0:
-            remarks.append(Remark("stamp_zero", "its stamp is zero; only its log time is known"))
+            map_warnings.append(MapWarning("stamp_zero", "its stamp is zero; only its log time is known"))
         elif before is not None and message.stamp_ns < before - BACK_NS:
-            remarks.append(
-                Remark("stamp_back", f"its stamp goes back by {(before - message.stamp_ns) / 1e9:.1f} s")
+            map_warnings.append(
+                MapWarning("stamp_back", f"its stamp goes back by {(before - message.stamp_ns) / 1e9:.1f} s")
             )
         if isinstance(message, Grid):
             frame, self._frame = self._frame, message.geometry.frame_id
@@ -190,5 +190,5 @@ class Oddities:
                 text = (
                     f"its frame changes from {frame!r} to {self._frame!r}; rooms are followed by coordinates"
                 )
-                remarks.append(Remark("frame_changes", text))
-        return tuple(remarks)
+                map_warnings.append(MapWarning("frame_changes", text))
+        return tuple(map_warnings)

@@ -37,7 +37,7 @@ PADDING_BYTES = 8
 """Less than this may follow the last field: some writers fill up to the largest alignment."""
 
 
-class Remark(NamedTuple):
+class MapWarning(NamedTuple):
     """What is odd about a map that can be read all the same: kind and text."""
 
     kind: str
@@ -51,7 +51,7 @@ class Grid:
     stamp_ns: int
     geometry: GridGeometry
     cells: Cells
-    remarks: tuple[Remark, ...] = ()
+    map_warnings: tuple[MapWarning, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +62,7 @@ class Patch:
     row: int
     column: int
     cells: Cells
-    remarks: tuple[Remark, ...] = ()
+    map_warnings: tuple[MapWarning, ...] = ()
 
 
 Decoder = Callable[[memoryview], Grid | Patch | None]
@@ -137,7 +137,7 @@ class Fields:
         self._data = data
         self._place = self.start
         self._most_cells = most_cells
-        self.remarks: list[Remark] = []
+        self.map_warnings: list[MapWarning] = []
 
     def numbers(self, code: str, count: int = 1) -> tuple[float, ...]:
         """Take `count` numbers of one `struct` type."""
@@ -180,14 +180,16 @@ class Fields:
             raise InvalidMapError(f"it says {columns} x {rows} cells, but its data has {len(data)}")
         check_cells(rows, columns, self._most_cells)
         if (left := len(self._data) - self._place) >= PADDING_BYTES:
-            self.remarks.append(
-                Remark("more_bytes", f"{left} bytes follow its last field; is its definition another one?")
+            self.map_warnings.append(
+                MapWarning(
+                    "more_bytes", f"{left} bytes follow its last field; is its definition another one?"
+                )
             )
         return np.frombuffer(data, np.uint8).reshape(rows, columns)
 
     def occupancy(self, rows: int, columns: int) -> Cells:
         """Take the last field as occupancy: -1, 0..100."""
-        return percent(self.cells(rows, columns).view(np.int8), self.remarks)
+        return percent(self.cells(rows, columns).view(np.int8), self.map_warnings)
 
     def time_ns(self) -> int:
         """Take a time as nanoseconds."""
@@ -246,13 +248,15 @@ def check_cells(rows: int, columns: int, most_cells: int) -> None:
         )
 
 
-def percent(values: Cells, remarks: list[Remark]) -> Cells:
+def percent(values: Cells, map_warnings: list[MapWarning]) -> Cells:
     """Occupancy as -1, 0..100; any other value counts as unknown, as map savers take it, with a remark."""
     if values.size == 0 or (values.min() >= UNKNOWN and values.max() <= 100):
         return values
     odd = (values < UNKNOWN) | (values > 100)
     count = np.count_nonzero(odd)
-    remarks.append(Remark("odd_values", f"{count} cells hold values outside -1..100 and count as unknown"))
+    map_warnings.append(
+        MapWarning("odd_values", f"{count} cells hold values outside -1..100 and count as unknown")
+    )
     return np.where(odd, np.int8(UNKNOWN), values)
 
 
@@ -270,7 +274,7 @@ def _cost_table() -> Cells:
 _OCCUPANCY_OF_COST = _cost_table()
 
 
-def flat_yaw_of(quaternion: tuple[float, float, float, float], remarks: list[Remark]) -> float:
+def flat_yaw_of(quaternion: tuple[float, float, float, float], map_warnings: list[MapWarning]) -> float:
     """Rotation about z, in radians, of a quaternion x, y, z, w; one of another length than 1 gets a remark.
 
     Raises
@@ -285,8 +289,8 @@ def flat_yaw_of(quaternion: tuple[float, float, float, float], remarks: list[Rem
         )
     length = math.hypot(*quaternion)
     if abs(length - 1) > UNIT_TOLERANCE:
-        remarks.append(
-            Remark("quaternion", f"the orientation of its origin has the length {length:g}, not 1")
+        map_warnings.append(
+            MapWarning("quaternion", f"the orientation of its origin has the length {length:g}, not 1")
         )
     if length == 0 or math.isinf(length):
         return 0.0
@@ -317,16 +321,16 @@ def make_grid(
     resolution_m: float,
     pose: tuple[float, ...],
     cells: Cells,
-    remarks: list[Remark],
+    map_warnings: list[MapWarning],
 ) -> Grid | None:
     """Put a grid together; `pose` is x, y, z and the quaternion x, y, z, w. None if there are no cells."""
     if cells.size == 0:
         return None
     x, y, _, *quaternion = pose
     height, width = cells.shape
-    yaw_rad = flat_yaw_of((quaternion[0], quaternion[1], quaternion[2], quaternion[3]), remarks)
+    yaw_rad = flat_yaw_of((quaternion[0], quaternion[1], quaternion[2], quaternion[3]), map_warnings)
     geometry = GridGeometry(resolution_m, (x, y), yaw_rad, frame_id, (height, width))
-    return Grid(stamp_ns, geometry, cells, tuple(remarks))
+    return Grid(stamp_ns, geometry, cells, tuple(map_warnings))
 
 
 def _occupancy_grid(fields: Fields) -> Grid | None:
@@ -336,14 +340,14 @@ def _occupancy_grid(fields: Fields) -> Grid | None:
     width, height = fields.integers("I", 2)
     pose = fields.numbers("d", 7)
     cells = fields.occupancy(height, width)
-    return make_grid(stamp_ns, frame_id, _resolution(resolution), pose, cells, fields.remarks)
+    return make_grid(stamp_ns, frame_id, _resolution(resolution), pose, cells, fields.map_warnings)
 
 
 def _occupancy_grid_update(fields: Fields) -> Patch:
     stamp_ns, _ = fields.header()
     x, y = fields.integers("i", 2)
     width, height = fields.integers("I", 2)
-    return Patch(stamp_ns, y, x, fields.occupancy(height, width), tuple(fields.remarks))
+    return Patch(stamp_ns, y, x, fields.occupancy(height, width), tuple(fields.map_warnings))
 
 
 def _costmap(fields: Fields) -> Grid | None:
@@ -355,11 +359,11 @@ def _costmap(fields: Fields) -> Grid | None:
     width, height = fields.integers("I", 2)
     pose = fields.numbers("d", 7)
     cells = _OCCUPANCY_OF_COST[fields.cells(height, width)]
-    return make_grid(stamp_ns, frame_id, _resolution(resolution), pose, cells, fields.remarks)
+    return make_grid(stamp_ns, frame_id, _resolution(resolution), pose, cells, fields.map_warnings)
 
 
 def _costmap_update(fields: Fields) -> Patch:
     stamp_ns, _ = fields.header()
     x, y, width, height = fields.integers("I", 4)
     cells = _OCCUPANCY_OF_COST[fields.cells(height, width)]
-    return Patch(stamp_ns, y, x, cells, tuple(fields.remarks))
+    return Patch(stamp_ns, y, x, cells, tuple(fields.map_warnings))

@@ -27,7 +27,7 @@ from rose2_logs.io.discovery import (
 )
 from rose2_logs.io.log import LogReader
 from rose2_logs.io.source import LogInfo, MessageSource
-from rose2_logs.system.warnings import notice
+from rose2_logs.system.warnings import log_warning
 
 if TYPE_CHECKING:
     from rose2_logs.io.file_log import FileLog, OpenFile
@@ -320,7 +320,7 @@ def _tell_what_is_one_log(log: Path, files: list[Path]) -> None:
     text = (
         f"{log}: has no {BAG_DESCRIPTION}; its {told} read as one log{left_out}: name the file that is meant"
     )
-    notice(logger, "files_as_one", text, file=log)
+    log_warning(logger, "files_as_one", text, file=log)
 
 
 def _files_of_bag(log: Path) -> list[Path]:
@@ -331,14 +331,14 @@ def _files_of_bag(log: Path) -> list[Path]:
     except LogError as error:
         if not (files := _stored_in(log)):
             raise
-        notice(logger, "description", f"{error}; the files beside it are read", file=path)
+        log_warning(logger, "description", f"{error}; the files beside it are read", file=path)
         return files
     files = [file for file in named if file.is_file()]
     for missing in [file for file in named if not file.is_file()]:
         text = f"{missing}: is missing, but {path} names it"
         if not files:
             raise LogError(text, file=missing)
-        notice(logger, "file_missing", f"{text}; the other files are read", file=missing)
+        log_warning(logger, "file_missing", f"{text}; the other files are read", file=missing)
     if not files:
         raise LogError(f"{path}: names no file; run `ros2 bag reindex` on {log}", file=path)
     return files
@@ -368,5 +368,5 @@ def _decompressed(file: Path, directory: Path) -> Path:
         text = f"{file}: cannot be decompressed: {error}"
         if not target.exists() or not target.stat().st_size or isinstance(error, TooLargeError):
             raise LogError(text, file=file) from error
-        notice(logger, "cut_off", f"{text}; what is whole before is read", file=file)
+        log_warning(logger, "cut_off", f"{text}; what is whole before is read", file=file)
     return target

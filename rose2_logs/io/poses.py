@@ -31,7 +31,7 @@ TRIED_MESSAGES = 3000
 """Within so many of its first messages a log's transforms lead from the map to the robot, or never do."""
 
 Pose = tuple[float, float, float]
-"""x, y in metres, yaw in radians."""
+"""x, y in meters, yaw in radians."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class RobotPath:
         Returns
         -------
         (K, 3) float
-            x, y in metres and yaw in radians, at least `POSE_STEP_M` from one to the next.
+            x, y in meters and yaw in radians, at least `POSE_STEP_M` from one to the next.
         """
         taken = []
         while self._next is not None and self._next[0] <= log_time_ns:

@@ -22,7 +22,7 @@ from rose2_logs.io.discovery import load_yaml
 from rose2_logs.io.messages import MOST_CELLS, Cells, Grid, check_cells, make_grid
 from rose2_logs.io.source import LoggedMap, LogInfo, MessageSource, TopicInfo
 from rose2_logs.model.occupancy import UNKNOWN
-from rose2_logs.system.warnings import notice
+from rose2_logs.system.warnings import log_warning
 
 logger = logging.getLogger(__name__)
 
@@ -178,7 +178,7 @@ def _cells(
             f"{path}: by its free_thresh {free_below:g} unknown pixels ({SAVED_UNKNOWN}) would be free; they "
             "are read as unknown"
         )
-        notice(logger, "free_thresh", text, file=path)
+        log_warning(logger, "free_thresh", text, file=path)
         unknown |= saved_as_unknown
     cells = np.where(occupancy > occupied_above, np.int8(100), np.int8(UNKNOWN))
     cells[occupancy < free_below] = 0
@@ -192,7 +192,7 @@ def _is_saved_trinary(shade: NDArray[np.float32]) -> bool:
 
 
 def _load_image(path: Path, most_cells: int) -> tuple[NDArray[np.float32], NDArray[np.bool_] | None]:
-    """Brightness (H, W) in 0..1, the mean of the colours, and which pixels are opaque if the image tells."""
+    """Brightness (H, W) in 0..1, the mean of the colors, and which pixels are opaque if the image tells."""
     from PIL import Image
 
     try:

@@ -50,7 +50,7 @@ class Structure:
 
 @dataclass(frozen=True, eq=False)
 class Walls:
-    """The walls of one map (paper, section III-B). All lengths in metres, world frame.
+    """The walls of one map (paper, section III-B). All lengths in meters, world frame.
 
     Attributes
     ----------
@@ -78,7 +78,7 @@ class Walls:
 
 @dataclass(frozen=True, eq=False)
 class FloorPlan:
-    """The plane cut into faces by the representative lines (paper, section III-C). World metres.
+    """The plane cut into faces by the representative lines (paper, section III-C). World meters.
 
     Attributes
     ----------
@@ -117,7 +117,7 @@ class SnapshotAnalysis:
     free_area_m2 : float
         Area of the known free cells.
     resolution_m : float
-        Side of the cells that the map was analysed in: its own, or of blocks where that is finer than needed
+        Side of the cells that the map was analyzed in: its own, or of blocks where that is finer than needed
         or the map is large.
     rooms : RoomMap
         The segmented map with the predicted shapes.
@@ -126,7 +126,7 @@ class SnapshotAnalysis:
     seconds : dict
         Time per stage.
     voronoi_m : (V, 4) float or None
-        Lines x0, y0, x1, y1 of the free space's Voronoi graph, world metres, where it was asked for.
+        Lines x0, y0, x1, y1 of the free space's Voronoi graph, world meters, where it was asked for.
     """
 
     index: int

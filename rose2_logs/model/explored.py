@@ -1,4 +1,4 @@
-"""The explored part of a map, at the resolution it is analysed at, and the way back to canvas and world."""
+"""The explored part of a map, at the resolution it is analyzed at, and the way back to canvas and world."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from rose2_logs.config.parameters import OccupancyParameters
 from rose2_logs.model.labels import known_window
 from rose2_logs.model.occupancy import BoolArray, CellValues, FloatArray, GridGeometry, Scalar, classify
 
-NEIGHBOURS = ((0, -1), (0, 1), (-1, 0), (1, 0), (-1, -1), (-1, 1), (1, -1), (1, 1))
+NEIGHBORS = ((0, -1), (0, 1), (-1, 0), (1, 0), (-1, -1), (-1, 1), (1, -1), (1, 1))
 """Where a coarse cell without a room looks for one: cells with a common side first."""
 
 
@@ -63,12 +63,12 @@ class ExploredPart:
 
     @property
     def resolution_m(self) -> float:
-        """Side of a block in metres."""
+        """Side of a block in meters."""
         return self.geometry.resolution_m * self.factor
 
     @property
     def free_area_m2(self) -> float:
-        """Area of the canvas's free cells in square metres."""
+        """Area of the canvas's free cells in square meters."""
         return float(np.count_nonzero(self.known_free)) * self.geometry.cell_area_m2
 
     def points(self, xy_m: FloatArray) -> FloatArray:
@@ -100,14 +100,14 @@ class ExploredPart:
         """Labels of blocks as labels of the canvas's free cells.
 
         A free cell in a block without a label, beside a wall that is thinner than a block, takes that of a
-        neighbouring block.
+        neighboring block.
         """
         full = np.zeros(self.geometry.shape, np.int32)
         if self.factor > 1:
             padded = np.pad(labels, 1)
             height, width = labels.shape
             labels = labels.copy()
-            for down, right in NEIGHBOURS:
+            for down, right in NEIGHBORS:
                 beside = padded[1 + down : 1 + down + height, 1 + right : 1 + right + width]
                 np.copyto(labels, beside, where=labels == 0)
         part = full[self.window]
@@ -122,7 +122,7 @@ class ExploredPart:
 
 
 def block_side(resolution_m: float, cells: int, parameters: OccupancyParameters) -> int:
-    """Cells along the side of the blocks that a map is analysed in.
+    """Cells along the side of the blocks that a map is analyzed in.
 
     Parameters
     ----------
@@ -132,21 +132,21 @@ def block_side(resolution_m: float, cells: int, parameters: OccupancyParameters)
         Number of cells of the explored part.
     """
     finer = int(parameters.working_resolution_m / resolution_m * (1 + 1e-9))
-    larger = int(np.ceil(np.sqrt(cells / parameters.analysed_max_cells)))
+    larger = int(np.ceil(np.sqrt(cells / parameters.analyzed_max_cells)))
     return max(1, finer, larger)
 
 
 def coarser_for_its_size(
-    geometry: GridGeometry, analysed_resolution_m: float, parameters: OccupancyParameters
+    geometry: GridGeometry, analyzed_resolution_m: float, parameters: OccupancyParameters
 ) -> str | None:
-    """Say that a map was analysed coarser than it is because it is large; None if it was not."""
+    """Say that a map was analyzed coarser than it is because it is large; None if it was not."""
     usual = max(geometry.resolution_m, parameters.working_resolution_m) * (1 + 1e-9)
-    if analysed_resolution_m <= usual:
+    if analyzed_resolution_m <= usual:
         return None
     return (
-        f"more than {parameters.analysed_max_cells} explored cells: analysed at "
-        f"{analysed_resolution_m:.3g} m instead of {geometry.resolution_m:.3g} m; "
-        "occupancy.analysed_max_cells sets the limit"
+        f"more than {parameters.analyzed_max_cells} explored cells: analyzed at "
+        f"{analyzed_resolution_m:.3g} m instead of {geometry.resolution_m:.3g} m; "
+        "occupancy.analyzed_max_cells sets the limit"
     )
 
 

@@ -37,7 +37,7 @@ def distinct_labels(labels: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDA
     return values.astype(np.int64), starts[index]
 
 
-def renumbered(labels: NDArray[np.int32], number: NDArray[np.int32]) -> NDArray[np.int32]:
+def renumber_in_place(labels: NDArray[np.int32], number: NDArray[np.int32]) -> NDArray[np.int32]:
     """Return ``number[labels]``, the image with new numbers, written over the old ones to save memory."""
     for rows in np.array_split(labels, max(1, labels.size // COUNTED_AT_ONCE)):
         rows[...] = number[rows]

@@ -17,9 +17,9 @@ IntArray = NDArray[np.int_]
 Scalar = TypeVar("Scalar", bound=np.generic)
 UNKNOWN = -1
 SMALLEST_CELL_M, LARGEST_CELL_M = 1e-4, 100.0
-"""Sides of cells that maps are made of, in metres: a laser's noise is above, a building below."""
+"""Sides of cells that maps are made of, in meters: a laser's noise is above, a building below."""
 FARTHEST_ORIGIN_M = 1e8
-"""No place on earth lies farther from the origin of its frame, in metres, in no projection."""
+"""No place on earth lies farther from the origin of its frame, in meters, in no projection."""
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class GridGeometry:
     """Where a grid lies in the world.
 
     The *grid frame* has its origin at the outer corner of cell (0, 0), x along the columns and y along the
-    rows, in metres. The *world* is the frame ``frame_id`` of the map message (REP 105).
+    rows, in meters. The *world* is the frame ``frame_id`` of the map message (REP 105).
 
     Attributes
     ----------
@@ -73,7 +73,7 @@ class GridGeometry:
 
     @property
     def cell_area_m2(self) -> float:
-        """Area of one cell in square metres."""
+        """Area of one cell in square meters."""
         return self.resolution_m**2
 
     @property
@@ -83,17 +83,17 @@ class GridGeometry:
         return np.array([[c, -s], [s, c]])
 
     def grid_to_world(self, xy_m: FloatArray) -> FloatArray:
-        """Convert points (..., 2) from the grid frame to the world, metres to metres."""
+        """Convert points (..., 2) from the grid frame to the world, meters to meters."""
         world: FloatArray = np.asarray(xy_m, float) @ self.rotation.T + np.asarray(self.origin_xy_m)
         return world
 
     def world_to_grid(self, xy_m: FloatArray) -> FloatArray:
-        """Convert points (..., 2) from the world to the grid frame, metres to metres."""
+        """Convert points (..., 2) from the world to the grid frame, meters to meters."""
         grid: FloatArray = (np.asarray(xy_m, float) - np.asarray(self.origin_xy_m)) @ self.rotation
         return grid
 
-    def cell_centres(self, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> FloatArray:
-        """World positions (..., 2) in metres of the centres of cells."""
+    def cell_centers(self, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> FloatArray:
+        """World positions (..., 2) in meters of the centers of cells."""
         return self.grid_to_world(
             (np.stack([columns, rows], axis=-1) + 0.5).astype(float) * self.resolution_m
         )
@@ -219,6 +219,6 @@ def is_same_to_analysis(
 
 
 def free_area_m2(snapshot: OccupancySnapshot, parameters: OccupancyParameters) -> float:
-    """Known free area of a map in square metres."""
+    """Known free area of a map in square meters."""
     free, _ = classify(snapshot.cells, parameters)
     return float(free.sum()) * snapshot.geometry.cell_area_m2

@@ -13,7 +13,7 @@ from rose2_logs.model.occupancy import BoolArray
 
 
 def outline(mask: BoolArray, resolution_m: float) -> BaseGeometry:
-    """Outline of the cells of a mask as a polygon or multipolygon in the grid frame, metres."""
+    """Outline of the cells of a mask as a polygon or multipolygon in the grid frame, meters."""
     padded = np.pad(mask, 1).astype(np.uint8)
     rows = np.diff(padded.astype(np.int8), axis=1)
     row, start = np.nonzero(rows == 1)
@@ -23,7 +23,7 @@ def outline(mask: BoolArray, resolution_m: float) -> BaseGeometry:
 
 
 def room_outlines(labels: NDArray[np.int32], resolution_m: float) -> list[BaseGeometry]:
-    """Outlines of the cells of rooms 1.. in the grid frame, metres; empty for numbers without cells."""
+    """Outlines of the cells of rooms 1.. in the grid frame, meters; empty for numbers without cells."""
     shapes: list[BaseGeometry] = []
     for room, window in enumerate(find_objects(labels), start=1):
         if window is None:

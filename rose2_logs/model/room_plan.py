@@ -14,7 +14,7 @@ from rose2_logs.model.analysis import SnapshotAnalysis
 from rose2_logs.model.labels import known_window
 from rose2_logs.model.occupancy import UNKNOWN, BoolArray, FloatArray, GridGeometry, OccupancySnapshot
 from rose2_logs.model.outlines import outline
-from rose2_logs.model.room_quality import RoomEvidence, is_unsure
+from rose2_logs.model.room_quality import RoomQuality, is_unsure
 from rose2_logs.model.rooms import Doorway
 
 PREDICTED_MIN_WIDTH_M = 0.3
@@ -34,15 +34,15 @@ class PlanRoom:
     number : int
         Its track in a run, its number in a single map.
     shape : shapely Polygon or MultiPolygon
-        With the predicted part, world metres; may be empty.
+        With the predicted part, world meters; may be empty.
     area_m2 : float
         As far as it was seen.
     label_point_m : (float, float) or None
         Point well inside what was seen of the room, None for an empty shape.
-    neighbours : tuple of int
+    neighbors : tuple of int
         Rooms behind its doorways, ascending.
-    confidence : float or None
-        Share of its outline that walls back, see `RoomEvidence`; None where it was not measured.
+    wall_support : float or None
+        Share of its outline that walls back, see `RoomQuality`; None where it was not measured.
     frontier_m : float or None
         Its open frontier.
     """
@@ -51,8 +51,8 @@ class PlanRoom:
     shape: BaseGeometry
     area_m2: float
     label_point_m: tuple[float, float] | None
-    neighbours: tuple[int, ...]
-    confidence: float | None = None
+    neighbors: tuple[int, ...]
+    wall_support: float | None = None
     frontier_m: float | None = None
 
     @property
@@ -63,7 +63,7 @@ class PlanRoom:
     @property
     def is_unsure(self) -> bool:
         """Whether few walls back its outline."""
-        return is_unsure(self.confidence)
+        return is_unsure(self.wall_support)
 
     @property
     def predicted_area_m2(self) -> float:
@@ -140,7 +140,7 @@ class RoomPlan:
 
     @property
     def bounds_m(self) -> tuple[float, float, float, float]:
-        """Least and greatest x and y that the plan takes up, as x0, y0, x1, y1; a square metre if none.
+        """Least and greatest x and y that the plan takes up, as x0, y0, x1, y1; a square meter if none.
 
         Rays that leave through windows and doors do not count.
         """
@@ -157,7 +157,7 @@ class RoomPlan:
 def plan_of_analysis(
     snapshot: OccupancySnapshot,
     analysis: SnapshotAnalysis,
-    evidence: RoomEvidence,
+    evidence: RoomQuality,
     title: str,
     occupancy: OccupancyParameters,
 ) -> RoomPlan:
@@ -167,14 +167,14 @@ def plan_of_analysis(
     for number, (shape, area, point) in enumerate(
         zip(found.polygons, found.areas_m2.tolist(), found.label_points_m.tolist(), strict=True), start=1
     ):
-        share = float(evidence.outline_wall_share[number - 1])
+        share = float(evidence.wall_support[number - 1])
         rooms.append(
             PlanRoom(
                 number,
                 shape,
                 area,
                 None if shape.is_empty else (point[0], point[1]),
-                found.neighbours(number),
+                found.neighbors(number),
                 None if np.isnan(share) else share,
                 float(evidence.frontier_m[number - 1]),
             )
@@ -190,7 +190,7 @@ def predicted_parts(plan: RoomPlan) -> dict[int, BaseGeometry]:
     Returns
     -------
     dict
-        Polygons or multipolygons, world metres, by the number of the room; rooms without such a part, and all
+        Polygons or multipolygons, world meters, by the number of the room; rooms without such a part, and all
         rooms of a plan without a map, are left out.
     """
     if plan.map is None:
@@ -205,7 +205,7 @@ def predicted_parts(plan: RoomPlan) -> dict[int, BaseGeometry]:
 
 
 def _unknown_within(shape: BaseGeometry, below: PlanMap) -> BaseGeometry:
-    """Outline of the cells within a shape, world metres, that are unknown over some width."""
+    """Outline of the cells within a shape, world meters, that are unknown over some width."""
     import cv2
 
     geometry = below.geometry

@@ -15,7 +15,7 @@ from rose2_logs.model.occupancy import UNKNOWN, BoolArray, FloatArray, Occupancy
 from rose2_logs.model.rooms import RoomMap
 
 OUTLINE_STEP_M = 0.1
-"""Outlines are looked at every so many metres: two cells of usual maps."""
+"""Outlines are looked at every so many meters: two cells of usual maps."""
 UNSURE_BELOW = 0.7
 """Rooms whose outline walls back less are unsure: doorways alone take an ordinary room to about 0.9."""
 UNSURE_SIGN = "?"
@@ -24,36 +24,34 @@ WALL_REACH_M = 0.2
 """An outline is backed by occupied cells this near: it runs in the middle of walls of usual thickness."""
 
 
-def is_unsure(outline_wall_share: float | None) -> bool:
+def is_unsure(wall_support: float | None) -> bool:
     """Whether little of a room's outline is known to be wall; of what was not measured nothing is said."""
-    return outline_wall_share is not None and outline_wall_share < UNSURE_BELOW
+    return wall_support is not None and wall_support < UNSURE_BELOW
 
 
-def unsure_sign(outline_wall_share: float | None) -> str:
+def unsure_sign(wall_support: float | None) -> str:
     """Return what stands behind the number of a room: the sign where it is unsure."""
-    return UNSURE_SIGN if is_unsure(outline_wall_share) else ""
+    return UNSURE_SIGN if is_unsure(wall_support) else ""
 
 
 @dataclass(frozen=True, eq=False)
-class RoomEvidence:
+class RoomQuality:
     """How sure the rooms of one map are.
 
     Attributes
     ----------
-    outline_wall_share : (R,) float
+    wall_support : (R,) float
         Share of each room's outline, with its predicted part, that occupied cells back; NaN for a room
         without outline. Doorways are not backed, so an ordinary room stays a little below 1.
     frontier_m : (R,) float
-        Length of each room's open frontier: cell sides between its free cells and unknown ones, metres.
+        Length of each room's open frontier: cell sides between its free cells and unknown ones, meters.
     """
 
-    outline_wall_share: FloatArray
+    wall_support: FloatArray
     frontier_m: FloatArray
 
 
-def room_evidence(
-    snapshot: OccupancySnapshot, rooms: RoomMap, parameters: OccupancyParameters
-) -> RoomEvidence:
+def room_quality(snapshot: OccupancySnapshot, rooms: RoomMap, parameters: OccupancyParameters) -> RoomQuality:
     """Measure how far the outlines of rooms are backed by walls, and their open frontier.
 
     Parameters
@@ -65,7 +63,7 @@ def room_evidence(
     parameters : OccupancyParameters
         Which cells are walls.
     """
-    return RoomEvidence(_wall_shares(snapshot, rooms, parameters), _frontiers(snapshot, rooms))
+    return RoomQuality(_wall_shares(snapshot, rooms, parameters), _frontiers(snapshot, rooms))
 
 
 def _wall_shares(snapshot: OccupancySnapshot, rooms: RoomMap, parameters: OccupancyParameters) -> FloatArray:
@@ -84,7 +82,7 @@ def _wall_shares(snapshot: OccupancySnapshot, rooms: RoomMap, parameters: Occupa
 
 
 def _points_along(polygon: BaseGeometry, step_m: float) -> FloatArray:
-    """Points (N, 2) every so many metres along the rings of a shape, one ring after the other.
+    """Points (N, 2) every so many meters along the rings of a shape, one ring after the other.
 
     As shapely interpolates along its boundary, which looks for each point from the beginning.
     """
@@ -111,9 +109,9 @@ def _within(mask: BoolArray, reach_cells: float) -> BoolArray:
 
 
 def _frontiers(snapshot: OccupancySnapshot, rooms: RoomMap) -> FloatArray:
-    """Length (R,) in metres of the sides that cells of each room share with unknown ones."""
+    """Length (R,) in meters of the sides that cells of each room share with unknown ones."""
     known = known_window(rooms.labels > 0)
-    # What lies beyond the canvas is not known to be unknown, so only neighbours on it count.
+    # What lies beyond the canvas is not known to be unknown, so only neighbors on it count.
     window = tuple(slice(max(part.start - 1, 0), part.stop + 1) for part in known)
     labels, unknown = rooms.labels[window], snapshot.cells[window] == UNKNOWN
     sides = np.zeros(len(rooms) + 1, np.int64)

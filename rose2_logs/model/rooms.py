@@ -26,7 +26,7 @@ class Doorway:
     rooms : (int, int)
         The two room numbers, the smaller one first.
     ends_m : (2, 2) float
-        The two ends of the passage, world metres.
+        The two ends of the passage, world meters.
     """
 
     rooms: tuple[int, int]
@@ -34,7 +34,7 @@ class Doorway:
 
     @property
     def width_m(self) -> float:
-        """Clear width of the passage in metres."""
+        """Clear width of the passage in meters."""
         return float(np.linalg.norm(self.ends_m[1] - self.ends_m[0]))
 
 
@@ -49,10 +49,10 @@ class RoomMap:
     labels : (H, W) int32, read-only
         0 = no room, 1..R = the rooms: the segmented map.
     polygons : tuple of R shapely Polygon or MultiPolygon
-        Shape of room i + 1 in world metres. From ROSE2 it includes the predicted, unseen part of the room;
-        from a baseline it is the outline of the labelled cells.
+        Shape of room i + 1 in world meters. From ROSE2 it includes the predicted, unseen part of the room;
+        from a baseline it is the outline of the labeled cells.
     areas_m2 : (R,) float
-        Area of the labelled cells of each room.
+        Area of the labeled cells of each room.
     doorways : tuple of Doorway
         Passages between rooms.
     """
@@ -88,12 +88,12 @@ class RoomMap:
 
     @property
     def predicted_areas_m2(self) -> FloatArray:
-        """Area (R,) of each room's polygon in square metres."""
+        """Area (R,) of each room's polygon in square meters."""
         return np.array([polygon.area for polygon in self.polygons], float)
 
     @cached_property
     def label_points_m(self) -> FloatArray:
-        """World point (R, 2) for the name of each room, metres: well inside its cells, so where it was seen.
+        """World point (R, 2) for the name of each room, meters: well inside its cells, so where it was seen.
 
         Of a room without cells it is a point of its polygon, NaN where that is empty.
         """
@@ -109,14 +109,14 @@ class RoomMap:
                 deep = np.argwhere(depth >= LABEL_DEPTH_SHARE * depth.max())
                 middle = [np.average(np.arange(len(n)) - 1, weights=n) for n in (cells.sum(1), cells.sum(0))]
                 row, column = deep[np.argmin(((deep - middle) ** 2).sum(axis=1))]
-                points[room - 1] = self.geometry.cell_centres(box[0].start + row, box[1].start + column)
+                points[room - 1] = self.geometry.cell_centers(box[0].start + row, box[1].start + column)
             elif not shape.is_empty:
                 points[room - 1] = shape.representative_point().coords[0]
         return points
 
     @cached_property
     def outer_rings_m(self) -> tuple[list[FloatArray], ...]:
-        """Closed outer rings (K, 2) of each room's polygon in world metres."""
+        """Closed outer rings (K, 2) of each room's polygon in world meters."""
         import shapely
 
         parts, room = shapely.get_parts(np.array(self.polygons, object), return_index=True)
@@ -132,6 +132,6 @@ class RoomMap:
         """Pairs of room numbers, smaller first, that at least one doorway connects; sorted."""
         return tuple(sorted({doorway.rooms for doorway in self.doorways}))
 
-    def neighbours(self, room: int) -> tuple[int, ...]:
+    def neighbors(self, room: int) -> tuple[int, ...]:
         """Rooms that a doorway connects with `room`, ascending."""
         return tuple(sorted({a + b - room for a, b in self.adjacency if room in (a, b)}))

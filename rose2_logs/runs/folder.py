@@ -20,7 +20,7 @@ from rose2_logs.model.room_plan import PlanRoom, RoomPlan
 from rose2_logs.model.rooms import Doorway
 from rose2_logs.runs.maps import RunMaps
 from rose2_logs.runs.provenance import log_files
-from rose2_logs.runs.tables import SMOOTHED, SUMMARY, TABLES
+from rose2_logs.runs.tables import BACK_PROJECTED, SUMMARY, TABLES
 from rose2_logs.system.files import require_utf8
 from rose2_logs.system.text import percent
 
@@ -109,7 +109,7 @@ class RunResults:
         LogError
             If there is none of its size.
         """
-        given, place = str(self.summary["log"]), self.summary.get("log_place") or {}
+        given, place = str(self.summary["log"]), self.summary.get("log_location") or {}
         beside = place.get("from_results")
         found = [place.get("absolute"), beside and os.path.normpath(self.folder.resolve() / beside), given]
         candidates = list(dict.fromkeys(str(each) for each in found if each))
@@ -135,8 +135,8 @@ class RunResults:
         import pyarrow as pa
         import pyarrow.parquet as pq
 
-        if name not in (*TABLES, SMOOTHED):
-            raise ValueError(f"no table {name!r}; there are {', '.join((*TABLES, SMOOTHED))}")
+        if name not in (*TABLES, BACK_PROJECTED):
+            raise ValueError(f"no table {name!r}; there are {', '.join((*TABLES, BACK_PROJECTED))}")
         path = self.folder / f"{name}.parquet"
         rows = None if snapshot is None else [("snapshot", "=", snapshot)]
         try:
@@ -144,18 +144,18 @@ class RunResults:
         except (OSError, pa.ArrowException) as error:
             raise LogError(f"{path}: cannot be read: {error}; analyze the log again") from error
 
-    def smoothed(self) -> pa.Table | None:
-        """Read how much of the last map's rooms each map shows; None if the run was not smoothed.
+    def back_projected(self) -> pa.Table | None:
+        """Read how much of the last map's rooms each map shows; None if the run was not back_projected.
 
         Raises
         ------
         LogError
             If the table cannot be read.
         """
-        name = f"{SMOOTHED}.parquet"
+        name = f"{BACK_PROJECTED}.parquet"
         # One that the summary does not name is of an earlier run.
         is_there = name in self.summary["files"] and (self.folder / name).is_file()
-        return self.table(SMOOTHED) if is_there else None
+        return self.table(BACK_PROJECTED) if is_there else None
 
     @cached_property
     def snapshots(self) -> dict[str, np.ndarray[Any, Any]]:
@@ -250,8 +250,8 @@ def _room(row: Row) -> PlanRoom:
         shapely.from_wkb(row["polygon_wkb"]),
         row["area_m2"],
         None if point[0] is None else point,
-        tuple(row["neighbours"]),
-        row["outline_wall_share"],
+        tuple(row["neighbors"]),
+        row["wall_support"],
         row["frontier_m"],
     )
 

@@ -21,12 +21,12 @@ import zstandard
 from rose2_logs.errors import InvalidMapError, OutputError
 from rose2_logs.model.analysis import SnapshotAnalysis
 from rose2_logs.model.occupancy import OccupancySnapshot
-from rose2_logs.model.room_quality import RoomEvidence
+from rose2_logs.model.room_quality import RoomQuality
 from rose2_logs.runs.codec import Codec
 from rose2_logs.system.files import writing
 from rose2_logs.system.workers import Workers
 
-Found = tuple[SnapshotAnalysis, RoomEvidence] | InvalidMapError
+Found = tuple[SnapshotAnalysis, RoomQuality] | InvalidMapError
 """What comes of one map, or why nothing does."""
 
 MAGIC = b"rose2_logs journal 1\n"
@@ -35,7 +35,7 @@ COMPRESSION_LEVEL = 1
 """Of zstd: what is gained above it is little and takes longer."""
 
 _FRAME = struct.Struct("<QI")  # length of what follows, its CRC-32
-_CODEC = Codec([SnapshotAnalysis, RoomEvidence])
+_CODEC = Codec([SnapshotAnalysis, RoomQuality])
 
 
 @dataclass(frozen=True)
@@ -178,7 +178,7 @@ class JournaledWorkers:
     Parameters
     ----------
     workers : Workers
-        What analyses the maps, started.
+        What analyzes the maps, started.
     journal : Journal
         Open.
     """

@@ -123,8 +123,8 @@ def labels_of_segmented(
     for value, holders in by_value.items():
         if len(holders) > 1:
             row, column = np.nonzero(segmented == value)
-            centres = shapely.points(geometry.cell_centres(row, column))
-            distances = [shapely.distance(room.shape, centres) for room in holders]
+            centers = shapely.points(geometry.cell_centers(row, column))
+            distances = [shapely.distance(room.shape, centers) for room in holders]
             nearest = np.argmin(np.nan_to_num(distances, nan=np.inf), axis=0)
             labels[row, column] = np.array([room.number for room in holders])[nearest]
     return labels
@@ -139,7 +139,7 @@ def read_marker_lines(path: Path, topic: str, namespace: str, log_time_ns: int) 
     Returns
     -------
     (N, 2, 2) float or None
-        Ends of the lines, metres; None without such markers.
+        Ends of the lines, meters; None without such markers.
 
     Raises
     ------

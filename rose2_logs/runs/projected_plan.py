@@ -13,17 +13,17 @@ from rose2_logs.model.room_plan import PlanMap, PlanRoom, RoomPlan
 from rose2_logs.model.rooms import Doorway, RoomMap
 from rose2_logs.runs.folder import RunResults
 from rose2_logs.runs.maps import RunMaps
-from rose2_logs.tracking.back_projection import Smoother
+from rose2_logs.tracking.back_projection import BackProjector
 from rose2_logs.tracking.registration import RigidMotion
 
 
-def smoothed_plan(results: RunResults, snapshot: int, maps: RunMaps | None) -> RoomPlan:
+def back_projected_plan(results: RunResults, snapshot: int, maps: RunMaps | None) -> RoomPlan:
     """Find what a map shows of the last map's rooms; their shapes are those of the last map.
 
     Parameters
     ----------
     results : RunResults
-        Of the run; it need not have been smoothed.
+        Of the run; it need not have been back_projected.
     snapshot : int
         Number of the map.
     maps : RunMaps or None
@@ -42,7 +42,7 @@ def smoothed_plan(results: RunResults, snapshot: int, maps: RunMaps | None) -> R
             "analyze the log again without --no-mcap"
         )
     tracks = np.array([room.number for room in last.rooms], np.int32)
-    # Rooms of the plan go by their tracks, ascending; the smoother counts them.
+    # Rooms of the plan go by their tracks, ascending; the projector counts them.
     counted = np.where(last.map.labels > 0, np.searchsorted(tracks, last.map.labels) + 1, 0).astype(np.int32)
     rooms = RoomMap(
         last.map.geometry,
@@ -52,8 +52,8 @@ def smoothed_plan(results: RunResults, snapshot: int, maps: RunMaps | None) -> R
     )
     used = results.parameters("tracking", "occupancy")
     to_last = _drift(results, snapshot).inverse().then(_drift(results, last_number))
-    smoother = Smoother(_snapshot(last_number, last.map), rooms, used.tracking, used.occupancy)
-    found = smoother.rooms(_snapshot(snapshot, then.map), to_last)
+    projector = BackProjector(_snapshot(last_number, last.map), rooms, used.tracking, used.occupancy)
+    found = projector.rooms(_snapshot(snapshot, then.map), to_last)
     back = to_last.inverse()
     points = RoomMap(then.map.geometry, found.labels, rooms.polygons, found.areas_m2).label_points_m.tolist()
     shown = {
@@ -62,7 +62,7 @@ def smoothed_plan(results: RunResults, snapshot: int, maps: RunMaps | None) -> R
             shapely.transform(room.shape, back.points),
             float(area),
             (point[0], point[1]),
-            room.neighbours,
+            room.neighbors,
         )
         for room, area, point in zip(last.rooms, found.areas_m2, points, strict=True)
         if area > 0

@@ -7,11 +7,11 @@ from types import TracebackType
 from typing import Self
 
 from rose2_logs.runs.parquet_table import ParquetTable
-from rose2_logs.tracking.back_projection import SmoothedSnapshot
+from rose2_logs.tracking.back_projection import BackProjectedSnapshot
 
 
-class SmoothedTable:
-    """Writes ``smoothed.parquet`` in the second pass over a run.
+class BackProjectedTable:
+    """Writes ``back_projected.parquet`` in the second pass over a run.
 
     Leaving the context without an exception makes the table whole.
 
@@ -29,13 +29,13 @@ class SmoothedTable:
     def __init__(self, path: Path) -> None:
         from rose2_logs.runs import table_schemas
 
-        self._table = ParquetTable(path, table_schemas.SMOOTHED)
+        self._table = ParquetTable(path, table_schemas.BACK_PROJECTED)
 
     def __enter__(self) -> Self:
         self._table.__enter__()
         return self
 
-    def write_smoothed(self, found: SmoothedSnapshot) -> None:
+    def write_back_projected(self, found: BackProjectedSnapshot) -> None:
         """Take one map: a row for each room that it shows some of."""
         areas_m2, last_m2 = found.rooms.areas_m2, found.last_rooms.areas_m2
         self._table.add(

@@ -63,7 +63,7 @@ def _image_of(file: Path) -> tuple[Path, ...]:
     return tuple(each for each in found if each.is_file())
 
 
-def log_place(log: Path, folder: Path) -> dict[str, str | None]:
+def log_location(log: Path, folder: Path) -> dict[str, str | None]:
     """Tell where a log lies, so that it is found again from anywhere, also after a move with its results.
 
     Parameters

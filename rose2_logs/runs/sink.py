@@ -8,7 +8,7 @@ from types import TracebackType
 from typing import Any, Protocol, Self, runtime_checkable
 
 from rose2_logs.config.parameters import Parameters
-from rose2_logs.tracking.back_projection import SmoothedSnapshot
+from rose2_logs.tracking.back_projection import BackProjectedSnapshot
 from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot
 
 
@@ -19,7 +19,7 @@ class RunInfo:
     Attributes
     ----------
     log_path : path
-        The log that is analysed.
+        The log that is analyzed.
     topic : str
         The map topic.
     method : str
@@ -33,7 +33,7 @@ class RunInfo:
     origin : str, optional
         Where the log comes from if `log_path` is but a copy.
     place : dict, optional
-        Where the log lies on this machine, see `provenance.log_place`; none of a copy.
+        Where the log lies on this machine, see `provenance.log_location`; none of a copy.
     """
 
     log_path: Path
@@ -55,7 +55,7 @@ class Sink(Protocol):
 
     def __enter__(self) -> Self: ...
 
-    def write(self, frame: TrackedSnapshot) -> None:
+    def write(self, step: TrackedSnapshot) -> None:
         """Take one snapshot."""
         ...
 
@@ -65,10 +65,10 @@ class Sink(Protocol):
 
 
 @runtime_checkable
-class SmoothedSink(Protocol):
+class BackProjectedSink(Protocol):
     """Also receives, after the last snapshot, all of them again by the layout of the last."""
 
-    def write_smoothed(self, found: SmoothedSnapshot) -> None:
+    def write_back_projected(self, found: BackProjectedSnapshot) -> None:
         """Take one snapshot of the second pass."""
         ...
 

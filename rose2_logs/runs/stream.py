@@ -15,11 +15,11 @@ from rose2_logs.io.log import LogReader
 from rose2_logs.io.poses import RobotPath
 from rose2_logs.model.explored import coarser_for_its_size
 from rose2_logs.model.occupancy import OccupancySnapshot, free_area_m2, is_same_to_analysis
-from rose2_logs.model.room_quality import room_evidence
+from rose2_logs.model.room_quality import room_quality
 from rose2_logs.runs.journal import Found, JournaledWorkers
 from rose2_logs.runs.summary import RunTotals
-from rose2_logs.segmentation.pipeline import analyse
-from rose2_logs.system.warnings import notice
+from rose2_logs.segmentation.pipeline import analyze
+from rose2_logs.system.warnings import log_warning
 from rose2_logs.system.workers import Workers, give_back_freed_memory
 from rose2_logs.tracking.layout_change import LayoutFollower
 from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot, map_motion
@@ -33,9 +33,9 @@ SnapshotWorkers = Workers[OccupancySnapshot, Found]
 
 
 def start_workers(options: RunOptions) -> SnapshotWorkers:
-    """Return what analyses snapshots: a context manager, to be entered as early as possible."""
+    """Return what analyzes snapshots: a context manager, to be entered as early as possible."""
     work = partial(
-        _analyse_or_refuse,
+        _analyze_or_refuse,
         parameters=options.parameters,
         method=options.method,
         voronoi="voronoi" in options.shown_layers,
@@ -60,11 +60,11 @@ def tracked_snapshots(
     last : OccupancySnapshot
         The last map of the run, which coverage refers to.
     workers : Workers
-        What analyses the maps, started.
+        What analyzes the maps, started.
     parameters : Parameters
         Those that it was started with.
     totals : RunTotals
-        Maps that cannot be analysed are left out and counted as invalid here.
+        Maps that cannot be analyzed are left out and counted as invalid here.
     path : RobotPath, optional
         Where the robot was, to be told with the maps.
     """
@@ -79,7 +79,7 @@ def tracked_snapshots(
         if isinstance(found, InvalidMapError):
             totals.invalid += 1
             text = f"{reader.info.path}: snapshot {snapshot.index} is left out: {found}"
-            notice(logger, "snapshot_left_out", text, file=reader.info.path, topic=reader.topic)
+            log_warning(logger, "snapshot_left_out", text, file=reader.info.path, topic=reader.topic)
             continue
         analysis, evidence = found
         note = coarser_for_its_size(snapshot.geometry, analysis.resolution_m, parameters.occupancy)
@@ -96,12 +96,12 @@ def tracked_snapshots(
         yield TrackedSnapshot(snapshot, analysis, coverage, track_ids, events, evidence, change, way)
 
 
-def _analyse_or_refuse(
+def _analyze_or_refuse(
     snapshot: OccupancySnapshot, parameters: Parameters, method: str, voronoi: bool
 ) -> Found:
     try:
-        analysis = analyse(snapshot, parameters, method, voronoi=voronoi)
-        return analysis, room_evidence(snapshot, analysis.rooms, parameters.occupancy)
+        analysis = analyze(snapshot, parameters, method, voronoi=voronoi)
+        return analysis, room_quality(snapshot, analysis.rooms, parameters.occupancy)
     except InvalidMapError as error:
         return error
     except MemoryError:

@@ -13,8 +13,8 @@ from typing import Any
 
 from rose2_logs.runs.sink import RunInfo
 from rose2_logs.system.files import replacing
-from rose2_logs.tracking.convergence import Hindsight
-from rose2_logs.tracking.track_history import RoomLives
+from rose2_logs.tracking.convergence import Convergence
+from rose2_logs.tracking.track_history import TrackHistories
 from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot
 
 
@@ -46,9 +46,9 @@ class RunTotals:
     Attributes
     ----------
     snapshots : int
-        Maps that were analysed.
+        Maps that were analyzed.
     invalid : int
-        Maps that could not be analysed and were left out.
+        Maps that could not be analyzed and were left out.
     unchanged : int
         Maps with the free and occupied cells of the one before, whose analysis was taken over.
     rooms_last : int
@@ -85,23 +85,23 @@ class RunTotals:
     stage_seconds: dict[str, float] = field(default_factory=dict)
     stage_seconds_max: dict[str, float] = field(default_factory=dict)
 
-    def add(self, frame: TrackedSnapshot) -> None:
+    def add(self, step: TrackedSnapshot) -> None:
         """Take one snapshot."""
         if self.first_log_time_ns is None:
-            self.first_log_time_ns = frame.snapshot.log_time_ns
-            self.coverage_first = frame.coverage
-        self.last_log_time_ns = frame.snapshot.log_time_ns
-        self.coverage_last = frame.coverage
+            self.first_log_time_ns = step.snapshot.log_time_ns
+            self.coverage_first = step.coverage
+        self.last_log_time_ns = step.snapshot.log_time_ns
+        self.coverage_last = step.coverage
         self.snapshots += 1
-        self.rooms_last = len(frame.track_ids)
-        self.tracks = max(self.tracks, *frame.track_ids, 0)
-        self.events.update(event.kind for event in frame.events)
-        if frame.change is not None:
-            self.changed_share.add(frame.change.changed_share)
-            self.variation_bits.add(frame.change.variation_bits)
-        if frame.evidence is not None:
-            self.frontier_m = float(frame.evidence.frontier_m.sum())
-        for stage, seconds in frame.analysis.seconds.items():
+        self.rooms_last = len(step.track_ids)
+        self.tracks = max(self.tracks, *step.track_ids, 0)
+        self.events.update(event.kind for event in step.events)
+        if step.change is not None:
+            self.changed_share.add(step.change.changed_share)
+            self.variation_bits.add(step.change.variation_bits)
+        if step.quality is not None:
+            self.frontier_m = float(step.quality.frontier_m.sum())
+        for stage, seconds in step.analysis.seconds.items():
             self.stage_seconds[stage] = self.stage_seconds.get(stage, 0.0) + seconds
             self.stage_seconds_max[stage] = max(self.stage_seconds_max.get(stage, 0.0), seconds)
 
@@ -110,8 +110,8 @@ def write_summary(
     path: Path,
     info: RunInfo,
     totals: RunTotals,
-    lives: RoomLives,
-    hindsight: Hindsight | None,
+    histories: TrackHistories,
+    convergence: Convergence | None,
     *,
     selection: dict[str, Any],
     messages: dict[str, int],
@@ -131,7 +131,7 @@ def write_summary(
         Log, method, resolved parameters, versions, provenance.
     totals : RunTotals
         What came out.
-    lives, hindsight : RoomLives, Hindsight
+    histories, convergence : TrackHistories, Convergence
         What is known of every room, and since when it was right.
     selection, messages : dict
         Which maps were asked for, and what became of the log's messages.
@@ -153,7 +153,7 @@ def write_summary(
     """
     summary = {
         "log": info.origin or str(info.log_path),
-        "log_place": info.place,
+        "log_location": info.place,
         "topic": info.topic,
         "method": info.method,
         "input": info.provenance,
@@ -174,7 +174,7 @@ def write_summary(
             "tracks": totals.tracks,
             "events": dict(sorted(totals.events.items())),
         },
-        "layout": _layout(totals, lives, hindsight),
+        "layout": _layout(totals, histories, convergence),
         "files": files,
         **({} if copied is None else {"annotated_log": copied}),
         "seconds": {
@@ -187,28 +187,30 @@ def write_summary(
     write_json(path, summary)
 
 
-def _layout(totals: RunTotals, lives: RoomLives, hindsight: Hindsight | None) -> dict[str, Any]:
+def _layout(totals: RunTotals, histories: TrackHistories, convergence: Convergence | None) -> dict[str, Any]:
     """Tell how the layout came to be: since when it was final, how much it changed, how sure it is."""
-    rooms = [lives.lives[track] for track in lives.in_last_map]
+    rooms = [histories.tracks[track] for track in histories.in_last_map]
     facts: dict[str, Any] = {
         "final_since": None,
         "changed_share_mean": totals.changed_share.mean,
         "changed_share_max": totals.changed_share.maximum,
         "variation_bits_mean": totals.variation_bits.mean,
         "variation_bits_max": totals.variation_bits.maximum,
-        "outline_wall_share_median": _median(room.outline_wall_share for room in rooms),
+        "wall_support_median": _median(room.wall_support for room in rooms),
         "frontier_m": totals.frontier_m,
     }
-    if hindsight is not None:
-        settled, right = hindsight.area_settled, hindsight.shape_right
+    if convergence is not None:
+        settled, right = convergence.area_settled, convergence.shape_right
         facts |= {
-            "final_since": hindsight.layout_final and dataclasses.asdict(hindsight.layout_final),
-            "area_settled_coverage_median": _median(settled[track].coverage for track in lives.in_last_map),
+            "final_since": convergence.layout_final and dataclasses.asdict(convergence.layout_final),
+            "area_settled_coverage_median": _median(
+                settled[track].coverage for track in histories.in_last_map
+            ),
             "shape_right_coverage_median": _median(
-                right[track].coverage for track in lives.in_last_map if track in right
+                right[track].coverage for track in histories.in_last_map if track in right
             ),
             "shape_right_seen_share_median": _median(
-                hindsight.shape_right_seen.get(track) for track in lives.in_last_map
+                convergence.shape_right_seen.get(track) for track in histories.in_last_map
             ),
         }
     return facts

@@ -22,7 +22,7 @@ _NULLABLE = frozenset(
         "label_x_m",
         "label_y_m",
         "clean_threshold",
-        "outline_wall_share",
+        "wall_support",
         "frontier_m",
         "variation_bits",
         "changed_share",
@@ -49,11 +49,11 @@ _SNAPSHOT: dict[str, tuple[pa.DataType, str]] = {
 }
 
 _EVIDENCE: dict[str, tuple[pa.DataType, str]] = {
-    "outline_wall_share": (
+    "wall_support": (
         pa.float64(),
         "share of the outline, with its predicted part, that occupied cells back; doorways are not backed",
     ),
-    "frontier_m": (pa.float64(), "open frontier: sides of its free cells towards unknown ones, metres"),
+    "frontier_m": (pa.float64(), "open frontier: sides of its free cells towards unknown ones, meters"),
 }
 
 _SNAPSHOTS_ALONG: dict[str, tuple[pa.DataType, str]] = {
@@ -61,12 +61,12 @@ _SNAPSHOTS_ALONG: dict[str, tuple[pa.DataType, str]] = {
     "stamp_ns": (pa.int64(), "header stamp of the map, nanoseconds"),
     "time_s": (pa.float64(), "log time since the first snapshot, seconds"),
     "coverage": (pa.float64(), "known free area over that of the run's last map, share in [0, 1]"),
-    "free_area_m2": (pa.float64(), "known free area, square metres"),
+    "free_area_m2": (pa.float64(), "known free area, square meters"),
     "rooms": (pa.int32(), "number of rooms"),
-    "rooms_area_m2": (pa.float64(), "area of all rooms as far as they were seen, square metres"),
+    "rooms_area_m2": (pa.float64(), "area of all rooms as far as they were seen, square meters"),
     "rooms_predicted_area_m2": (
         pa.float64(),
-        "area of all rooms with their predicted parts, square metres",
+        "area of all rooms with their predicted parts, square meters",
     ),
     "doorways": (pa.int32(), "number of doorways between rooms"),
     "directions_rad": (
@@ -79,17 +79,17 @@ _SNAPSHOTS_ALONG: dict[str, tuple[pa.DataType, str]] = {
     "faces": (pa.int32(), "number of faces"),
     "repeats_before": (pa.int32(), "identical maps dropped since the snapshot before"),
     "frame_id": (pa.string(), "name of the world frame"),
-    "resolution_m": (pa.float64(), "side of a cell, metres"),
-    "analysed_resolution_m": (
+    "resolution_m": (pa.float64(), "side of a cell, meters"),
+    "analyzed_resolution_m": (
         pa.float64(),
-        "side of the cells that the map was analysed in, metres: larger for maps that are very fine or large",
+        "side of the cells that the map was analyzed in, meters: larger for maps that are very fine or large",
     ),
-    "origin_x_m": (pa.float64(), "world x of the grid's origin, metres"),
-    "origin_y_m": (pa.float64(), "world y of the grid's origin, metres"),
+    "origin_x_m": (pa.float64(), "world x of the grid's origin, meters"),
+    "origin_y_m": (pa.float64(), "world y of the grid's origin, meters"),
     "yaw_rad": (pa.float64(), "rotation of the grid in the world, radians counter-clockwise"),
     "height_cells": (pa.int32(), "rows of the grid"),
     "width_cells": (pa.int32(), "columns of the grid"),
-    "frontier_m": (pa.float64(), "open frontier of all rooms, metres"),
+    "frontier_m": (pa.float64(), "open frontier of all rooms, meters"),
     "variation_bits": (
         pa.float64(),
         "variation of information between the rooms of the map before and of this one, over the floor in "
@@ -99,8 +99,8 @@ _SNAPSHOTS_ALONG: dict[str, tuple[pa.DataType, str]] = {
         pa.float64(),
         "share of this floor that is in a room of another track than in the map before",
     ),
-    "drift_x_m": (pa.float64(), "where the first map's frame lies now: x of its origin, metres"),
-    "drift_y_m": (pa.float64(), "y of its origin, metres"),
+    "drift_x_m": (pa.float64(), "where the first map's frame lies now: x of its origin, meters"),
+    "drift_y_m": (pa.float64(), "y of its origin, meters"),
     "drift_yaw_rad": (pa.float64(), "its turn, radians counter-clockwise; changes with shifted events"),
 }
 
@@ -136,13 +136,13 @@ ROOMS = _table(
         **_SNAPSHOT,
         "track": (pa.int32(), "number of the room over the run, from 1"),
         "room": (pa.int32(), "number of the room in this snapshot, from 1"),
-        "area_m2": (pa.float64(), "area as far as it was seen, square metres"),
-        "predicted_area_m2": (pa.float64(), "area of the polygon, with the predicted part, square metres"),
-        "label_x_m": (pa.float64(), "world x of a point well inside what was seen of the room, metres"),
-        "label_y_m": (pa.float64(), "world y of a point well inside what was seen of the room, metres"),
-        "neighbours": (pa.list_(pa.int32()), "tracks of the rooms behind its doorways, ascending"),
+        "area_m2": (pa.float64(), "area as far as it was seen, square meters"),
+        "predicted_area_m2": (pa.float64(), "area of the polygon, with the predicted part, square meters"),
+        "label_x_m": (pa.float64(), "world x of a point well inside what was seen of the room, meters"),
+        "label_y_m": (pa.float64(), "world y of a point well inside what was seen of the room, meters"),
+        "neighbors": (pa.list_(pa.int32()), "tracks of the rooms behind its doorways, ascending"),
         **_EVIDENCE,
-        "polygon_wkb": (pa.binary(), "shape with the predicted part, well-known binary, world metres"),
+        "polygon_wkb": (pa.binary(), "shape with the predicted part, well-known binary, world meters"),
     },
     {"geo": json.dumps(GEOPARQUET, sort_keys=True)},
 )
@@ -160,8 +160,8 @@ EVENTS = _table(
             pa.float64(),
             "intersection over union with the track's last shape, share; 0 for none",
         ),
-        "shift_x_m": (pa.float64(), "of a shift, how far the middle of the walls moved: x, metres"),
-        "shift_y_m": (pa.float64(), "y, metres"),
+        "shift_x_m": (pa.float64(), "of a shift, how far the middle of the walls moved: x, meters"),
+        "shift_y_m": (pa.float64(), "y, meters"),
         "turn_rad": (pa.float64(), "and how far the map turned about it, radians counter-clockwise"),
     }
 )
@@ -171,26 +171,26 @@ DOORWAYS = _table(
         **_SNAPSHOT,
         "track_a": (pa.int32(), "track of the room on one side, the smaller number"),
         "track_b": (pa.int32(), "track of the room on the other side"),
-        "width_m": (pa.float64(), "clear width, metres"),
-        "x0_m": (pa.float64(), "world x of one end, metres"),
-        "y0_m": (pa.float64(), "world y of one end, metres"),
-        "x1_m": (pa.float64(), "world x of the other end, metres"),
-        "y1_m": (pa.float64(), "world y of the other end, metres"),
+        "width_m": (pa.float64(), "clear width, meters"),
+        "x0_m": (pa.float64(), "world x of one end, meters"),
+        "y0_m": (pa.float64(), "world y of one end, meters"),
+        "x1_m": (pa.float64(), "world x of the other end, meters"),
+        "y1_m": (pa.float64(), "world y of the other end, meters"),
     }
 )
 
-SMOOTHED = _table(
+BACK_PROJECTED = _table(
     {
         **_SNAPSHOT,
         "track": (pa.int32(), "a room of the run's last map"),
-        "area_m2": (pa.float64(), "area of it that this map shows, square metres"),
+        "area_m2": (pa.float64(), "area of it that this map shows, square meters"),
         "last_area_share": (
             pa.float64(),
             "that over its area in the last map; above 1 where a later map lost some",
         ),
     }
 )
-"""The last map's rooms on all maps, of `analyze --smooth`."""
+"""The last map's rooms on all maps, of `analyze --back-project`."""
 
 TRACKS = _table(
     {
@@ -203,8 +203,8 @@ TRACKS = _table(
         "last_coverage": (pa.float64(), "coverage then, share in [0, 1]"),
         "maps": (pa.int32(), "number of maps that show it"),
         "in_last_map": (pa.bool_(), "whether the run's last map shows it"),
-        "area_m2": (pa.float64(), "its last area, as far as it was seen, square metres"),
-        "predicted_area_m2": (pa.float64(), "area of its last shape, with the predicted part, square metres"),
+        "area_m2": (pa.float64(), "its last area, as far as it was seen, square meters"),
+        "predicted_area_m2": (pa.float64(), "area of its last shape, with the predicted part, square meters"),
         "area_settled_snapshot": (pa.int32(), "map from which on its area was within 10 % of the last"),
         "area_settled_time_s": (pa.float64(), "when that was, seconds"),
         "area_settled_coverage": (pa.float64(), "coverage then, share in [0, 1]"),
@@ -222,7 +222,7 @@ TRACKS = _table(
         "splits": (pa.int32(), "how often it was split"),
         "merges": (pa.int32(), "how often it took in others"),
         "losses": (pa.int32(), "how often it was lost"),
-        "polygon_wkb": (pa.binary(), "its last shape, well-known binary, world metres"),
+        "polygon_wkb": (pa.binary(), "its last shape, well-known binary, world meters"),
     },
     {"geo": json.dumps(GEOPARQUET, sort_keys=True)},
 )
@@ -241,13 +241,13 @@ ROOM_CHANGES = _table(
             "the same where both runs have explored, share; null where they nowhere have",
         ),
         "explored_share": (pa.float64(), "share of the place of both shapes that both runs have explored"),
-        "area_a_m2": (pa.float64(), "area in A as far as it was seen, square metres"),
-        "area_b_m2": (pa.float64(), "area in B as far as it was seen, square metres"),
-        "predicted_area_a_m2": (pa.float64(), "area of A's shape, with the predicted part, square metres"),
-        "predicted_area_b_m2": (pa.float64(), "area of B's shape, with the predicted part, square metres"),
+        "area_a_m2": (pa.float64(), "area in A as far as it was seen, square meters"),
+        "area_b_m2": (pa.float64(), "area in B as far as it was seen, square meters"),
+        "predicted_area_a_m2": (pa.float64(), "area of A's shape, with the predicted part, square meters"),
+        "predicted_area_b_m2": (pa.float64(), "area of B's shape, with the predicted part, square meters"),
         "shape_a_wkb": (
             pa.binary(),
-            "shape in A with the predicted part, well-known binary, A's frame, metres",
+            "shape in A with the predicted part, well-known binary, A's frame, meters",
         ),
         "shape_b_wkb": (pa.binary(), "shape in B, likewise, also in A's frame"),
     },
@@ -257,13 +257,13 @@ ROOM_CHANGES = _table(
 WALL_CHANGES = _table(
     {
         "status": (pa.string(), "missing, new or moved"),
-        "length_m": (pa.float64(), "length of the stretch, of a moved wall the longer of the two, metres"),
-        "shift_m": (pa.float64(), "of a moved wall, how far it is from where it was, across it, metres"),
-        "a_x0_m": (pa.float64(), "x of one end in A, A's frame, metres; null for a new wall"),
+        "length_m": (pa.float64(), "length of the stretch, of a moved wall the longer of the two, meters"),
+        "shift_m": (pa.float64(), "of a moved wall, how far it is from where it was, across it, meters"),
+        "a_x0_m": (pa.float64(), "x of one end in A, A's frame, meters; null for a new wall"),
         "a_y0_m": (pa.float64(), "y of it"),
         "a_x1_m": (pa.float64(), "x of the other end in A"),
         "a_y1_m": (pa.float64(), "y of it"),
-        "b_x0_m": (pa.float64(), "x of one end in B, A's frame, metres; null for a missing wall"),
+        "b_x0_m": (pa.float64(), "x of one end in B, A's frame, meters; null for a missing wall"),
         "b_y0_m": (pa.float64(), "y of it"),
         "b_x1_m": (pa.float64(), "x of the other end in B"),
         "b_y1_m": (pa.float64(), "y of it"),

@@ -7,10 +7,10 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from rose2_logs.runs.convergence_tables import write_hindsight
+from rose2_logs.runs.convergence_tables import write_convergence
 from rose2_logs.runs.parquet_table import ParquetTable, Row
-from rose2_logs.tracking.convergence import Hindsight
-from rose2_logs.tracking.track_history import Moment, RoomLives, evidence_of
+from rose2_logs.tracking.convergence import Convergence
+from rose2_logs.tracking.track_history import SnapshotRef, TrackHistories, quality_of
 from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot
 
 
@@ -27,15 +27,15 @@ class Tables:
 
     Attributes
     ----------
-    lives : RoomLives
+    histories : TrackHistories
         What is known of every room over the run.
-    hindsight : Hindsight or None
-        What the last map tells of the ones before, after `look_back`.
+    convergence : Convergence or None
+        What the last map tells of the ones before, after `measure_convergence`.
     """
 
     def __init__(self, folder: Path) -> None:
-        self.lives = RoomLives()
-        self.hindsight: Hindsight | None = None
+        self.histories = TrackHistories()
+        self.convergence: Convergence | None = None
         self._folder = folder
         self._stack = ExitStack()
         self._tables: dict[str, ParquetTable] = {}
@@ -59,7 +59,7 @@ class Tables:
             self._stack = opening.pop_all()
         return self
 
-    def write(self, frame: TrackedSnapshot) -> None:
+    def write(self, step: TrackedSnapshot) -> None:
         """Take one snapshot.
 
         Raises
@@ -67,24 +67,24 @@ class Tables:
         OutputError
             If a file cannot be written.
         """
-        self.lives.add(frame)
-        about = {"snapshot": frame.snapshot.index, "log_time_ns": frame.snapshot.log_time_ns}
-        self._tables["along"].add([about | _snapshot_row(frame, self.lives.moment(frame))])
-        self._tables["rooms"].add([about | row for row in _room_rows(frame)])
-        self._tables["events"].add([about | row for row in _event_rows(frame)])
-        self._tables["doorways"].add([about | row for row in _doorway_rows(frame)])
+        self.histories.add(step)
+        about = {"snapshot": step.snapshot.index, "log_time_ns": step.snapshot.log_time_ns}
+        self._tables["along"].add([about | _snapshot_row(step, self.histories.snapshot_ref(step))])
+        self._tables["rooms"].add([about | row for row in _room_rows(step)])
+        self._tables["events"].add([about | row for row in _event_rows(step)])
+        self._tables["doorways"].add([about | row for row in _doorway_rows(step)])
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
         with self._stack:
             if kind is None:
-                self.look_back()
+                self.measure_convergence()
                 _, *tables = self._tables.values()
                 for table in tables:
                     table.publish()
 
-    def look_back(self) -> None:
+    def measure_convergence(self) -> None:
         """Find what the last map tells of the ones before: after the last snapshot; the end does it else.
 
         Raises
@@ -92,12 +92,12 @@ class Tables:
         OutputError
             If a file cannot be written or read back.
         """
-        if self.hindsight is not None:
+        if self.convergence is not None:
             return
         for name in ("along", "rooms", "events", "doorways"):
             self._tables[name].close()
-        self.hindsight = write_hindsight(
-            self.lives,
+        self.convergence = write_convergence(
+            self.histories,
             rooms_path=self._tables["rooms"].part,
             along_path=self._tables["along"].part,
             snapshots=self._tables["snapshots"],
@@ -105,15 +105,15 @@ class Tables:
         )
 
 
-def _snapshot_row(frame: TrackedSnapshot, moment: Moment) -> Row:
-    snapshot, analysis, geometry = frame.snapshot, frame.analysis, frame.analysis.geometry
+def _snapshot_row(step: TrackedSnapshot, snapshot_ref: SnapshotRef) -> Row:
+    snapshot, analysis, geometry = step.snapshot, step.analysis, step.analysis.geometry
     structure, walls, plan = analysis.structure, analysis.walls, analysis.floor_plan
-    change = frame.change
+    change = step.change
     x, y, yaw = (0.0, 0.0, 0.0) if change is None else change.drift.pose
     return {
         "stamp_ns": snapshot.stamp_ns,
-        "time_s": moment.time_s,
-        "coverage": frame.coverage,
+        "time_s": snapshot_ref.time_s,
+        "coverage": step.coverage,
         "free_area_m2": analysis.free_area_m2,
         "rooms": len(analysis.rooms),
         "rooms_area_m2": float(analysis.rooms.areas_m2.sum()),
@@ -127,13 +127,13 @@ def _snapshot_row(frame: TrackedSnapshot, moment: Moment) -> Row:
         "repeats_before": snapshot.repeats_before,
         "frame_id": geometry.frame_id,
         "resolution_m": geometry.resolution_m,
-        "analysed_resolution_m": frame.analysis.resolution_m,
+        "analyzed_resolution_m": step.analysis.resolution_m,
         "origin_x_m": geometry.origin_xy_m[0],
         "origin_y_m": geometry.origin_xy_m[1],
         "yaw_rad": geometry.yaw_rad,
         "height_cells": geometry.shape[0],
         "width_cells": geometry.shape[1],
-        "frontier_m": None if frame.evidence is None else float(frame.evidence.frontier_m.sum()),
+        "frontier_m": None if step.quality is None else float(step.quality.frontier_m.sum()),
         "variation_bits": change and change.variation_bits,
         "changed_share": change and change.changed_share,
         "drift_x_m": x,
@@ -142,13 +142,13 @@ def _snapshot_row(frame: TrackedSnapshot, moment: Moment) -> Row:
     }
 
 
-def _room_rows(frame: TrackedSnapshot) -> list[Row]:
-    rooms, tracks = frame.analysis.rooms, frame.track_ids
+def _room_rows(step: TrackedSnapshot) -> list[Row]:
+    rooms, tracks = step.analysis.rooms, step.track_ids
     rows = []
     points = rooms.label_points_m.tolist()
     for number, (track, polygon) in enumerate(zip(tracks, rooms.polygons, strict=True), start=1):
         x, y = (None, None) if polygon.is_empty else points[number - 1]
-        wall_share, frontier_m = evidence_of(frame, number - 1)
+        wall_share, frontier_m = quality_of(step, number - 1)
         rows.append(
             {
                 "track": track,
@@ -157,8 +157,8 @@ def _room_rows(frame: TrackedSnapshot) -> list[Row]:
                 "predicted_area_m2": polygon.area,
                 "label_x_m": x,
                 "label_y_m": y,
-                "neighbours": sorted(tracks[other - 1] for other in rooms.neighbours(number)),
-                "outline_wall_share": wall_share,
+                "neighbors": sorted(tracks[other - 1] for other in rooms.neighbors(number)),
+                "wall_support": wall_share,
                 "frontier_m": frontier_m,
                 "polygon_wkb": polygon.wkb,
             }
@@ -166,9 +166,9 @@ def _room_rows(frame: TrackedSnapshot) -> list[Row]:
     return sorted(rows, key=lambda row: row["track"])
 
 
-def _event_rows(frame: TrackedSnapshot) -> list[Row]:
+def _event_rows(step: TrackedSnapshot) -> list[Row]:
     rows = []
-    for event in frame.events:
+    for event in step.events:
         motion = event.motion
         x, y = (None, None) if motion is None else motion.shift_xy_m
         rows.append(
@@ -185,10 +185,10 @@ def _event_rows(frame: TrackedSnapshot) -> list[Row]:
     return rows
 
 
-def _doorway_rows(frame: TrackedSnapshot) -> list[Row]:
+def _doorway_rows(step: TrackedSnapshot) -> list[Row]:
     rows = []
-    for doorway in frame.analysis.rooms.doorways:
-        track_a, track_b = sorted(frame.track_ids[room - 1] for room in doorway.rooms)
+    for doorway in step.analysis.rooms.doorways:
+        track_a, track_b = sorted(step.track_ids[room - 1] for room in doorway.rooms)
         (x0, y0), (x1, y1) = doorway.ends_m.tolist()
         rows.append(
             {
@@ -207,8 +207,8 @@ def _doorway_rows(frame: TrackedSnapshot) -> list[Row]:
 TABLES = ("snapshots", "rooms", "tracks", "events", "doorways")
 
 
-SMOOTHED = "smoothed"
-"""Name of the table that a run has only where it was asked to smooth."""
+BACK_PROJECTED = "back_projected"
+"""Name of the table that a run has only where it was asked to back_project."""
 
 
 SUMMARY = "summary.json"

@@ -13,12 +13,12 @@ IntArray = NDArray[np.intp]
 
 
 def circular_peaks(values: FloatArray, min_gap: int = 1, min_prominence: float = 0.0) -> IntArray:
-    """Find the values that are higher than their neighbours on both sides.
+    """Find the values that are higher than their neighbors on both sides.
 
     Parameters
     ----------
     values : (B,) float
-        The last is a neighbour of the first.
+        The last is a neighbor of the first.
     min_gap : int
         Least number of steps between two peaks: the higher one stays, of equal ones the first.
     min_prominence : float

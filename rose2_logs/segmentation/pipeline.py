@@ -14,7 +14,7 @@ from rose2_logs.config.parameters import Parameters
 from rose2_logs.errors import ParameterError
 from rose2_logs.model.analysis import FloorPlan, SnapshotAnalysis, Structure, Walls
 from rose2_logs.model.explored import ExploredPart
-from rose2_logs.model.labels import distinct_labels, label_sizes, renumbered
+from rose2_logs.model.labels import distinct_labels, label_sizes, renumber_in_place
 from rose2_logs.model.occupancy import BoolArray, OccupancySnapshot
 from rose2_logs.model.outlines import room_outlines
 from rose2_logs.model.rooms import Doorway, RoomMap
@@ -36,7 +36,7 @@ METHODS = ("rose2", *BASELINES)
 """Names of the segmentation methods: the paper's, and those that it compares with."""
 
 
-def analyse(
+def analyze(
     snapshot: OccupancySnapshot, parameters: Parameters, method: str = "rose2", *, voronoi: bool = False
 ) -> SnapshotAnalysis:
     """Segment one map into rooms.
@@ -157,9 +157,11 @@ def _finished_rooms(
     number = number_rooms(
         labels, int(unsettled.max(initial=0)), parameters.floor_plan.room_min_area_m2, resolution_m
     )
-    labels = renumbered(labels, number)
+    labels = renumber_in_place(labels, number)
     # Which faces are a room's is told by the labels before their borders settled.
-    room_of_face, shapes = _room_shapes(plan, renumbered(unsettled, number), labels, resolution_m, parameters)
+    room_of_face, shapes = _room_shapes(
+        plan, renumber_in_place(unsettled, number), labels, resolution_m, parameters
+    )
     return labels, shapes, room_of_face
 
 

@@ -24,12 +24,12 @@ ALIGNMENT_BYTES = 64
 """Arrays begin at multiples of it, as numpy and OpenCV like them."""
 
 
-class ParcelError(Rose2LogsError):
+class SharedMemoryError(Rose2LogsError):
     """There is no room for what is handed over."""
 
 
 @dataclass(frozen=True)
-class Parcel:
+class Packed:
     """A value on its way.
 
     Attributes
@@ -37,7 +37,7 @@ class Parcel:
     pickled : bytes
         All but the large arrays.
     file : str, optional
-        Holds the large arrays; it goes when the parcel is opened.
+        Holds the large arrays; it goes when the value is unpacked.
     spans : tuple of (int, int)
         Where each of them begins and ends in the file.
     """
@@ -48,8 +48,8 @@ class Parcel:
 
 
 @contextmanager
-def parcel_folders() -> Iterator[tuple[str, ...]]:
-    """Give folders for parcels, the best one first; what was not taken out goes with them."""
+def shared_memory_folders() -> Iterator[tuple[str, ...]]:
+    """Give folders for packed values, the best one first; what was not taken out goes with them."""
     with ExitStack() as stack:
         places = [str(SHARED_MEMORY)] if SHARED_MEMORY.is_dir() else []
         made = []
@@ -59,12 +59,12 @@ def parcel_folders() -> Iterator[tuple[str, ...]]:
         yield tuple(made)
 
 
-def pack(value: Any, folders: Sequence[str]) -> Parcel:
-    """Make a parcel of a picklable value; its large arrays go to the first folder that has room for them.
+def pack(value: Any, folders: Sequence[str]) -> Packed:
+    """Pack a picklable value; its large arrays go to the first folder that has room for them.
 
     Raises
     ------
-    ParcelError
+    SharedMemoryError
         If none has.
     """
     arrays: list[memoryview] = []
@@ -77,7 +77,7 @@ def pack(value: Any, folders: Sequence[str]) -> Parcel:
 
     pickled = pickle.dumps(value, protocol=5, buffer_callback=keep_in_pickle)
     if not arrays:
-        return Parcel(pickled)
+        return Packed(pickled)
     spans, end = [], 0
     for array in arrays:
         begin = end + -end % ALIGNMENT_BYTES
@@ -86,10 +86,10 @@ def pack(value: Any, folders: Sequence[str]) -> Parcel:
     why: OSError | None = None
     for folder in folders:
         try:
-            return Parcel(pickled, _written(arrays, spans, folder), tuple(spans))
+            return Packed(pickled, _written(arrays, spans, folder), tuple(spans))
         except OSError as error:
             why = error
-    raise ParcelError(
+    raise SharedMemoryError(
         f"no room for {end / 1e6:.0f} MB in {' or '.join(folders) or tempfile.gettempdir()}: {why}; "
         "free some space or use one worker"
     )
@@ -111,14 +111,14 @@ def _written(arrays: Sequence[memoryview], spans: Sequence[tuple[int, int]], fol
     return file.name
 
 
-def unpack(parcel: Parcel) -> Any:
-    """Take a value out of its parcel, once; its arrays stay in the mapped memory as long as they live."""
-    if parcel.file is None:
-        return pickle.loads(parcel.pickled)  # noqa: S301 (of a worker of this run)
-    with Path(parcel.file).open("rb") as file:
+def unpack(packed: Packed) -> Any:
+    """Unpack a value, once; its arrays stay in the mapped memory as long as they live."""
+    if packed.file is None:
+        return pickle.loads(packed.pickled)  # noqa: S301 (of a worker of this run)
+    with Path(packed.file).open("rb") as file:
         mapped = memoryview(mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_COPY))
     # On Windows a file that is mapped stays; it goes with its folder.
     with suppress(OSError):
-        Path(parcel.file).unlink()
-    arrays = [mapped[begin:end] for begin, end in parcel.spans]
-    return pickle.loads(parcel.pickled, buffers=arrays)  # noqa: S301 (of a worker of this run)
+        Path(packed.file).unlink()
+    arrays = [mapped[begin:end] for begin, end in packed.spans]
+    return pickle.loads(packed.pickled, buffers=arrays)  # noqa: S301 (of a worker of this run)

@@ -40,7 +40,7 @@ class StrictError(Rose2LogsError):
     """A warning, where warnings are errors."""
 
 
-def notice(
+def log_warning(
     logger: logging.Logger,
     kind: str,
     text: str,
@@ -76,7 +76,7 @@ def notice(
 
 
 @dataclass
-class NoticesOfKind:
+class WarningsOfKind:
     """How often a kind of warning came, and the first few of them."""
 
     count: int = 0
@@ -84,10 +84,10 @@ class NoticesOfKind:
 
 
 @dataclass
-class Notices:
+class WarningLog:
     """The warnings of a run, by kind in the order in which they first came."""
 
-    kinds: dict[str, NoticesOfKind] = field(default_factory=dict)
+    kinds: dict[str, WarningsOfKind] = field(default_factory=dict)
 
     @property
     def count(self) -> int:
@@ -96,7 +96,7 @@ class Notices:
 
     def add(self, record: logging.LogRecord) -> None:
         """Take a warning."""
-        found = self.kinds.setdefault(getattr(record, "kind", "other"), NoticesOfKind())
+        found = self.kinds.setdefault(getattr(record, "kind", "other"), WarningsOfKind())
         found.count += 1
         if len(found.first) < FIRST_KEPT:
             told = {name: getattr(record, name, None) for name in FIELDS[1:]}
@@ -126,7 +126,7 @@ class Notices:
 
 
 @contextmanager
-def gathered(strict: bool = False) -> Iterator[Notices]:
+def collect_warnings(strict: bool = False) -> Iterator[WarningLog]:
     """Gather the warnings that this thread gives while the context lasts.
 
     Parameters
@@ -139,14 +139,14 @@ def gathered(strict: bool = False) -> Iterator[Notices]:
     StrictError
         Out of the call that gives a warning, if `strict`.
     """
-    notices = Notices()
+    warning_log = WarningLog()
     thread = threading.get_ident()
 
     class Gather(logging.Handler):
         def emit(self, record: logging.LogRecord) -> None:
             if record.thread != thread or not getattr(record, "is_counted", True):
                 return
-            notices.add(record)
+            warning_log.add(record)
             # Others are about this machine, not about the log.
             if strict and hasattr(record, "kind"):
                 text = f"{record.getMessage()} (an error because of --strict)"
@@ -157,6 +157,6 @@ def gathered(strict: bool = False) -> Iterator[Notices]:
     # Before those that show warnings: one that becomes an error is shown as the error alone.
     logger.handlers.insert(0, handler)
     try:
-        yield notices
+        yield warning_log
     finally:
         logger.removeHandler(handler)

@@ -19,7 +19,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, Generic, Self, TypeVar
 
 from rose2_logs.errors import Rose2LogsError
-from rose2_logs.system.shared_memory import Parcel, pack, parcel_folders, unpack
+from rose2_logs.system.shared_memory import Packed, pack, shared_memory_folders, unpack
 
 if TYPE_CHECKING:
     from threadpoolctl import ThreadpoolController
@@ -67,7 +67,7 @@ class Workers(Generic[Item, Result]):
 
     def __enter__(self) -> Self:
         if self._count > 1:
-            self._folders = self._stack.enter_context(parcel_folders())
+            self._folders = self._stack.enter_context(shared_memory_folders())
             context = _context(self._function)
             self._pool = ProcessPoolExecutor(
                 self._count, context, initializer=_begin, initargs=(self._function, self._folders)
@@ -117,8 +117,8 @@ class Workers(Generic[Item, Result]):
                 elif known is not None and (result := known(item)) is not None:
                     before = (item, _Task(result=result))
                 else:
-                    parcel = pack(item, self._folders)
-                    before = (item, _Task(self._pool.submit(_work, parcel)))
+                    packed = pack(item, self._folders)
+                    before = (item, _Task(self._pool.submit(_work, packed)))
                 pending.append(before)
                 if len(pending) >= LOOK_AHEAD_PER_WORKER * self._count:
                     yield _taken(pending)
@@ -178,7 +178,7 @@ def _context(function: Callable[..., Any]) -> BaseContext:
 class _Task:
     """A result that comes once and may be asked for several times."""
 
-    def __init__(self, future: Future[Parcel] | None = None, result: Any = None) -> None:
+    def __init__(self, future: Future[Packed] | None = None, result: Any = None) -> None:
         self._future = future
         self._result = result
 
@@ -248,8 +248,8 @@ def _nothing() -> None:
     return
 
 
-def _work(parcel: Parcel) -> Parcel:
-    return pack(_call_on_one_thread(_function, unpack(parcel)), _folders)
+def _work(packed: Packed) -> Packed:
+    return pack(_call_on_one_thread(_function, unpack(packed)), _folders)
 
 
 def _call_on_one_thread(function: Callable[[Item], Result], item: Item) -> Result:

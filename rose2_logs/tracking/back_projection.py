@@ -23,7 +23,7 @@ from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot, map_motion
 
 
 @dataclass(frozen=True, eq=False)
-class SmoothedRooms:
+class BackProjectedRooms:
     """How much of the rooms of the run's last map another map shows.
 
     Attributes
@@ -38,12 +38,12 @@ class SmoothedRooms:
     areas_m2: FloatArray
 
 
-class Smoother:
+class BackProjector:
     """Carries the rooms of a run's last map over to the maps before it.
 
     A map is laid over the last one: first as it moved from map to map, then by its walls. Each of its free
     cells takes the room that lies there in the end; the nearest, where the last map shows no free space.
-    Pieces of a room smaller than `smoothed_min_area_m2` take the room beside them.
+    Pieces of a room smaller than `back_projected_min_area_m2` take the room beside them.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ class Smoother:
         tracking: TrackingParameters,
         occupancy: OccupancyParameters | None = None,
     ) -> None:
-        self._min_area_m2 = tracking.smoothed_min_area_m2
+        self._min_area_m2 = tracking.back_projected_min_area_m2
         self._occupancy = occupancy or OccupancyParameters()
         self._window = known_window(last.cells >= 0)
         self._geometry, self._count = rooms.geometry, len(rooms)
@@ -74,7 +74,7 @@ class Smoother:
         points = wall_faces(free, occupied, last.geometry)
         self._fit = WallFit(points, last.geometry.resolution_m) if len(points) >= POINTS_MIN else None
 
-    def rooms(self, snapshot: OccupancySnapshot, motion: RigidMotion) -> SmoothedRooms:
+    def rooms(self, snapshot: OccupancySnapshot, motion: RigidMotion) -> BackProjectedRooms:
         """Find the rooms of the last map on another one.
 
         Parameters
@@ -90,18 +90,18 @@ class Smoother:
         free = all_free[window]
         row, column = np.nonzero(free)
         if self._count == 0 or len(row) == 0:
-            return SmoothedRooms(labels, np.zeros(self._count))
+            return BackProjectedRooms(labels, np.zeros(self._count))
         corner = np.array([window[0].start, window[1].start])
-        centres = snapshot.geometry.cell_centres(row + corner[0], column + corner[1])
+        centers = snapshot.geometry.cell_centers(row + corner[0], column + corner[1])
         laid_over = self._laid_over(all_free, occupied, snapshot.geometry, motion)
-        cells = self._geometry.world_to_cell(laid_over.points(centres))
+        cells = self._geometry.world_to_cell(laid_over.points(centers))
         cells -= (self._window[0].start, self._window[1].start)
         np.clip(cells, 0, np.array(self._nearest.shape) - 1, out=cells)
         part = labels[window]
         part[row, column] = self._nearest[cells[:, 0], cells[:, 1]]
         cell_m2 = snapshot.geometry.cell_area_m2
         _join_small_pieces(part, free, self._min_area_m2 / cell_m2)
-        return SmoothedRooms(labels, label_sizes(part, self._count)[1:].astype(float) * cell_m2)
+        return BackProjectedRooms(labels, label_sizes(part, self._count)[1:].astype(float) * cell_m2)
 
     def _laid_over(
         self, free: BoolArray, occupied: BoolArray, geometry: GridGeometry, motion: RigidMotion
@@ -112,8 +112,8 @@ class Smoother:
         if fit is None or len(points) < POINTS_MIN:
             return motion
         walls = WallFit(points, geometry.resolution_m).sample()
-        centre = walls.points.mean(axis=0)
-        start = RigidMotion.moving(centre, motion.points(centre), motion.turn_rad)
+        center = walls.points.mean(axis=0)
+        start = RigidMotion.moving(center, motion.points(center), motion.turn_rad)
         fitted = fit.settled(walls, start)
         return max(start, fitted, key=lambda each: fit.share(walls.points, each))
 
@@ -155,7 +155,7 @@ def _filled(labels: NDArray[np.int32]) -> NDArray[np.int32]:
 
 
 @dataclass(frozen=True, eq=False)
-class SmoothedSnapshot:
+class BackProjectedSnapshot:
     """One map of a run with what it shows of the rooms of the last one.
 
     Attributes
@@ -164,7 +164,7 @@ class SmoothedSnapshot:
         The map.
     coverage : float
         As of `TrackedSnapshot`.
-    rooms : SmoothedRooms
+    rooms : BackProjectedRooms
         How much it shows of the last map's rooms.
     last_rooms : RoomMap
         The rooms of the last map.
@@ -176,13 +176,13 @@ class SmoothedSnapshot:
 
     snapshot: OccupancySnapshot
     coverage: float
-    rooms: SmoothedRooms
+    rooms: BackProjectedRooms
     last_rooms: RoomMap
     track_ids: tuple[int, ...]
     to_last: RigidMotion
 
 
-class RunSmoother:
+class RunBackProjection:
     """Keeps what the second pass needs along the run, some numbers a map, and makes that pass.
 
     Parameters
@@ -197,13 +197,13 @@ class RunSmoother:
         self._motions: dict[int, RigidMotion | None] = {}
         self._coverages: dict[int, float] = {}
 
-    def add(self, frame: TrackedSnapshot) -> None:
+    def add(self, step: TrackedSnapshot) -> None:
         """Take the next map of the run."""
-        self._last = frame
-        self._motions[frame.snapshot.index] = map_motion(frame.events)
-        self._coverages[frame.snapshot.index] = frame.coverage
+        self._last = step
+        self._motions[step.snapshot.index] = map_motion(step.events)
+        self._coverages[step.snapshot.index] = step.coverage
 
-    def smoothed(self, snapshots: Iterable[OccupancySnapshot]) -> Iterator[SmoothedSnapshot]:
+    def back_projected(self, snapshots: Iterable[OccupancySnapshot]) -> Iterator[BackProjectedSnapshot]:
         """Yield the maps with the rooms of the last one; one map at a time is held.
 
         Parameters
@@ -215,11 +215,11 @@ class RunSmoother:
         if last is None:
             return
         rooms = last.analysis.rooms
-        smoother = Smoother(last.snapshot, rooms, self._parameters.tracking, self._parameters.occupancy)
+        projector = BackProjector(last.snapshot, rooms, self._parameters.tracking, self._parameters.occupancy)
         to_last = dict(zip(self._motions, motions_to_last(list(self._motions.values())), strict=True))
         for snapshot in snapshots:
             if snapshot.index in to_last:
                 motion = to_last[snapshot.index]
-                found = smoother.rooms(snapshot, motion)
+                found = projector.rooms(snapshot, motion)
                 coverage = self._coverages[snapshot.index]
-                yield SmoothedSnapshot(snapshot, coverage, found, rooms, last.track_ids, motion)
+                yield BackProjectedSnapshot(snapshot, coverage, found, rooms, last.track_ids, motion)

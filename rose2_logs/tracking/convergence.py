@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from rose2_logs.model.occupancy import FloatArray
 from rose2_logs.tracking.overlap import share_of
 from rose2_logs.tracking.registration import RigidMotion
-from rose2_logs.tracking.track_history import Moment, RoomLives
+from rose2_logs.tracking.track_history import SnapshotRef, TrackHistories
 
 AREA_TOLERANCE = 0.1
 """A room has its last area when it is within this share of it."""
 SHAPE_MIN_IOU = 0.8
-"""A room has its last shape from this overlap on: walls a few decimetres off in a room of five metres."""
+"""A room has its last shape from this overlap on: walls a few decimeters off in a room of five meters."""
 FINAL_MIN_SHARE = 0.9
 """The layout is final when this share of it, by area, is in rooms of their last shape."""
 
@@ -43,7 +43,7 @@ class RoomRows:
 
 
 @dataclass
-class Hindsight:
+class Convergence:
     """Since when what was right.
 
     Attributes
@@ -59,74 +59,76 @@ class Hindsight:
         the last map has no room.
     final_share : dict
         By snapshot, the share of the last layout's area that was in rooms of their last shape.
-    layout_final : Moment or None
+    layout_final : SnapshotRef or None
         The map from which on this share stayed above `FINAL_MIN_SHARE`; None where the last map has no room.
     """
 
-    area_settled: dict[int, Moment] = field(default_factory=dict)
-    shape_right: dict[int, Moment] = field(default_factory=dict)
+    area_settled: dict[int, SnapshotRef] = field(default_factory=dict)
+    shape_right: dict[int, SnapshotRef] = field(default_factory=dict)
     shape_right_seen: dict[int, float] = field(default_factory=dict)
     final_iou: dict[int, float | None] = field(default_factory=dict)
     final_share: dict[int, float | None] = field(default_factory=dict)
-    layout_final: Moment | None = None
+    layout_final: SnapshotRef | None = None
 
 
-def look_back(
+def measure_convergence(
     rows: Iterable[RoomRows],
-    lives: RoomLives,
-    moments: Mapping[int, Moment],
+    histories: TrackHistories,
+    snapshot_refs: Mapping[int, SnapshotRef],
     drifts: Mapping[int, RigidMotion],
-) -> Hindsight:
+) -> Convergence:
     """Compare the rooms of every map with what they were in the end.
 
     Parameters
     ----------
     rows : iterable of RoomRows
         Every room of every map, in the order of the maps.
-    lives : RoomLives
+    histories : TrackHistories
         What is known of the rooms in the end.
-    moments : mapping of int to Moment
+    snapshot_refs : mapping of int to SnapshotRef
         Every map, by snapshot, in their order.
     drifts : mapping of int to RigidMotion
         How each moved since the first one.
     """
-    found = Hindsight()
-    weight = {track: lives.lives[track].polygon.area for track in lives.in_last_map}
+    found = Convergence()
+    weight = {track: histories.tracks[track].polygon.area for track in histories.in_last_map}
     total = sum(weight.values())
-    final_iou, final_share = dict.fromkeys(moments, 0.0), dict.fromkeys(moments, 0.0)
+    final_iou, final_share = dict.fromkeys(snapshot_refs, 0.0), dict.fromkeys(snapshot_refs, 0.0)
     for batch in rows:
         for snapshot, track, area, iou in zip(
             batch.snapshot.tolist(),
             batch.track.tolist(),
             batch.area_m2.tolist(),
-            _iou_with_last(batch, lives, drifts).tolist(),
+            _iou_with_last(batch, histories, drifts).tolist(),
             strict=True,
         ):
-            last = lives.lives[track].area_m2
+            last = histories.tracks[track].area_m2
             if abs(area - last) > AREA_TOLERANCE * last:
                 found.area_settled.pop(track, None)
             else:
-                found.area_settled.setdefault(track, moments[snapshot])
+                found.area_settled.setdefault(track, snapshot_refs[snapshot])
             if iou >= SHAPE_MIN_IOU and track not in found.shape_right:
-                found.shape_right[track] = moments[snapshot]
+                found.shape_right[track] = snapshot_refs[snapshot]
                 found.shape_right_seen[track] = area / last if last > 0 else 0.0
             if track in weight:
                 final_iou[snapshot] += iou * weight[track]
                 final_share[snapshot] += (iou >= SHAPE_MIN_IOU) * weight[track]
-    for snapshot, moment in moments.items():
+    for snapshot, snapshot_ref in snapshot_refs.items():
         share = final_share[snapshot] / total if total > 0 else None
         found.final_iou[snapshot] = final_iou[snapshot] / total if total > 0 else None
         found.final_share[snapshot] = share
         if share is None or share < FINAL_MIN_SHARE:
             found.layout_final = None
         elif found.layout_final is None:
-            found.layout_final = moment
+            found.layout_final = snapshot_ref
     return found
 
 
-def _iou_with_last(rows: RoomRows, lives: RoomLives, drifts: Mapping[int, RigidMotion]) -> FloatArray:
+def _iou_with_last(
+    rows: RoomRows, histories: TrackHistories, drifts: Mapping[int, RigidMotion]
+) -> FloatArray:
     """Intersection over union (N,) of each room with its track's last shape, both where the last one lay."""
-    ends = [lives.lives[track] for track in rows.track.tolist()]
+    ends = [histories.tracks[track] for track in rows.track.tolist()]
     then = _placed(
         rows.polygons,
         [

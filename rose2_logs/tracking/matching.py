@@ -14,7 +14,7 @@ from rose2_logs.tracking.registration import RigidMotion
 ROWS_AT_ONCE = 256
 """Rows resampled together: bounds the memory for coordinates to some megabytes for the largest maps."""
 BORDER_NUDGE = 1e-6
-"""Cells: centres that lie on a border of the other grid, up to rounding, all fall to the same side."""
+"""Cells: centers that lie on a border of the other grid, up to rounding, all fall to the same side."""
 SAME_GRID_CELLS = 1e-9
 """Cells of two grids run along each other when one's step differs by less in the other's cells."""
 
@@ -22,7 +22,7 @@ SAME_GRID_CELLS = 1e-9
 def resample_labels(
     labels: NDArray[np.int32], source: GridGeometry, target: GridGeometry
 ) -> NDArray[np.int32]:
-    """Look up labels at the cell centres of another grid.
+    """Look up labels at the cell centers of another grid.
 
     Parameters
     ----------
@@ -34,12 +34,12 @@ def resample_labels(
     Returns
     -------
     (H', W') int32
-        The label of the source cell that holds each centre, 0 outside the source grid.
+        The label of the source cell that holds each center, 0 outside the source grid.
     """
     height, width = target.shape
     result = np.zeros(target.shape, np.int32)
-    # A centre's source cell is affine in its row and column: three points give the whole map.
-    corners = target.cell_centres(np.array([0, 1, 0]), np.array([0, 0, 1]))
+    # A center's source cell is affine in its row and column: three points give the whole map.
+    corners = target.cell_centers(np.array([0, 1, 0]), np.array([0, 0, 1]))
     origin, by_row, by_column = source.world_to_grid(corners) / source.resolution_m
     by_row, by_column = by_row - origin, by_column - origin
     if np.abs(np.concatenate([by_row - (0, 1), by_column - (1, 0)])).max() < SAME_GRID_CELLS:
@@ -106,7 +106,7 @@ class RegionShape:
         return dataclasses.replace(self, geometry=motion.grid(self.geometry))
 
     def common_area_m2(self, labels: NDArray[np.int32], geometry: GridGeometry, count: int) -> FloatArray:
-        """Area (count,) in square metres that this one shares with the rooms 1..count of another map."""
+        """Area (count,) in square meters that this one shares with the rooms 1..count of another map."""
         under = resample_labels(labels, geometry, self.geometry)[self.mask]
         cells = np.bincount(under, minlength=count + 1)[1 : count + 1].astype(np.float64)
         return cells * self.geometry.cell_area_m2

@@ -1,4 +1,4 @@
-"""What a track's room looked like: a few shapes, so that a split that is taken back is recognised."""
+"""What a track's room looked like: a few shapes, so that a split that is taken back is recognized."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from rose2_logs.tracking.registration import RigidMotion
 class TrackMemory:
     """The shapes that a track's room had, the newest last.
 
-    A room that flickers between two rooms and one has the whole and the part in memory, and is recognised in
+    A room that flickers between two rooms and one has the whole and the part in memory, and is recognized in
     either. A shape like one in memory takes its place; where there are too many, the one that was seen least
     often goes, the older of two alike.
 

@@ -15,17 +15,17 @@ if TYPE_CHECKING:
     from scipy.spatial import cKDTree
 
 POINTS_MAX = 2000
-"""Wall cells of the map before that are laid over the next map, evenly taken: enough for some millimetres."""
+"""Wall cells of the map before that are laid over the next map, evenly taken: enough for some millimeters."""
 POINTS_MIN = 50
-"""Fewer wall cells do not tell how a map lies: two metres of wall."""
+"""Fewer wall cells do not tell how a map lies: two meters of wall."""
 SEARCH_POINTS = 500
 """Wall cells that the search among many positions tries."""
 GATES_M = (0.5, 0.3, 0.2, 0.1)
 """How far a wall's nearest wall may be, from step to step of the fit: a loop closure's leap, then drift."""
 GATE_MIN_CELLS = 2.0
 """And this many cells at least: a wall's two faces, and its wobble."""
-NEIGHBOURS = 12
-"""Wall cells around a point that tell how the wall runs: half a metre of its face."""
+NEIGHBORS = 12
+"""Wall cells around a point that tell how the wall runs: half a meter of its face."""
 DAMPING = 1e-3
 """Least share of the walls that must stand across a direction to fit the shift along it."""
 ROUNDS_MAX = 8
@@ -50,7 +50,7 @@ class RigidMotion:
 
     Attributes
     ----------
-    centre_xy_m : (float, float)
+    center_xy_m : (float, float)
         The middle of the walls, before.
     shift_xy_m : (float, float)
         How far that point moved.
@@ -58,14 +58,14 @@ class RigidMotion:
         Turn about that point, counter-clockwise.
     """
 
-    centre_xy_m: tuple[float, float]
+    center_xy_m: tuple[float, float]
     shift_xy_m: tuple[float, float]
     turn_rad: float
 
     @classmethod
-    def moving(cls, centre_m: FloatArray, to_m: FloatArray, turn_rad: float) -> RigidMotion:
+    def moving(cls, center_m: FloatArray, to_m: FloatArray, turn_rad: float) -> RigidMotion:
         """Motion that brings a point (2,) to another and turns about it."""
-        (x, y), (dx, dy) = centre_m.tolist(), (to_m - centre_m).tolist()
+        (x, y), (dx, dy) = center_m.tolist(), (to_m - center_m).tolist()
         return cls((x, y), (dx, dy), float(turn_rad))
 
     @classmethod
@@ -75,7 +75,7 @@ class RigidMotion:
 
     @property
     def pose(self) -> tuple[float, float, float]:
-        """Where the frame's origin comes to lie, x and y in metres, and the turn in radians."""
+        """Where the frame's origin comes to lie, x and y in meters, and the turn in radians."""
         x, y = self.points(np.zeros(2)).tolist()
         return x, y, self.turn_rad
 
@@ -86,15 +86,15 @@ class RigidMotion:
 
     def inverse(self) -> RigidMotion:
         """Return the motion that takes this one back."""
-        centre, shift = np.asarray(self.centre_xy_m), np.asarray(self.shift_xy_m)
-        return RigidMotion.moving(centre + shift, centre, -self.turn_rad)
+        center, shift = np.asarray(self.center_xy_m), np.asarray(self.shift_xy_m)
+        return RigidMotion.moving(center + shift, center, -self.turn_rad)
 
     def points(self, xy_m: FloatArray) -> FloatArray:
-        """Where points (..., 2) come to lie, metres."""
+        """Where points (..., 2) come to lie, meters."""
         c, s = np.cos(self.turn_rad), np.sin(self.turn_rad)
-        centre = np.asarray(self.centre_xy_m)
+        center = np.asarray(self.center_xy_m)
         moved: FloatArray = (
-            (xy_m - centre) @ np.array([[c, s], [-s, c]]) + centre + np.asarray(self.shift_xy_m)
+            (xy_m - center) @ np.array([[c, s], [-s, c]]) + center + np.asarray(self.shift_xy_m)
         )
         return moved
 
@@ -148,13 +148,13 @@ class MapAligner:
 
 
 def wall_points(snapshot: OccupancySnapshot, parameters: OccupancyParameters) -> FloatArray:
-    """World centres (N, 2) of the occupied cells beside free ones: the faces of walls."""
+    """World centers (N, 2) of the occupied cells beside free ones: the faces of walls."""
     return wall_faces(*classify(snapshot.cells, parameters), snapshot.geometry)
 
 
 def wall_faces(free: BoolArray, occupied: BoolArray, geometry: GridGeometry) -> FloatArray:
     """Do the same for a map whose cells (H, W) are told apart already."""
-    return geometry.cell_centres(*np.nonzero(occupied & _beside(free)))
+    return geometry.cell_centers(*np.nonzero(occupied & _beside(free)))
 
 
 def _beside(mask: BoolArray) -> BoolArray:
@@ -176,7 +176,7 @@ def evenly(points: FloatArray, most: int) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class WallSample:
-    """Points (N, 2) of walls in world metres, and a unit vector (N, 2) across the wall at each."""
+    """Points (N, 2) of walls in world meters, and a unit vector (N, 2) across the wall at each."""
 
     points: FloatArray
     across: FloatArray
@@ -195,7 +195,7 @@ class WallFit:
     def sample(self) -> WallSample:
         """Some of the walls, to be laid over those of the next map."""
         points = evenly(self._points, POINTS_MAX)
-        _, nearest = self._tree.query(points, k=NEIGHBOURS)
+        _, nearest = self._tree.query(points, k=NEIGHBORS)
         around = self._points[nearest] - self._points[nearest].mean(axis=1, keepdims=True)
         x, y = around[..., 0], around[..., 1]
         # The direction of the greatest spread is that of the wall.
@@ -205,15 +205,15 @@ class WallFit:
     def best(self, walls: WallSample, parameters: TrackingParameters) -> RigidMotion:
         """Motion of walls that brings most of them to walls; staying unless another is better."""
         points = walls.points
-        centre = points.mean(axis=0)
-        staying = RigidMotion.moving(centre, centre, 0.0)
+        center = points.mean(axis=0)
+        staying = RigidMotion.moving(center, center, 0.0)
         least = max(self.share(points, staying) + BETTER_SHARE, parameters.shift_min_share)
         if least > 1:
             return staying
         fitted = self.settled(walls, staying)
         share = self.share(points, fitted)
         if share < SURE_SHARE:
-            for start in self._search(points, centre, parameters):
+            for start in self._search(points, center, parameters):
                 other = self.settled(walls, start)
                 if (found := self.share(points, other)) > share:
                     fitted, share = other, found
@@ -229,8 +229,8 @@ class WallFit:
 
         Only the distance across the wall counts: along a wall, cells match at every step of the raster.
         """
-        centre = np.asarray(motion.centre_xy_m)
-        radius = float(np.linalg.norm(walls.points - centre, axis=1).max())
+        center = np.asarray(motion.center_xy_m)
+        radius = float(np.linalg.norm(walls.points - center, axis=1).max())
         for gate in self._gates:
             for _ in range(ROUNDS_MAX):
                 placed = motion.points(walls.points)
@@ -239,37 +239,37 @@ class WallFit:
                 if np.count_nonzero(near) < POINTS_MIN:
                     return motion
                 weight = (1 - (distance[near] / gate) ** 2) ** 2
-                to = motion.points(centre)
-                across = motion.points(walls.across[near] + centre) - to
+                to = motion.points(center)
+                across = motion.points(walls.across[near] + center) - to
                 shift, turn = _step(
                     placed[near] - to, self._points[nearest[near]] - placed[near], across, weight, radius
                 )
-                motion = RigidMotion.moving(centre, to + shift, motion.turn_rad + turn)
+                motion = RigidMotion.moving(center, to + shift, motion.turn_rad + turn)
                 if np.hypot(*shift) + abs(turn) * radius < SETTLED_M:
                     break
         return motion
 
     def _search(
-        self, points: FloatArray, centre: FloatArray, parameters: TrackingParameters
+        self, points: FloatArray, center: FloatArray, parameters: TrackingParameters
     ) -> list[RigidMotion]:
         """Best starts among all shifts and turns within reach: correlation with the distance to walls."""
         nearness, low = self._nearness(parameters.shift_search_m)
         chosen = evenly(points, SEARCH_POINTS)
-        radius = max(float(np.linalg.norm(chosen - centre, axis=1).max()), SEARCH_STEP_M)
+        radius = max(float(np.linalg.norm(chosen - center, axis=1).max()), SEARCH_STEP_M)
         shifts = _steps(parameters.shift_search_m, SEARCH_STEP_M)
         turns = _steps(parameters.shift_search_rad, SEARCH_STEP_M / radius)
         offset = np.stack(np.meshgrid(shifts, shifts, indexing="ij"), -1).reshape(-1, 2)
         height, width = nearness.shape
         scores = np.zeros((len(turns), len(offset)))
         for number, turn in enumerate(turns):
-            placed = RigidMotion.moving(centre, centre, turn).points(chosen) - low
+            placed = RigidMotion.moving(center, center, turn).points(chosen) - low
             cells = np.floor((placed[:, None] + offset) / SEARCH_RASTER_M).astype(np.intp)
             x, y = cells[..., 0], cells[..., 1]
             inside = (x >= 0) & (y >= 0) & (x < width) & (y < height)
             scores[number] = (nearness[y.clip(0, height - 1), x.clip(0, width - 1)] * inside).sum(axis=0)
         best = np.argsort(-scores, axis=None, kind="stable")[:SEARCH_CANDIDATES]
         return [
-            RigidMotion.moving(centre, centre + offset[at % len(offset)], turns[at // len(offset)])
+            RigidMotion.moving(center, center + offset[at % len(offset)], turns[at // len(offset)])
             for at in best.tolist()
         ]
 

@@ -13,7 +13,7 @@ from rose2_logs.tracking.tracked_snapshot import RoomEvent, TrackedSnapshot, map
 
 
 @dataclass(frozen=True)
-class Moment:
+class SnapshotRef:
     """One map of the run.
 
     Attributes
@@ -32,12 +32,12 @@ class Moment:
 
 
 @dataclass
-class RoomLife:
+class TrackHistory:
     """One track.
 
     Attributes
     ----------
-    first, last : Moment
+    first, last : SnapshotRef
         The first and the last map that show it.
     maps : int
         Number of maps that show it.
@@ -45,88 +45,88 @@ class RoomLife:
         Its area in the last of them, as far as it was seen.
     polygon : shapely Polygon or MultiPolygon
         Its shape there, with the predicted part.
-    outline_wall_share, frontier_m : float or None
+    wall_support, frontier_m : float or None
         Evidence there, None where it was not measured.
     splits, merges, losses : int
         How often it was split, took in others, and was lost.
     """
 
-    first: Moment
-    last: Moment
+    first: SnapshotRef
+    last: SnapshotRef
     maps: int = 0
     area_m2: float = 0.0
     polygon: BaseGeometry = field(default_factory=Polygon)
-    outline_wall_share: float | None = None
+    wall_support: float | None = None
     frontier_m: float | None = None
     splits: int = 0
     merges: int = 0
     losses: int = 0
 
 
-class RoomLives:
-    """Gathers the life of every room.
+class TrackHistories:
+    """Gathers the history of every room.
 
     Attributes
     ----------
-    lives : dict
+    histories : dict
         By track, in the order of their numbers.
-    last : Moment or None
+    last : SnapshotRef or None
         The last map.
     in_last_map : tuple of int
         The tracks that it shows, ascending.
     shifts : int
         How often the whole map shifted.
-    largest_shift : (Moment, RigidMotion) or None
+    largest_shift : (SnapshotRef, RigidMotion) or None
         The first of the greatest of these.
     """
 
     def __init__(self) -> None:
-        self.lives: dict[int, RoomLife] = {}
-        self.last: Moment | None = None
+        self.tracks: dict[int, TrackHistory] = {}
+        self.last: SnapshotRef | None = None
         self.in_last_map: tuple[int, ...] = ()
         self.shifts = 0
-        self.largest_shift: tuple[Moment, RigidMotion] | None = None
+        self.largest_shift: tuple[SnapshotRef, RigidMotion] | None = None
         self._first_time_ns: int | None = None
 
-    def moment(self, frame: TrackedSnapshot) -> Moment:
+    def snapshot_ref(self, step: TrackedSnapshot) -> SnapshotRef:
         """Return when a map was; the first one that is asked for begins the run."""
         if self._first_time_ns is None:
-            self._first_time_ns = frame.snapshot.log_time_ns
-        time_s = (frame.snapshot.log_time_ns - self._first_time_ns) / 1e9
-        return Moment(frame.snapshot.index, time_s, frame.coverage)
+            self._first_time_ns = step.snapshot.log_time_ns
+        time_s = (step.snapshot.log_time_ns - self._first_time_ns) / 1e9
+        return SnapshotRef(step.snapshot.index, time_s, step.coverage)
 
-    def add(self, frame: TrackedSnapshot) -> None:
+    def add(self, step: TrackedSnapshot) -> None:
         """Take the next map."""
-        now = self.moment(frame)
-        rooms = frame.analysis.rooms
-        for number, track in enumerate(frame.track_ids):
-            life = self.lives.setdefault(track, RoomLife(now, now))
-            life.last = now
-            life.maps += 1
-            life.area_m2 = float(rooms.areas_m2[number])
-            life.polygon = rooms.polygons[number]
-            life.outline_wall_share, life.frontier_m = evidence_of(frame, number)
-        for event in frame.events:
+        now = self.snapshot_ref(step)
+        rooms = step.analysis.rooms
+        for number, track in enumerate(step.track_ids):
+            history = self.tracks.setdefault(track, TrackHistory(now, now))
+            history.last = now
+            history.maps += 1
+            history.area_m2 = float(rooms.areas_m2[number])
+            history.polygon = rooms.polygons[number]
+            history.wall_support, history.frontier_m = quality_of(step, number)
+        for event in step.events:
             self._count(event)
-        if (motion := map_motion(frame.events)) is not None:
+        if (motion := map_motion(step.events)) is not None:
             self.shifts += 1
             before_m = -1.0 if self.largest_shift is None else math.hypot(*self.largest_shift[1].shift_xy_m)
             if math.hypot(*motion.shift_xy_m) > before_m:
                 self.largest_shift = now, motion
-        self.last, self.in_last_map = now, tuple(sorted(frame.track_ids))
+        self.last, self.in_last_map = now, tuple(sorted(step.track_ids))
 
     def _count(self, event: RoomEvent) -> None:
         if event.kind == "split":
-            self.lives[event.track].splits += 1
+            self.tracks[event.track].splits += 1
         elif event.kind == "merged":
-            self.lives[event.track].merges += 1
+            self.tracks[event.track].merges += 1
         elif event.kind == "lost":
-            self.lives[event.track].losses += 1
+            self.tracks[event.track].losses += 1
 
 
-def evidence_of(frame: TrackedSnapshot, number: int) -> tuple[float | None, float | None]:
-    """Share of the outline that walls back, and open frontier in metres, of room `number` + 1."""
-    if frame.evidence is None:
+def quality_of(step: TrackedSnapshot, number: int) -> tuple[float | None, float | None]:
+    """Share of the outline that walls back, and open frontier in meters, of room `number` + 1."""
+    if step.quality is None:
         return None, None
-    share = float(frame.evidence.outline_wall_share[number])
-    return (None if math.isnan(share) else share), float(frame.evidence.frontier_m[number])
+    share = float(step.quality.wall_support[number])
+    return (None if math.isnan(share) else share), float(step.quality.frontier_m[number])

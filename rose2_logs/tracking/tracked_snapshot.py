@@ -8,7 +8,7 @@ from typing import Literal, get_args
 
 from rose2_logs.model.analysis import SnapshotAnalysis
 from rose2_logs.model.occupancy import FloatArray, OccupancySnapshot
-from rose2_logs.model.room_quality import RoomEvidence
+from rose2_logs.model.room_quality import RoomQuality
 from rose2_logs.tracking.layout_change import LayoutChange
 from rose2_logs.tracking.registration import RigidMotion
 
@@ -71,12 +71,12 @@ class TrackedSnapshot:
         The track (1, 2, ... never used again) of room i + 1.
     events : tuple of RoomEvent
         What happened to the tracks at this snapshot.
-    evidence : RoomEvidence, optional
+    quality : RoomQuality, optional
         How sure the rooms are.
     change : LayoutChange, optional
         How the layout changed since the map before.
     path : (K, 3) float, optional
-        Poses of the robot since the map before: x, y in world metres, yaw in radians.
+        Poses of the robot since the map before: x, y in world meters, yaw in radians.
     """
 
     snapshot: OccupancySnapshot
@@ -84,6 +84,6 @@ class TrackedSnapshot:
     coverage: float
     track_ids: tuple[int, ...]
     events: tuple[RoomEvent, ...]
-    evidence: RoomEvidence | None = None
+    quality: RoomQuality | None = None
     change: LayoutChange | None = None
     path: FloatArray | None = None

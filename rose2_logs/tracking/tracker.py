@@ -212,7 +212,7 @@ class RoomTracker:
 
 
 def _common(shape: RegionShape, rooms: RoomMap, boxes: FloatArray, areas: FloatArray) -> FloatArray:
-    """Area (R,) in square metres that a shape shares with each room; rooms have boxes (R, 4)."""
+    """Area (R,) in square meters that a shape shares with each room; rooms have boxes (R, 4)."""
     box = shape.box_m
     if not np.any(np.all((boxes[:, :2] < box[2:]) & (boxes[:, 2:] > box[:2]), axis=1)):
         return np.zeros(len(areas))

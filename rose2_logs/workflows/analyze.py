@@ -22,23 +22,23 @@ from rose2_logs.io.log_file import LATEST_NS
 from rose2_logs.outputs.mcap.viewer_layouts import bag_metadata_path, foxglove_path, rviz_path
 from rose2_logs.runs.journal import JournaledWorkers
 from rose2_logs.runs.output_folder import OutputFolder
-from rose2_logs.runs.projected_table import SmoothedTable
-from rose2_logs.runs.provenance import fingerprint, log_place, software_versions
-from rose2_logs.runs.sink import CopyingSink, RunInfo, Sink, SmoothedSink
+from rose2_logs.runs.projected_table import BackProjectedTable
+from rose2_logs.runs.provenance import fingerprint, log_location, software_versions
+from rose2_logs.runs.sink import BackProjectedSink, CopyingSink, RunInfo, Sink
 from rose2_logs.runs.stream import SnapshotWorkers, start_workers, tracked_snapshots
 from rose2_logs.runs.summary import RunTotals, write_summary
-from rose2_logs.runs.tables import SMOOTHED, SUMMARY, TABLES, Tables
+from rose2_logs.runs.tables import BACK_PROJECTED, SUMMARY, TABLES, Tables
 from rose2_logs.system.files import refuse_existing, require_short, require_utf8
-from rose2_logs.system.warnings import Notices, gathered, muted
-from rose2_logs.tracking.back_projection import RunSmoother
-from rose2_logs.tracking.track_history import Moment
+from rose2_logs.system.warnings import WarningLog, collect_warnings, muted
+from rose2_logs.tracking.back_projection import RunBackProjection
+from rose2_logs.tracking.track_history import SnapshotRef
 from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot
 
 __all__ = [
     "OnSnapshot",
     "RunOptions",
     "RunResult",
-    "analyse_log",
+    "analyze_log",
     "log_stem",
     "seconds_into_log",
 ]
@@ -57,8 +57,8 @@ class RunResult:
     files: tuple[Path, ...]
     totals: RunTotals
     seconds: float
-    layout_final: Moment | None
-    warnings: Notices = field(default_factory=Notices)
+    layout_final: SnapshotRef | None
+    warnings: WarningLog = field(default_factory=WarningLog)
 
 
 OnSnapshot = Callable[[TrackedSnapshot, float], None]
@@ -93,16 +93,16 @@ def seconds_into_log(
             raise ParameterError(f"{seconds:g} is no number of seconds into a log")
     if start_s is None and end_s is None:
         return None, None
-    with muted():  # what is odd is told when the log is analysed
+    with muted():  # what is odd is told when the log is analyzed
         first_ns = inspect_log(path, limits).start_ns or 0
     start_ns = None if start_s is None else first_ns + round(start_s * 1e9)
     return start_ns, None if end_s is None else first_ns + round(end_s * 1e9)
 
 
-def analyse_log(
+def analyze_log(
     path: Path, folder: Path, options: RunOptions, on_snapshot: OnSnapshot | None = None
 ) -> RunResult:
-    """Analyse a log and write all results to a folder.
+    """Analyze a log and write all results to a folder.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def analyse_log(
     Raises
     ------
     LogError, InvalidMapError
-        If the log cannot be read or holds no map that can be analysed.
+        If the log cannot be read or holds no map that can be analyzed.
     OutputError
         If there are results already and they may not be replaced, one cannot be written, or could not name
         the log.
@@ -127,12 +127,12 @@ def analyse_log(
     AlreadyWholeError
         If a run is to go on that is over.
     """
-    with gathered(options.strict) as warnings:
-        return _analyse_log(path, folder, options, on_snapshot, warnings)
+    with collect_warnings(options.strict) as warnings:
+        return _analyze_log(path, folder, options, on_snapshot, warnings)
 
 
-def _analyse_log(
-    path: Path, folder: Path, options: RunOptions, on_snapshot: OnSnapshot | None, warnings: Notices
+def _analyze_log(
+    path: Path, folder: Path, options: RunOptions, on_snapshot: OnSnapshot | None, warnings: WarningLog
 ) -> RunResult:
     start = time.perf_counter()
     for named in (path, folder):
@@ -158,18 +158,18 @@ def _analyse_log(
         made = output.made(_facts(info, options), overwrite=options.overwrite, resume=options.resume)
         with made as (work, journal):
             workers = JournaledWorkers(processes, journal) if options.journal else processes
-            result = _analyse(reader, workers, work, info, options, on_snapshot, warnings, start)
+            result = _analyze(reader, workers, work, info, options, on_snapshot, warnings, start)
     return dataclasses.replace(result, folder=folder, files=output.files)
 
 
-def _analyse(
+def _analyze(
     reader: LogReader,
     workers: SnapshotWorkers | JournaledWorkers,
     folder: Path,
     info: RunInfo,
     options: RunOptions,
     on_snapshot: OnSnapshot | None,
-    warnings: Notices,
+    warnings: WarningLog,
     start: float,
 ) -> RunResult:
     """Write all results of an open log to a folder that is there; the run began at `start`."""
@@ -177,42 +177,42 @@ def _analyse(
     planned = _planned_files(folder, path, options)
     totals = RunTotals()
     last = reader.last()
-    smoother = RunSmoother(options.parameters) if options.smooth else None
-    frame: TrackedSnapshot | None = None
+    projector = RunBackProjection(options.parameters) if options.back_project else None
+    step: TrackedSnapshot | None = None
     first_ns: int | None = None
     way = reader.robot_path(last.geometry.frame_id) if "path" in options.shown_layers else None
     with ExitStack() as stack:
         tables = Tables(folder)
         others = _make_sinks(planned, info, options, tables, reader)
         sinks = [stack.enter_context(sink) for sink in (tables, *others)]
-        for frame in tracked_snapshots(reader, last, workers, options.parameters, totals, way):
+        for step in tracked_snapshots(reader, last, workers, options.parameters, totals, way):
             for sink in sinks:
-                sink.write(frame)
-            totals.add(frame)
-            if smoother is not None:
-                smoother.add(frame)
+                sink.write(step)
+            totals.add(step)
+            if projector is not None:
+                projector.add(step)
             logger.info(
                 "snapshot %d: coverage %.1f %%, %d rooms",
-                frame.snapshot.index,
-                100 * frame.coverage,
-                len(frame.track_ids),
+                step.snapshot.index,
+                100 * step.coverage,
+                len(step.track_ids),
             )
             if on_snapshot is not None:
-                now_ns = frame.snapshot.log_time_ns
+                now_ns = step.snapshot.log_time_ns
                 first_ns = now_ns if first_ns is None else first_ns
-                on_snapshot(frame, (now_ns - first_ns) / max(last.log_time_ns - first_ns, 1))
+                on_snapshot(step, (now_ns - first_ns) / max(last.log_time_ns - first_ns, 1))
         messages = dataclasses.asdict(reader.counts)
-        if frame is None:
-            raise InvalidMapError(f"{path}: none of its {totals.invalid} maps can be analysed")
-        if smoother is not None:
-            logger.info("the maps are read once more, to be smoothed")
-            receiving = [sink for sink in sinks if isinstance(sink, SmoothedSink)]
+        if step is None:
+            raise InvalidMapError(f"{path}: none of its {totals.invalid} maps can be analyzed")
+        if projector is not None:
+            logger.info("the maps are read once more, to be back_projected")
+            receiving = [sink for sink in sinks if isinstance(sink, BackProjectedSink)]
             # What is odd was told the first time.
-            with muted(), SmoothedTable(planned[SMOOTHED]) as table:
-                for found in smoother.smoothed(reader.snapshots()):
+            with muted(), BackProjectedTable(planned[BACK_PROJECTED]) as table:
+                for found in projector.back_projected(reader.snapshots()):
                     for receiver in (table, *receiving):
-                        receiver.write_smoothed(found)
-        tables.look_back()
+                        receiver.write_back_projected(found)
+        tables.measure_convergence()
     if options.origin is not None:
         warnings.rename(str(path), options.origin)
     seconds = time.perf_counter() - start
@@ -221,8 +221,8 @@ def _analyse(
         planned["summary"],
         info,
         totals,
-        tables.lives,
-        tables.hindsight,
+        tables.histories,
+        tables.convergence,
         selection=dataclasses.asdict(options.selection),
         messages=messages,
         files=[file.name for file in files.values()],
@@ -231,7 +231,7 @@ def _analyse(
         seconds=seconds,
         workers=options.workers,
     )
-    layout_final = None if tables.hindsight is None else tables.hindsight.layout_final
+    layout_final = None if tables.convergence is None else tables.convergence.layout_final
     written = (*files.values(), planned["summary"])
     return RunResult(folder, written, totals, seconds, layout_final, warnings)
 
@@ -246,7 +246,7 @@ def _run_info(path: Path, folder: Path, reader: LogReader, options: RunOptions) 
         software_versions(),
         {"format": reader.info.format, **fingerprint(path)},
         options.origin,
-        None if is_copy else log_place(path, options.home or folder),
+        None if is_copy else log_location(path, options.home or folder),
     )
 
 
@@ -273,7 +273,7 @@ def _planned_files(folder: Path, log: Path, options: RunOptions) -> dict[str, Pa
         files |= {"annotated_log": log, "foxglove": foxglove_path(log), "rviz": rviz_path(log)}
         if options.bag:
             files["bag"] = bag_metadata_path(log)
-    tables = (*TABLES, SMOOTHED) if options.smooth else TABLES
+    tables = (*TABLES, BACK_PROJECTED) if options.back_project else TABLES
     files |= {name: folder / f"{name}.parquet" for name in tables}
     return files | {"summary": folder / SUMMARY}
 

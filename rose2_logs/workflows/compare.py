@@ -18,7 +18,7 @@ from rose2_logs.io import open_log
 from rose2_logs.model.occupancy import OccupancySnapshot
 from rose2_logs.runs.folder import RunResults
 from rose2_logs.runs.tables import SUMMARY
-from rose2_logs.segmentation.pipeline import analyse
+from rose2_logs.segmentation.pipeline import analyze
 from rose2_logs.system.files import refuse_existing, writing
 
 FILES = (
@@ -47,7 +47,7 @@ def compare_runs(
     Parameters
     ----------
     folder_a, folder_b : path
-        Results of `analyse_log`; B is laid over A.
+        Results of `analyze_log`; B is laid over A.
     folder : path
         Receives the files of `FILES`.
     recording : bool
@@ -121,7 +121,7 @@ def read_final_layout(folder: Path, name: str | None = None) -> FinalLayout:
     last = results.choose()
     rooms = results.table("rooms", ["track", "area_m2", "polygon_wkb"], last).to_pylist()
     snapshot = _last_map(results, last_ns, parameters.reading)
-    analysis = analyse(snapshot, parameters, method)
+    analysis = analyze(snapshot, parameters, method)
     if not np.isclose(analysis.free_area_m2, results.row(last)["free_area_m2"]):
         log = summary["log"]
         raise LogError(f"{folder}: {log} does not hold the map that the results are of; analyze it again")

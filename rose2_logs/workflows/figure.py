@@ -12,7 +12,7 @@ from rose2_logs.drawing.svg import as_svg
 from rose2_logs.errors import ParameterError
 from rose2_logs.outputs.exports.formats import planned_files, write_plan
 from rose2_logs.runs.folder import RunResults
-from rose2_logs.runs.projected_plan import smoothed_plan
+from rose2_logs.runs.projected_plan import back_projected_plan
 from rose2_logs.system.files import refuse_existing, replacing
 
 FIGURE_WIDTH_PX = 1800
@@ -26,7 +26,7 @@ def write_figure(
     snapshot: int | None = None,
     coverage: float | None = None,
     *,
-    smoothed: bool = False,
+    back_projected: bool = False,
     width_px: int = FIGURE_WIDTH_PX,
     overwrite: bool = False,
 ) -> Path:
@@ -38,10 +38,10 @@ def write_figure(
         Results of a log.
     out : path, optional
         The picture, ``.png`` or ``.svg``; by default ``<name>.figure.png`` in the folder, with the number of
-        the map in its name if it is not the last, and ``smoothed`` if it is.
+        the map in its name if it is not the last, and ``back_projected`` if it is.
     snapshot, coverage : int, float, optional
         Which map, see `RunResults.choose`.
-    smoothed : bool
+    back_projected : bool
         Draw the rooms of the last map as far as this one shows them, instead of its own.
     width_px : int
         Width of a PNG.
@@ -64,14 +64,14 @@ def write_figure(
     """
     results = RunResults(folder)
     number = results.choose(snapshot, coverage)
-    stem = f"{_stem(results, number)}.smoothed" if smoothed else _stem(results, number)
+    stem = f"{_stem(results, number)}.back_projected" if back_projected else _stem(results, number)
     out = folder / f"{stem}.figure.png" if out is None else out
     kind = out.suffix.lower()
     if kind not in PICTURE_ENDINGS:
         raise ParameterError(f"{out}: a figure is {' or '.join(PICTURE_ENDINGS)}; let its name end so")
     refuse_existing([out], overwrite=overwrite)
     with results.open_maps() as maps:
-        plan = smoothed_plan(results, number, maps) if smoothed else results.plan(number, maps)
+        plan = back_projected_plan(results, number, maps) if back_projected else results.plan(number, maps)
         drawing = draw_plan(plan)
     if kind == ".png":
         write_image(out, as_pixels(drawing, width_px))

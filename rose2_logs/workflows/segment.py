@@ -22,12 +22,12 @@ from rose2_logs.io.saved_maps import MapFilesSource
 from rose2_logs.model.explored import coarser_for_its_size
 from rose2_logs.model.occupancy import OccupancySnapshot
 from rose2_logs.model.room_plan import plan_of_analysis
-from rose2_logs.model.room_quality import room_evidence
+from rose2_logs.model.room_quality import room_quality
 from rose2_logs.model.rooms import RoomMap
 from rose2_logs.outputs.exports.formats import planned_files, write_plan
 from rose2_logs.outputs.exports.geojson import plan_geojson
 from rose2_logs.runs.summary import write_json
-from rose2_logs.segmentation.pipeline import analyse
+from rose2_logs.segmentation.pipeline import analyze
 from rose2_logs.system.files import refuse_existing, require_utf8
 
 logger = logging.getLogger(__name__)
@@ -57,12 +57,12 @@ def segment_map(
     Parameters
     ----------
     map_file : path
-        A map_server ``.yaml``, or an image in the grey values of ROS maps.
+        A map_server ``.yaml``, or an image in the gray values of ROS maps.
     folder : path
         Receives ``<name>.labels.png`` (0 = none, row 0 at the top like the image),
         ``<name>.floor_plan.geojson`` and ``<name>.rooms.png``.
     parameters, method
-        As for `analyse`.
+        As for `analyze`.
     formats : sequence of str
         Further formats for the floor plan, see `exports.formats`.
     resolution_m : float, optional
@@ -86,12 +86,12 @@ def segment_map(
     more = planned_files([each for each in formats if each != "geojson"], folder, name)
     refuse_existing([*files, *more], overwrite=overwrite)
     snapshot = read_static_map(map_file, resolution_m, parameters.reading)
-    analysis = analyse(snapshot, parameters, method)
+    analysis = analyze(snapshot, parameters, method)
     note = coarser_for_its_size(snapshot.geometry, analysis.resolution_m, parameters.occupancy)
     if note is not None:
         logger.warning("%s: %s", map_file, note)
     write_label_image(files[0], np.flipud(analysis.rooms.labels))
-    evidence = room_evidence(snapshot, analysis.rooms, parameters.occupancy)
+    evidence = room_quality(snapshot, analysis.rooms, parameters.occupancy)
     plan = plan_of_analysis(snapshot, analysis, evidence, name, parameters.occupancy)
     write_json(files[1], plan_geojson(plan, analysis.walls))
     write_image(files[2], draw_rooms(snapshot, analysis))

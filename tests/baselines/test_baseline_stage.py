@@ -9,7 +9,7 @@ from free_masks import RESOLUTION_M, overlap_with_room, ring, two_rooms
 from rose2_logs.config.parameters import Parameters
 from rose2_logs.model.outlines import room_outlines
 from rose2_logs.segmentation.baselines.stage import BASELINES, segment_by_baseline
-from rose2_logs.segmentation.pipeline import METHODS, analyse
+from rose2_logs.segmentation.pipeline import METHODS, analyze
 
 PARAMETERS = Parameters()
 every_method = pytest.mark.parametrize("method", BASELINES)
@@ -109,7 +109,7 @@ def test_outlines_hold_the_cells_of_their_room():
 @every_method
 def test_an_analysis_holds_rooms_and_doorways_in_the_world(method):
     cells = np.where(two_rooms((120, 130))[0], 0, 100).astype(np.int8)
-    analysis = analyse(snapshot(cells, RESOLUTION_M, (10.0, -5.0), 0.5), PARAMETERS, method)
+    analysis = analyze(snapshot(cells, RESOLUTION_M, (10.0, -5.0), 0.5), PARAMETERS, method)
     rooms, geometry = analysis.rooms, analysis.geometry
     assert (analysis.structure, analysis.walls, analysis.floor_plan) == (None, None, None)
     assert len(rooms) == 2
@@ -118,11 +118,11 @@ def test_an_analysis_holds_rooms_and_doorways_in_the_world(method):
     assert rooms.areas_m2 == pytest.approx(rooms.predicted_areas_m2)
     for number, shape in enumerate(rooms.polygons, start=1):
         row, column = np.nonzero(rooms.labels == number)
-        assert shapely.contains_xy(shape, geometry.cell_centres(row, column)).all()
+        assert shapely.contains_xy(shape, geometry.cell_centers(row, column)).all()
     assert method in analysis.seconds
 
 
 @every_method
 def test_a_map_without_free_cells_has_no_rooms(method):
     for fill in (-1, 100):
-        assert len(analyse(snapshot(np.full((30, 20), fill)), PARAMETERS, method).rooms) == 0
+        assert len(analyze(snapshot(np.full((30, 20), fill)), PARAMETERS, method).rooms) == 0

@@ -9,7 +9,7 @@ from rose2_logs.segmentation.baselines.regions import ranks_by_size
 
 
 def grown_one_by_one(seeds, free):
-    """The same in plain words: round by round, the first of the neighbours by size."""
+    """The same in plain words: round by round, the first of the neighbors by size."""
     labels = np.where(free, seeds, 0)
     rank = ranks_by_size(labels)
     while True:

@@ -65,7 +65,7 @@ def test_the_area_of_a_dead_end_decides():
     assert merged(labels, 1.0, **loose, dead_end_max_area_m2=50.0).max() == 1
 
 
-def test_the_smallest_room_goes_first_to_its_widest_neighbour():
+def test_the_smallest_room_goes_first_to_its_widest_neighbor():
     """A sliver between two rooms goes to the one with the longer common border."""
     labels = np.zeros((12, 23), np.int32)
     labels[1:11, 1:11], labels[1:11, 12:22] = 1, 3
@@ -75,7 +75,7 @@ def test_the_smallest_room_goes_first_to_its_widest_neighbour():
     assert joined[3, 11] == joined[3, 3]
 
 
-def test_labels_may_have_gaps_and_rooms_no_neighbour():
+def test_labels_may_have_gaps_and_rooms_no_neighbor():
     labels = rows("1..5", "1..5")
     assert (merged(labels, 5.0) == rows("1..2", "1..2")).all()
     assert merged(np.zeros((3, 3), np.int32)).max() == 0

@@ -45,9 +45,9 @@ def test_a_closed_part_of_the_least_area_is_a_room_and_a_smaller_one_is_not():
     assert segment(free)[where].max() == 0
 
 
-def test_without_neighbourhoods_and_prunings_there_are_rooms_all_the_same():
+def test_without_neighborhoods_and_prunings_there_are_rooms_all_the_same():
     free, _ = two_rooms()
-    assert segment(free, neighbourhood_max_rounds=0, prune_passes=0).max() >= 1
+    assert segment(free, neighborhood_max_rounds=0, prune_passes=0).max() >= 1
 
 
 @pytest.mark.parametrize("fill", [False, True])

@@ -60,7 +60,7 @@ def test_every_cell_points_to_the_narrowest_cell_near_it():
     assert narrowest_cells(graph, distance, 60.0, 150).tolist() == [[0, 3]]
 
 
-def test_the_neighbourhood_is_the_longer_the_narrower_the_passage():
+def test_the_neighborhood_is_the_longer_the_narrower_the_passage():
     graph, distance = path([20, 19, 18, 17, 16, 15, 14, 13, 4])
     # More than three cells around the first one do not reach to the end.
     reached = narrowest_cells(graph, distance, 60.0, 150)[:, 1].tolist()
@@ -78,7 +78,7 @@ def test_an_empty_graph_has_no_narrow_cells():
     assert len(narrowest_cells(np.zeros((4, 4), bool), np.ones((4, 4), np.float32), 280.0, 150)) == 0
 
 
-def test_neighbourhoods_follow_the_graph_and_not_the_plane():
+def test_neighborhoods_follow_the_graph_and_not_the_plane():
     """Two passages side by side do not see each other."""
     free = np.zeros((5, 20), bool)
     free[0], free[4] = True, True

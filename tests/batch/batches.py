@@ -14,12 +14,12 @@ from typing import Self, TypeVar
 from saved_maps import save_run
 
 from rose2_logs.batch.driver import LogState
-from rose2_logs.batch.task import LogOutcome, LogTask, Progress, analyse_task
+from rose2_logs.batch.task import LogOutcome, LogTask, Progress, analyze_task
 from rose2_logs.runs.tables import TABLES
 
 TIMEOUT_S = 90.0
 SLOW = tuple(range(116, 222, 4))
-"""Of how many columns the maps of a log know, that takes long enough to be caught while it is analysed."""
+"""Of how many columns the maps of a log know, that takes long enough to be caught while it is analyzed."""
 
 Found = TypeVar("Found")
 
@@ -91,7 +91,7 @@ class WorkersHere:
     def events(self) -> Iterator[Progress | LogOutcome]:
         while self._waiting:
             told: list[Progress] = []
-            outcome = analyse_task(self._waiting.popleft(), told.append)
+            outcome = analyze_task(self._waiting.popleft(), told.append)
             yield from told
             yield outcome
 

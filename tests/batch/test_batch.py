@@ -36,7 +36,7 @@ from rose2_logs.batch.record import RECORD, BatchSettings
 from rose2_logs.batch.task import Progress
 from rose2_logs.errors import OutputError
 from rose2_logs.runs.tables import TABLES
-from rose2_logs.workflows.analyze import RunOptions, analyse_log
+from rose2_logs.workflows.analyze import RunOptions, analyze_log
 
 GOOD = {"slow", "one_run", "two_run"}
 
@@ -69,7 +69,7 @@ def test_a_logs_folder_is_what_analyze_writes(batch, tmp_path):
     """The same files and the same bytes of tables, so that all other commands work on it."""
     folder, _ = batch
     options = RunOptions(recording=False, annotated_log=False)
-    analyse_log(folder / "logs" / "one" / "run", tmp_path, options)
+    analyze_log(folder / "logs" / "one" / "run", tmp_path, options)
     results = folder / "out" / "logs" / "one_run"
     assert table_bytes(results) == table_bytes(tmp_path)
     assert {path.name for path in results.iterdir()} == {path.name for path in tmp_path.iterdir()} | {RECORD}
@@ -77,7 +77,7 @@ def test_a_logs_folder_is_what_analyze_writes(batch, tmp_path):
     for kept, where in ((ours, results), (theirs, tmp_path)):
         del kept["seconds"]
         # As seen from the place where the results stand, not from where they were made.
-        assert (where / kept["log_place"].pop("from_results")).resolve() == folder / "logs" / "one" / "run"
+        assert (where / kept["log_location"].pop("from_results")).resolve() == folder / "logs" / "one" / "run"
     assert ours == theirs
 
 

@@ -45,7 +45,7 @@ def test_patterns_find_logs_and_nothing_else(data: Path, pattern: str):
 
 
 def test_a_file_of_a_ros2_bag_means_the_bag(data: Path):
-    """It would be analysed in parts otherwise."""
+    """It would be analyzed in parts otherwise."""
     assert found(data, "b/bag/bag_0.mcap", "b/bag") == ["b/bag"]
 
 
@@ -70,7 +70,7 @@ def test_nothing_found_is_an_error_that_names_the_argument(data: Path, argument:
 
 
 def test_a_single_log_that_is_not_there_is_for_the_worker_to_tell(data: Path):
-    """The others are analysed all the same."""
+    """The others are analyzed all the same."""
     assert found(data, "nowhere.mcap") == ["nowhere.mcap"]
 
 

@@ -173,16 +173,16 @@ def test_each_folder_becomes_a_bag(batches):
             assert "/rose2/rooms" in bag.topics
 
 
-def test_what_is_to_be_smoothed_joins_the_data_set(batches):
-    """Of results that stand without it, too; it stays until a log is analysed without it."""
-    partition = batches.out / "tables" / "smoothed" / "log=one_run"
-    smoothed = BatchSettings(recording=False, annotated_log=False, smooth=True)
-    plain = dataclasses.replace(smoothed, smooth=False)
+def test_what_is_to_be_back_projected_joins_the_data_set(batches):
+    """Of results that stand without it, too; it stays until a log is analyzed without it."""
+    partition = batches.out / "tables" / "back_projected" / "log=one_run"
+    back_projected = BatchSettings(recording=False, annotated_log=False, back_project=True)
+    plain = dataclasses.replace(back_projected, back_project=False)
     assert not partition.exists()
-    assert batches.run("one", settings=smoothed) == {"one_run": "done"}
-    assert batches.run("one", settings=smoothed) == {"one_run": "up to date"}
-    kept = (batches.out / "logs" / "one_run" / "smoothed.parquet").read_bytes()
-    assert (partition / "smoothed.parquet").read_bytes() == kept
+    assert batches.run("one", settings=back_projected) == {"one_run": "done"}
+    assert batches.run("one", settings=back_projected) == {"one_run": "up to date"}
+    kept = (batches.out / "logs" / "one_run" / "back_projected.parquet").read_bytes()
+    assert (partition / "back_projected.parquet").read_bytes() == kept
     assert [each.name for each in partition.parent.iterdir()] == ["log=one_run"]
     assert batches.run("one", settings=plain) == {"one_run": "up to date"}
     assert partition.exists()
@@ -191,7 +191,7 @@ def test_what_is_to_be_smoothed_joins_the_data_set(batches):
 
 
 def test_strict_makes_a_warning_about_a_log_its_failure(batches):
-    """The other logs are analysed."""
+    """The other logs are analyzed."""
     described = batches.logs / "two" / "run" / "map1.yaml"
     described.write_text(described.read_text().replace("resolution: 0.05", "resolution: 0"))
     settings = dataclasses.replace(QUIET, strict=True)
@@ -252,15 +252,15 @@ def fails(times: int, error: OSError, monkeypatch) -> list[int]:
     from rose2_logs.workflows import analyze as run
 
     calls: list[int] = []
-    whole = run.analyse_log
+    whole = run.analyze_log
 
-    def analyse(path, *arguments):
+    def analyze(path, *arguments):
         calls.append(len(calls))
         if len(calls) <= times:
             raise LogError(f"{path}: cannot be read: {error.strerror}") from error
         return whole(path, *arguments)
 
-    monkeypatch.setattr(run, "analyse_log", analyse)
+    monkeypatch.setattr(run, "analyze_log", analyze)
     return calls
 
 
@@ -286,14 +286,14 @@ def test_a_log_that_changes_while_it_is_read_fails(batches, monkeypatch):
     """Its results would be of no log at all; the earlier ones stand."""
     from rose2_logs.workflows import analyze as run
 
-    whole = run.analyse_log
+    whole = run.analyze_log
 
-    def analyse(path, *arguments):
+    def analyze(path, *arguments):
         result = whole(path, *arguments)
         (path / "map9.yaml").write_text("image: map1.png")
         return result
 
-    monkeypatch.setattr(run, "analyse_log", analyse)
+    monkeypatch.setattr(run, "analyze_log", analyze)
     assert batches.run("one", rerun=True) == {"one_run": "failed"}
     assert "changed while it was read" in summary(batches.out)["one_run"]["reason"]
     assert batches.snapshots("one_run") == 2

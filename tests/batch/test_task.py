@@ -14,7 +14,7 @@ from rose2_logs.batch import task
 from rose2_logs.batch.location import Location
 from rose2_logs.batch.record import BatchSettings
 from rose2_logs.batch.remote import TransferError
-from rose2_logs.batch.task import MOST_WARNINGS, RUNNING, LogTask, Progress, analyse_task, is_transient
+from rose2_logs.batch.task import MOST_WARNINGS, RUNNING, LogTask, Progress, analyze_task, is_transient
 from rose2_logs.errors import LogError
 
 QUIET = BatchSettings(recording=False, annotated_log=False)
@@ -40,7 +40,7 @@ def ignore(_: Progress) -> None:
 def test_tasks_and_outcomes_reach_other_processes(work, log):
     """As they are."""
     given = LogTask(log, "maps", work, QUIET)
-    outcome = analyse_task(given, ignore)
+    outcome = analyze_task(given, ignore)
     assert outcome.status == "done"
     assert outcome.results is not None
     assert outcome.results.parent == work / "maps"
@@ -49,7 +49,7 @@ def test_tasks_and_outcomes_reach_other_processes(work, log):
 
 def test_a_worker_of_another_version_refuses(work, log):
     """Its results would not be those of the batch."""
-    outcome = analyse_task(LogTask(log, "maps", work, QUIET, version="0.0.1"), ignore)
+    outcome = analyze_task(LogTask(log, "maps", work, QUIET, version="0.0.1"), ignore)
     assert outcome.status == "failed"
     assert outcome.reason.startswith("the worker runs rose2-logs ")
     assert outcome.reason.endswith(", the batch 0.0.1")
@@ -58,7 +58,7 @@ def test_a_worker_of_another_version_refuses(work, log):
 def test_a_worker_that_does_not_see_the_folder_for_results_says_so(work, log):
     """As a machine on which it is not mounted; nothing is made there."""
     (work / RUNNING).unlink()
-    outcome = analyse_task(LogTask(log, "maps", work, QUIET), ignore)
+    outcome = analyze_task(LogTask(log, "maps", work, QUIET), ignore)
     assert outcome.reason.startswith(f"{work.parents[2]}: not seen from ")
     assert list(work.iterdir()) == []
 
@@ -70,30 +70,30 @@ def test_work_ends_soon_after_its_batch(work, log, monkeypatch):
     def report(told: Progress) -> None:
         (work / RUNNING).unlink(missing_ok=True)
 
-    outcome = analyse_task(LogTask(log, "maps", work, QUIET), report)
+    outcome = analyze_task(LogTask(log, "maps", work, QUIET), report)
     assert outcome.reason == "the batch has ended"
     assert not [path for path in work.rglob("*") if path.is_file()]
 
 
 def test_warnings_are_gathered_and_counted(work, log, monkeypatch):
-    """Those of the log, wherever it is analysed; the first of them, and how many more."""
+    """Those of the log, wherever it is analyzed; the first of them, and how many more."""
     count = MOST_WARNINGS + 3
 
-    def analyse(*_: object) -> None:
+    def analyze(*_: object) -> None:
         for number in range(count):
             logging.getLogger("rose2_logs.io").warning("trouble %d", number)
         raise LogError("no more")
 
-    monkeypatch.setattr("rose2_logs.workflows.analyze.analyse_log", analyse)
-    outcome = analyse_task(LogTask(log, "maps", work, QUIET), ignore)
+    monkeypatch.setattr("rose2_logs.workflows.analyze.analyze_log", analyze)
+    outcome = analyze_task(LogTask(log, "maps", work, QUIET), ignore)
     assert outcome.reason == "no more"
     assert outcome.warnings == (*(f"trouble {number}" for number in range(MOST_WARNINGS)), "3 more warnings")
 
 
 def test_a_fault_of_the_tool_is_told_as_one_with_its_traceback(work, log, monkeypatch):
     """For --debug."""
-    monkeypatch.setattr("rose2_logs.workflows.analyze.analyse_log", lambda *_: 1 // 0)
-    outcome = analyse_task(LogTask(log, "maps", work, QUIET), ignore)
+    monkeypatch.setattr("rose2_logs.workflows.analyze.analyze_log", lambda *_: 1 // 0)
+    outcome = analyze_task(LogTask(log, "maps", work, QUIET), ignore)
     assert outcome.reason.startswith("ZeroDivisionError: ")
     assert outcome.reason.endswith("(a fault of rose2-logs)")
     assert "Traceback" in outcome.details

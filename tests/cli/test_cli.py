@@ -143,7 +143,7 @@ def test_debug_shows_the_traceback(cli):
 
 
 def test_segment_writes_labels_plan_and_picture(cli, tmp_path: Path):
-    """The label image has the map's size and orientation; the plan lies at the map's origin, in metres."""
+    """The label image has the map's size and orientation; the plan lies at the map's origin, in meters."""
     path = save_map(tmp_path, "flat", two_rooms())
     code, out, _ = cli("segment", path, "-o", tmp_path / "out")
     assert code == 0
@@ -160,7 +160,7 @@ def test_segment_writes_labels_plan_and_picture(cli, tmp_path: Path):
     assert corners.max(0) == pytest.approx([1 + 11.2, 2 + 5.6], abs=0.3)
     with Image.open(tmp_path / "out" / "flat.rooms.png") as image:
         picture = np.asarray(image)
-    # A wide map: the plain one above, grey; the rooms below, in two colours.
+    # A wide map: the plain one above, gray; the rooms below, in two colors.
     above, below = picture[: len(picture) // 2 - 10], picture[len(picture) // 2 + 10 :]
     assert np.ptp(above.astype(int), axis=2).max() == 0
     height, width = below.shape[:2]
@@ -279,7 +279,7 @@ def test_help_shows_flags_as_flags_and_cuts_nothing(cli, command: str):
         (["--set", "room_min_area=2"], "did you mean floor_plan.room_min_area_m2?"),
         (["--set", "floor_plan.room_area_m2=2"], "did you mean floor_plan.room_min_area_m2?"),
         (["--set", "rooms.room_min_area_m2=2"], "did you mean floor_plan.room_min_area_m2?"),
-        (["--set", "colour=2"], "write it as block.name=value"),
+        (["--set", "color=2"], "write it as block.name=value"),
         (["--start", "9000"], "they lie from 20.0 to 596.7 s into the log"),
     ],
 )

@@ -21,7 +21,7 @@ BIN = Path(sys.executable).parent
 
 
 def three_rooms() -> NDArray[np.uint8]:
-    """Grey image of three rooms, 4, 6 and 8 m long and 5 m wide, with doors of 1 m between them."""
+    """Gray image of three rooms, 4, 6 and 8 m long and 5 m wide, with doors of 1 m between them."""
     image = np.full((120, 400), UNKNOWN, np.uint8)
     left = 10
     for length in (80, 120, 160):
@@ -63,7 +63,7 @@ def test_compare_tells_what_differs(cli, results, tmp_path: Path):
     assert shapely.from_wkb(seen["shape_a_wkb"]).bounds == pytest.approx((11.7, 2.4, 19.8, 7.6), abs=0.3)
     walls = pq.read_table(tmp_path / "out" / "wall_changes.parquet").to_pylist()
     missing = [row["length_m"] for row in walls if row["status"] == "missing"]
-    # Five metres with a door of one.
+    # Five meters with a door of one.
     assert sum(missing) == pytest.approx(4, abs=0.6)
     with Image.open(tmp_path / "out" / "comparison.png") as picture:
         assert picture.width >= 900

@@ -13,7 +13,7 @@ import pytest
 from mcap.writer import Writer
 from saved_maps import save_run
 
-from rose2_logs.system.warnings import PACKAGE, gathered, muted, notice
+from rose2_logs.system.warnings import PACKAGE, collect_warnings, log_warning, muted
 
 MAPS = 12
 
@@ -106,7 +106,7 @@ def test_strict_ends_at_the_first_warning_and_leaves_nothing(cli, damaged):
 
 
 def test_names_in_a_log_cannot_write_to_the_terminal(cli, tmp_path):
-    """A name is shown as text: no colours of rich, no escape sequences, no second line."""
+    """A name is shown as text: no colors of rich, no escape sequences, no second line."""
     log = tmp_path / "run.mcap"
     with log.open("wb") as file:
         writer = Writer(file)
@@ -147,16 +147,16 @@ def test_a_map_that_the_method_stumbles_over_is_left_out(monkeypatch, tmp_path):
     from rose2_logs.workflows import analyze as run
 
     maps = save_run(tmp_path / "maps")
-    analyse = tracked_stream.analyse
+    analyze = tracked_stream.analyze
 
     def stumbling(snapshot, *others, **more):
         if snapshot.index == 1:
             raise IndexError("out of bounds")
-        return analyse(snapshot, *others, **more)
+        return analyze(snapshot, *others, **more)
 
-    monkeypatch.setattr(tracked_stream, "analyse", stumbling)
+    monkeypatch.setattr(tracked_stream, "analyze", stumbling)
     options = run.RunOptions(recording=False, annotated_log=False)
-    result = run.analyse_log(maps, tmp_path / "out", options)
+    result = run.analyze_log(maps, tmp_path / "out", options)
     assert (result.totals.snapshots, result.totals.invalid) == (2, 1)
     (told,) = result.warnings.kinds["snapshot_left_out"].first
     assert "snapshot 1 is left out: IndexError: out of bounds" in told["message"]
@@ -165,13 +165,13 @@ def test_a_map_that_the_method_stumbles_over_is_left_out(monkeypatch, tmp_path):
 
 def test_notices_are_gathered_by_kind_in_this_thread_only_while_asked_for():
     logger = logging.getLogger(f"{PACKAGE}.test")
-    with gathered() as outer:
-        with gathered() as inner:
+    with collect_warnings() as outer:
+        with collect_warnings() as inner:
             for k in range(7):
-                notice(logger, "odd", f"number {k}", index=k)
-        notice(logger, "even", "later")
+                log_warning(logger, "odd", f"number {k}", index=k)
+        log_warning(logger, "even", "later")
         with muted():
-            notice(logger, "even", "not at all")
+            log_warning(logger, "even", "not at all")
     assert (inner.count, outer.count) == (7, 8)
     assert list(outer.kinds) == ["odd", "even"]
     assert [told["index"] for told in inner.kinds["odd"].first] == [0, 1, 2, 3, 4]

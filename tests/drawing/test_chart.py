@@ -78,9 +78,9 @@ def test_lanes_show_when_rooms_were_there_and_in_which_state():
     """A room that went and came back has two bars; a bar reaches to the next map, or to the next state."""
     x = np.array([0.0, 10.0, 20.0, 30.0, 40.0])
     states = np.array([[1, 0, 1, 2, 0], [0, 0, 0, 0, 2]])
-    colours = [{"forming": "#100", "settled": "#200"}, {"forming": "#300", "settled": "#400"}]
+    colors = [{"forming": "#100", "settled": "#200"}, {"forming": "#300", "settled": "#400"}]
     root = ET.fromstring(
-        lane_chart(x, states, ["1", "2"], colours, title="t", x_label="x", x_range=(0.0, 40.0))
+        lane_chart(x, states, ["1", "2"], colors, title="t", x_label="x", x_range=(0.0, 40.0))
     )
     bars = [(float(each.get("x")), float(each.get("width"))) for each in root.iter("rect")]
     quarter = (WIDTH - LEFT - RIGHT) / 4

@@ -1,4 +1,4 @@
-"""A drawn plan shows each room where it is, in the colour of its track, as SVG and as pixels alike."""
+"""A drawn plan shows each room where it is, in the color of its track, as SVG and as pixels alike."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ import shapely
 from drawn_plans import LEFT, RIGHT, two_rooms_plan
 from PIL import Image
 
-from rose2_logs.drawing.palette import track_colour
+from rose2_logs.drawing.palette import track_color
 from rose2_logs.drawing.pixels import as_pixels
 from rose2_logs.drawing.plan import (
     FIGURE,
-    FREE_GREY,
+    FREE_GRAY,
     LETTER_EM,
     MARGIN_M,
     PANEL,
     SEEN_OPACITY,
-    UNKNOWN_GREY,
+    UNKNOWN_GRAY,
     draw_plan,
 )
 from rose2_logs.drawing.shapes import Area, Drawing, Lines, Text, hatching
@@ -34,13 +34,13 @@ from rose2_logs.model.rooms import Doorway
 SVG = "{http://www.w3.org/2000/svg}"
 
 
-def seen_colour(number: int) -> np.ndarray:
-    return np.round((1 - SEEN_OPACITY) * FREE_GREY + SEEN_OPACITY * np.array(track_colour(number)))
+def seen_color(number: int) -> np.ndarray:
+    return np.round((1 - SEEN_OPACITY) * FREE_GRAY + SEEN_OPACITY * np.array(track_color(number)))
 
 
 @pytest.mark.parametrize("yaw_rad", [0.0, 0.6])
 def test_pixels_show_rooms_where_they_are(yaw_rad: float):
-    """Also on a turned grid; x goes right and y up; what was not seen is pale, what is unknown is grey."""
+    """Also on a turned grid; x goes right and y up; what was not seen is pale, what is unknown is gray."""
     plan = two_rooms_plan(yaw_rad)
     drawing = draw_plan(plan, dataclasses.replace(PANEL, font=0.0, hatch_gap=1e9))
     image = as_pixels(drawing, 720)
@@ -52,16 +52,16 @@ def test_pixels_show_rooms_where_they_are(yaw_rad: float):
         column, row = (x - x0 + MARGIN_M) / metres_per_px, (y1 + MARGIN_M - y) / metres_per_px
         return image[int(row), int(column)].astype(int)
 
-    assert np.abs(at((2.2, 3.5)) - seen_colour(LEFT)).max() <= 2
-    assert np.abs(at((6.2, 1.5)) - seen_colour(RIGHT)).max() <= 2
+    assert np.abs(at((2.2, 3.5)) - seen_color(LEFT)).max() <= 2
+    assert np.abs(at((6.2, 1.5)) - seen_color(RIGHT)).max() <= 2
     pale = at((8.3, 2.5))
-    assert np.abs(pale - np.array([UNKNOWN_GREY] * 3)).max() > 5
-    assert pale.mean() > seen_colour(RIGHT).mean()
+    assert np.abs(pale - np.array([UNKNOWN_GRAY] * 3)).max() > 5
+    assert pale.mean() > seen_color(RIGHT).mean()
     assert at((5.0, 2.5))[0] > 180 > at((5.0, 2.5))[1] + 60  # the red doorway
 
 
 def test_svg_is_xml_with_the_same_picture_and_shapes():
-    """The picture within holds the cells' colours, paths are rooms, texts their names; markup is escaped."""
+    """The picture within holds the cells' colors, paths are rooms, texts their names; markup is escaped."""
     plan = two_rooms_plan()
     text = as_svg(draw_plan(plan))
     root = ET.fromstring(text)
@@ -69,7 +69,7 @@ def test_svg_is_xml_with_the_same_picture_and_shapes():
     (image,) = root.iter(f"{SVG}image")
     pixels = np.asarray(Image.open(io.BytesIO(base64.b64decode(image.get("href").split(",")[1]))))
     assert pixels.shape == (32, 62, 3)
-    assert (pixels[10, 10] == seen_colour(LEFT)).all()
+    assert (pixels[10, 10] == seen_color(LEFT)).all()
     texts = [element.text for element in root.iter(f"{SVG}text")]
     assert {"Room 3", "Room 120", "12 m²", "predicted, unseen", "doorway"} <= set(texts)
     told = [element.text for element in root.iter(f"{SVG}title")]
@@ -82,7 +82,7 @@ def test_unsure_rooms_are_marked_and_the_legend_says_so():
     plan = two_rooms_plan()
     unsure, sure = (
         dataclasses.replace(
-            plan, rooms=tuple(dataclasses.replace(room, confidence=share) for room in plan.rooms)
+            plan, rooms=tuple(dataclasses.replace(room, wall_support=share) for room in plan.rooms)
         )
         for share in (0.69, 0.7)
     )
@@ -105,7 +105,7 @@ def test_the_legend_fits_into_the_page(height_m: float):
     drawing = draw_plan(plan, FIGURE, shape.bounds)
     strip = drawing.height - 3 * FIGURE.font
     words = [
-        each for each in drawing.shapes if isinstance(each, Text) and each.y > strip and not each.is_centred
+        each for each in drawing.shapes if isinstance(each, Text) and each.y > strip and not each.is_centered
     ]
     ends = [(each.x, each.x + LETTER_EM * each.size * len(each.text)) for each in words]
     assert words[-1].text == "unsure, little wall around"
@@ -176,7 +176,7 @@ def test_what_lies_in_a_hole_is_drawn(turn: int):
 
 
 def test_a_raised_two_is_drawn():
-    """The square of metres is no empty box: it is there, smaller and higher than a plain two."""
+    """The square of meters is no empty box: it is there, smaller and higher than a plain two."""
 
     def ink(text):
         page = Drawing(100, 40)

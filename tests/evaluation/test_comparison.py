@@ -43,7 +43,7 @@ def test_leaked_missed_and_empty_cells():
 
 
 def test_a_found_room_outside_every_true_room_has_no_partner():
-    """It leaks as a whole, and is nobody's colour."""
+    """It leaks as a whole, and is nobody's color."""
     comparison = compare(rows("11.."), rows("5566"))
     assert comparison.partner_of_found[[5, 6]].tolist() == [1, 0]
     assert comparison.count(Mark.LEAKED) == 2

@@ -52,7 +52,7 @@ def test_a_label_that_does_not_occur_has_no_number():
 
 
 def test_true_rooms_move_with_the_map():
-    """Rooms a metre wide are told apart after a shift by a metre when the motion is known."""
+    """Rooms a meter wide are told apart after a shift by a meter when the motion is known."""
     labels = rows("1234", "1234")
     linker = TruthLinker()
     before = snapshot(np.zeros((2, 4)), 1.0)
@@ -77,8 +77,8 @@ def test_a_canvas_that_grew_is_laid_over_the_one_before(pad: tuple[int, int]):
 
 def case_result(folder: Path, name: str, cells, truth, labels) -> CaseResult:
     """A case as images in a folder, and rooms found in it."""
-    grey = np.select([cells == 0, cells == 100], [254, 0], 205).astype(np.uint8)
-    Image.fromarray(np.flipud(grey)).save(folder / f"{name}.png")
+    gray = np.select([cells == 0, cells == 100], [254, 0], 205).astype(np.uint8)
+    Image.fromarray(np.flipud(gray)).save(folder / f"{name}.png")
     write_label_image(folder / f"{name}.rooms.png", np.flipud(truth))
     case = Case("run", name, folder / f"{name}.png", folder / f"{name}.rooms.png", 0.05)
     found = np.flipud(labels).astype(np.int32)
@@ -99,8 +99,8 @@ def test_a_run_is_scored_over_growing_canvases_without_origins(tmp_path: Path):
     assert scores.found.idf1 == scores.found.idf1_bound == pytest.approx(100 * 2 * 8 / (9 + 8))
     assert (scores.found.id_switches, scores.found.fragmentations) == (0, 1)
     assert (scores.found.tracks, scores.found.true_tracks) == (3, 3)
-    assert scores.smoothed.idf1 == 100  # the last map has the missed room
-    assert scores.smoothed_iou_sym == pytest.approx(100)
+    assert scores.back_projected.idf1 == 100  # the last map has the missed room
+    assert scores.back_projected_iou_sym == pytest.approx(100)
     assert run_tracks_as_json({"run": scores})["run"]["found"]["idf1"] == scores.found.idf1
 
 

@@ -47,7 +47,7 @@ def test_geojson_is_read_by_shapely(plan, tmp_path: Path):
     (file,) = write_plan(plan, ["geojson"], tmp_path, "two")
     collection = json.loads(file.read_text())
     assert collection["type"] == "FeatureCollection"
-    assert collection["map_frame"]["unit"] == "metre"
+    assert collection["map_frame"]["unit"] == "meter"
     assert "not longitude" in collection["map_frame"]["note"]
     # The standard forbids these names to collections.
     assert not {"coordinates", "geometry", "properties"} & collection.keys()
@@ -66,8 +66,8 @@ def test_geojson_is_read_by_shapely(plan, tmp_path: Path):
         assert polygon.exterior.is_ccw
         about = feature["properties"]
         assert (about["room"], about["name"]) == (room.number, room.name)
-        assert (about["area_m2"], about["confidence"]) == pytest.approx((room.area_m2, 0.75))
-        assert about["neighbours"] == list(room.neighbours)
+        assert (about["area_m2"], about["wall_support"]) == pytest.approx((room.area_m2, 0.75))
+        assert about["neighbors"] == list(room.neighbors)
     (door,) = found["doorway"]
     assert shape(door["geometry"]).length == pytest.approx(door["properties"]["width_m"], abs=1e-3) == 1.0
     assert door["properties"]["rooms"] == [LEFT, RIGHT]
@@ -82,7 +82,7 @@ def test_a_room_without_a_shape_has_no_geometry(tmp_path: Path):
 
 
 def test_dxf_passes_the_audit(plan, tmp_path: Path):
-    """Layers, metres, outlines, hatches, doorways, labels."""
+    """Layers, meters, outlines, hatches, doorways, labels."""
     (file,) = write_plan(plan, ["dxf"], tmp_path, "two")
     document = ezdxf.readfile(file)
     audit = document.audit()
@@ -128,7 +128,7 @@ def test_the_same_plan_gives_the_same_dxf_in_every_process(tmp_path: Path):
     assert len(written) == 1
 
 
-def test_labelled_map_is_read_as_a_map(plan, tmp_path: Path):
+def test_labeled_map_is_read_as_a_map(plan, tmp_path: Path):
     """Our reader of map_server's files gets the cells, their place, and the rooms as values."""
     image, about, listing, labels = write_plan(plan, ["map_server"], tmp_path, "two")
     with open_log(about) as log:
@@ -142,7 +142,7 @@ def test_labelled_map_is_read_as_a_map(plan, tmp_path: Path):
         assert ((plan.map.labels == number) == (snapshot.cells == rooms[number]["value"])).all()
     outside = plan.map.labels == 0
     assert np.array_equal(snapshot.cells[outside], plan.map.cells[outside])
-    assert rooms[LEFT]["neighbours"] == [RIGHT]
+    assert rooms[LEFT]["neighbors"] == [RIGHT]
     assert image.read_bytes().startswith(b"P5")
     assert np.array_equal(np.flipud(np.asarray(Image.open(labels))), plan.map.labels)
 
@@ -219,8 +219,8 @@ def test_a_real_plan_is_read_back(real_plan, tmp_path: Path):
     assert areas == pytest.approx({room.number: room.predicted_area_m2 for room in real_plan.rooms}, rel=1e-3)
     assert all(shape(each["geometry"]).is_valid for each in features)
     graph = nx.node_link_graph(json.loads((tmp_path / "real.graph.json").read_text()), edges="edges")
-    neighbours = {room.number: sorted(set(graph.neighbors(room.number))) for room in real_plan.rooms}
-    assert neighbours == {room.number: list(room.neighbours) for room in real_plan.rooms}
+    neighbors = {room.number: sorted(set(graph.neighbors(room.number))) for room in real_plan.rooms}
+    assert neighbors == {room.number: list(room.neighbors) for room in real_plan.rooms}
 
 
 def test_an_unknown_format_is_named(plan, tmp_path: Path):

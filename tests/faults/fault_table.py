@@ -27,7 +27,7 @@ from faulty_maps import SAVED_FAULTS, write_maps
 from rose2_logs.config.parameters import ReadingParameters
 from rose2_logs.errors import LogError
 from rose2_logs.io import open_log
-from rose2_logs.system.warnings import gathered
+from rose2_logs.system.warnings import collect_warnings
 
 PAGE = Path(__file__).parents[2] / "docs" / "faults.md"
 LIMITS = ReadingParameters(map_max_cells=1 << 24, chunk_max_bytes=4 << 20)
@@ -98,14 +98,14 @@ def make(table: str, case: Case, folder: Path) -> Path:
 
 def outcome(log: Path) -> str:
     """Read a log and tell what came of it in a few words; anything but a known error is raised."""
-    with gathered() as notices:
+    with collect_warnings() as warning_log:
         try:
             with open_log(log, limits=LIMITS) as reader:
                 maps = sum(1 for _ in reader.snapshots())
                 counts = reader.counts
         except LogError as error:
             return f"error: {_plain(error, log)}"
-    kinds = [f"{found.count} × {kind}" for kind, found in notices.kinds.items()]
+    kinds = [f"{found.count} × {kind}" for kind, found in warning_log.kinds.items()]
     repeats = f", {counts.repeats} repeats" if counts.repeats else ""
     return f"{maps} of {counts.messages} map messages{repeats}" + "".join(f", {kind}" for kind in kinds)
 

@@ -542,7 +542,7 @@ def bag_chunk(packed_data: bytes, claimed: int, compression: bytes) -> bytes:
 
 
 def png_claiming(width: int, height: int, rows: bytes) -> bytes:
-    """A grey PNG that claims a size, whatever its rows are."""
+    """A gray PNG that claims a size, whatever its rows are."""
 
     def chunk(kind: bytes, data: bytes) -> bytes:
         return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))

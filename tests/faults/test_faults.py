@@ -13,7 +13,7 @@ from fault_table import LIMITS, PAGE, TABLES, expected, make, outcome
 from faulty_logs import COUNT, INPUTS, MESSAGE_FAULTS, SEEN, Grid, room
 
 from rose2_logs.io import open_log
-from rose2_logs.system.warnings import StrictError, gathered
+from rose2_logs.system.warnings import StrictError, collect_warnings
 
 CASES = [(table, *case) for table, cases in TABLES.items() for case in cases()]
 PEAK_BYTES = 3 * LIMITS.chunk_max_bytes
@@ -105,7 +105,7 @@ def test_what_is_read_of_a_log_with_a_faulty_message_is_what_its_other_messages_
 def test_where_it_is_asked_for_the_first_warning_is_an_error(table, fault, kind, tmp_path):
     log = make(table, (fault, kind), tmp_path)
     with (
-        gathered(strict=True),
+        collect_warnings(strict=True),
         pytest.raises(StrictError, match="--strict") as caught,
         open_log(log, limits=LIMITS) as reader,
     ):
@@ -128,7 +128,7 @@ def test_every_kind_of_warning_is_explained_on_the_page():
     kinds = set()
     for path in (Path(__file__).parents[2] / "rose2_logs").rglob("*.py"):
         code = path.read_text(encoding="utf-8")
-        kinds |= set(re.findall(r'(?:notice\(logger, |Remark\(\s*)"(\w+)"', code))
+        kinds |= set(re.findall(r'(?:notice\(logger, |MapWarning\(\s*)"(\w+)"', code))
     assert "invalid_map" not in kinds, "that one is chosen by the error"
     explained = set(
         re.findall(r"`(\w+)`", PAGE.read_text(encoding="utf-8").partition("## Faults of messages")[0])

@@ -26,7 +26,7 @@ from rose2_logs.errors import OutputError
 from rose2_logs.outputs.exports.formats import FORMATS
 from rose2_logs.outputs.report.page import write_report
 from rose2_logs.runs.folder import RunResults
-from rose2_logs.workflows.analyze import NAMELESS, RunOptions, analyse_log, log_stem
+from rose2_logs.workflows.analyze import NAMELESS, RunOptions, analyze_log, log_stem
 from rose2_logs.workflows.figure import export_plan, write_figure
 
 MAPS = 2
@@ -74,13 +74,13 @@ def elements(picture: Path) -> list[tuple[str, tuple[str, ...]]]:
 
 
 def made_of(name: str, folder: Path) -> Path:
-    """Analyse a log whose topic, frame, file and results are called so; return the folder of results."""
+    """Analyze a log whose topic, frame, file and results are called so; return the folder of results."""
     file_name = name.replace("/", "\u2215").replace("\0", "") or HARMLESS
     file_name = file_name.encode()[:LONGEST].decode(errors="ignore")
     logged = [(f"/{name}", START_NS + k * 10**9, grid(room(SEEN[k + 2], k), frame=name)) for k in range(MAPS)]
     log = write_mcap(folder / f"{file_name}.mcap", logged)
     out = folder / "some" / "where" / file_name
-    return analyse_log(log, out, RunOptions(topic=f"/{name}", recording=False, bag=True)).folder
+    return analyze_log(log, out, RunOptions(topic=f"/{name}", recording=False, bag=True)).folder
 
 
 @pytest.fixture(scope="module")
@@ -160,10 +160,10 @@ def test_a_name_that_is_not_utf8_is_refused_in_one_line(tmp_path: Path):
     log = Path(os.fsdecode(os.fsencode(tmp_path) + b"/run\xff.mcap"))
     write_mcap(log, [("/map", START_NS, grid(room(90)))])
     with pytest.raises(OutputError, match=r"is not UTF-8.*rename it"):
-        analyse_log(log, tmp_path / "out", RunOptions())
+        analyze_log(log, tmp_path / "out", RunOptions())
     plain = log.rename(tmp_path / "run.mcap")
     with pytest.raises(OutputError, match=r"is not UTF-8.*rename it"):
-        analyse_log(plain, log.with_suffix(""), RunOptions())
+        analyze_log(plain, log.with_suffix(""), RunOptions())
     assert list(tmp_path.iterdir()) == [plain]
     with pytest.raises(OutputError, match=r"is not UTF-8.*rename it"):
         RunResults(log.with_suffix(""))
@@ -173,7 +173,7 @@ def test_a_name_too_long_for_its_results_is_told_and_leaves_nothing(tmp_path: Pa
     """The file system takes the log's name, but not that of its results."""
     log = write_mcap(tmp_path / f"{'x' * 245}.mcap", [("/map", START_NS, grid(room(90)))])
     with pytest.raises(OutputError, match=r"longer than 246 bytes; give the log a shorter name"):
-        analyse_log(log, tmp_path / "out", RunOptions())
+        analyze_log(log, tmp_path / "out", RunOptions())
     assert list(tmp_path.iterdir()) == [log]
 
 
@@ -217,6 +217,6 @@ def test_a_file_in_a_bag_whose_name_is_not_utf8_is_no_trouble(tmp_path: Path):
     Path(os.fsdecode(os.fsencode(bag) + b"/caf\xe9.txt")).write_text("")
     out = tmp_path / "out"
     options = RunOptions(selection=Selection(max_snapshots=1), recording=False, annotated_log=False)
-    analyse_log(bag, out, options)
+    analyze_log(bag, out, options)
     names = [file["name"] for file in json.loads((out / "summary.json").read_text())["input"]["files"]]
     assert r"caf\xe9.txt" in names

@@ -12,10 +12,10 @@ from faulty_logs import COUNT, INPUTS
 from mcap.reader import make_reader
 
 from rose2_logs.errors import InvalidMapError
-from rose2_logs.workflows.analyze import RunOptions, analyse_log
+from rose2_logs.workflows.analyze import RunOptions, analyze_log
 
 CASES = [
-    # table, fault, kind of log, maps that are analysed, messages of the log in the annotated MCAP
+    # table, fault, kind of log, maps that are analyzed, messages of the log in the annotated MCAP
     ("messages", "resolution NaN", "MCAP, zstd", 4, 10),
     ("messages", "upside down", "ROS 1 bag", 4, 10),
     ("messages", "cells out of range", "ROS 2, sqlite3", 5, 10),
@@ -39,10 +39,10 @@ CASES = [
 @pytest.mark.parametrize(
     ("table", "fault", "kind", "maps", "copied"), CASES, ids=[" / ".join(case[1:3]) for case in CASES]
 )
-def test_what_is_whole_is_analysed_and_copied(table, fault, kind, maps, copied, tmp_path):
+def test_what_is_whole_is_analyzed_and_copied(table, fault, kind, maps, copied, tmp_path):
     log = make(table, (fault, kind), tmp_path)
     before = [(file, file.read_bytes()) for file in ([log] if log.is_file() else sorted(log.iterdir()))]
-    result = analyse_log(log, tmp_path / "out", RunOptions(recording=False))
+    result = analyze_log(log, tmp_path / "out", RunOptions(recording=False))
     assert result.totals.snapshots == maps
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert summary["warnings"] == result.warnings.as_json()
@@ -55,10 +55,10 @@ def test_what_is_whole_is_analysed_and_copied(table, fault, kind, maps, copied, 
     assert [(file, file.read_bytes()) for file, _ in before] == before
 
 
-def test_a_log_of_which_nothing_can_be_analysed_leaves_nothing_behind(tmp_path):
+def test_a_log_of_which_nothing_can_be_analyzed_leaves_nothing_behind(tmp_path):
     log = make("messages", ("all maps invalid", "MCAP, zstd"), tmp_path)
     with pytest.raises(InvalidMapError, match="3 maps contradict themselves"):
-        analyse_log(log, tmp_path / "out", RunOptions())
+        analyze_log(log, tmp_path / "out", RunOptions())
     assert not list((tmp_path / "out").rglob("*.*"))
 
 
@@ -69,7 +69,7 @@ def test_the_same_faults_give_the_same_summary_whatever_the_number_of_workers(tm
     for workers in (1, 2):
         folder = tmp_path / str(workers)
         options = RunOptions(recording=False, annotated_log=False, workers=workers)
-        assert 0 < analyse_log(log, folder, options).totals.snapshots < COUNT
+        assert 0 < analyze_log(log, folder, options).totals.snapshots < COUNT
         summary = json.loads((folder / "summary.json").read_text())
         summaries.append({key: value for key, value in summary.items() if key != "seconds"})
     assert summaries[0] == summaries[1]

@@ -10,7 +10,7 @@ from rose2_logs.config.parameters import FloorPlanParameters
 from rose2_logs.model.outlines import outline
 from rose2_logs.segmentation.floor_plan.doorways import find_doorways
 from rose2_logs.segmentation.floor_plan.edge_weights import EdgeEvidence, edge_evidence
-from rose2_logs.segmentation.floor_plan.faces import build_faces, rasterise
+from rose2_logs.segmentation.floor_plan.faces import build_faces, rasterize
 from rose2_logs.segmentation.floor_plan.grouping import group_faces
 from rose2_logs.segmentation.floor_plan.rooms import adopt_left_out, settle_borders
 from rose2_logs.segmentation.floor_plan.stage import make_floor_plan
@@ -42,7 +42,7 @@ def test_a_face_within_a_face_is_a_hole_of_it():
 
 def test_painted_faces_cover_every_cell():
     graph = build_faces(GRID_LINES, shapely.box(0, 0, 6, 6))
-    painted = rasterise(graph.polygons, np.arange(1, 13, dtype=np.int32), (120, 120), 0.05)
+    painted = rasterize(graph.polygons, np.arange(1, 13, dtype=np.int32), (120, 120), 0.05)
     assert (painted > 0).all()
     sizes = np.bincount(painted.ravel(), minlength=13)[1:] * 0.05**2
     assert np.allclose(sizes, shapely.area(graph.polygons), rtol=0.1)
@@ -105,11 +105,11 @@ def test_how_much_of_a_face_was_seen_does_not_hang_on_the_raster(turn_deg):
     plan = make_floor_plan(lines, walls, free, turn, 0.05, PARAMETERS)
     middle = shapely.Point(7.5 - 2 * c, 7.5 - 2 * s)
     (face,) = (k for k, polygon in enumerate(plan.graph.polygons) if polygon.contains(middle))
-    # Half of the corridor, less the margin of a metre at both ends and the lines' distance from its cells.
+    # Half of the corridor, less the margin of a meter at both ends and the lines' distance from its cells.
     assert plan.seen[face] == pytest.approx(4 * 2 / (10 * 2.1), abs=0.01)
 
 
-def make_evidence(wall, is_open, passage, blind=0.0):
+def make_quality(wall, is_open, passage, blind=0.0):
     wall, is_open = np.array(wall, float), np.array(is_open, float)
     return EdgeEvidence(wall, blind * wall, is_open, wall + is_open, np.array(passage, float))
 
@@ -119,7 +119,7 @@ def make_evidence(wall, is_open, passage, blind=0.0):
 def test_what_is_open_joins_and_a_door_does_not_in_any_order_of_edges(order, grouping):
     # Faces 0 and 1 are one room cut by a line; 2 lies behind a wall with a door.
     faces = np.array([(0, 1), (1, 2), (0, 2)], np.int32)[order]
-    evidence = make_evidence(
+    evidence = make_quality(
         np.array([0, 3, 3])[order], np.array([4, 1, 0])[order], np.array([1, 0.3, 0])[order]
     )
     parameters = dataclasses.replace(PARAMETERS, grouping=grouping)
@@ -129,7 +129,7 @@ def test_what_is_open_joins_and_a_door_does_not_in_any_order_of_edges(order, gro
 
 def test_a_niche_joins_its_room_and_a_face_that_was_not_seen_takes_no_part():
     faces = np.array([(0, 1), (0, 2)], np.int32)
-    evidence = make_evidence([0.5, 0], [0.5, 4], [0.4, 1])
+    evidence = make_quality([0.5, 0], [0.5, 4], [0.4, 1])
     group = group_faces(
         faces, evidence, np.array([16.0, 0.5, 0.0]), np.ones(3), np.array([2, 0.3, 2]), PARAMETERS
     )
@@ -139,7 +139,7 @@ def test_a_niche_joins_its_room_and_a_face_that_was_not_seen_takes_no_part():
 @pytest.mark.parametrize(("seen", "rooms"), [((1.0, 0.9), 1), ((1.0, 0.4), 2), ((0.4, 1.0), 2)])
 def test_a_wall_with_nothing_behind_divides_faces_that_are_hardly_known(seen, rooms):
     """A cupboard of 2 m beside a passage of 2 m; behind it, the rest of a room or another one."""
-    evidence = make_evidence([2.0], [2.0], [1.0], blind=1.0)
+    evidence = make_quality([2.0], [2.0], [1.0], blind=1.0)
     group = group_faces(
         np.array([(0, 1)], np.int32), evidence, np.full(2, 9.0), np.array(seen), np.full(2, 1.5), PARAMETERS
     )

@@ -53,7 +53,7 @@ def without_labels(map_: OccupancySnapshot, shift_xy_m: tuple[float, float], tur
     ],
 )
 def test_a_moved_map_is_laid_back(sample, shift_xy_m, turn_deg: float):
-    """Any turn and tens of metres of offset: every wall within half a cell, the turn within 0.05 degrees."""
+    """Any turn and tens of meters of offset: every wall within half a cell, the turn within 0.05 degrees."""
     other, motion = without_labels(sample, shift_xy_m, turn_deg)
     found = place(placed(other), placed(sample))
     walls = placed(sample).walls
@@ -71,7 +71,7 @@ def test_a_map_with_other_cells_is_laid_over(sample):
     coarse = np.ascontiguousarray(sample.cells[::2, ::2])
     other = snapshot(coarse, 2 * geometry.resolution_m, (40.0, -7.0), 2.0)
     found = place(placed(other), placed(sample))
-    # The cell taken of each four has its centre a quarter of the large cell from that one's centre.
+    # The cell taken of each four has its center a quarter of the large cell from that one's center.
     corner = found.motion.points(np.array([40.0, -7.0]))
     assert corner == pytest.approx(geometry.origin_xy_m, abs=0.08)
     turn = math.remainder(found.motion.turn_rad + 2.0 - geometry.yaw_rad, 2 * math.pi)
@@ -125,7 +125,7 @@ def test_a_map_without_walls_cannot_be_laid(cells):
 
 
 def test_free_space_far_beyond_the_walls_takes_no_more_memory():
-    """A yard of 800 m around a building of 40 m, in cells of one metre."""
+    """A yard of 800 m around a building of 40 m, in cells of one meter."""
     cells = np.zeros((800, 800), np.int8)
     cells[400:440, 400:440] = 100
     cells[403:437, 402:420] = cells[403:437, 421:438] = 0
@@ -145,10 +145,10 @@ def test_free_space_far_beyond_the_walls_takes_no_more_memory():
     [(0.9, 0.0, True), (1.1, 0.0, False), (0.0, 0.04, True), (0.0, 0.06, False), (0.0, 2 * np.pi, True)],
 )
 def test_placements_are_one_where_the_map_lies_and_is_turned_about_the_same(shift_m, turn_rad, is_same):
-    centre = np.array([30.0, -20.0])
-    one = RigidMotion.moving(centre, centre + 5.0, 1.0)
-    other = RigidMotion.moving(centre, centre + 5.0 + np.array([0.0, shift_m]), 1.0 + turn_rad)
-    assert _is_same(one, other, centre) == is_same
+    center = np.array([30.0, -20.0])
+    one = RigidMotion.moving(center, center + 5.0, 1.0)
+    other = RigidMotion.moving(center, center + 5.0 + np.array([0.0, shift_m]), 1.0 + turn_rad)
+    assert _is_same(one, other, center) == is_same
 
 
 @pytest.mark.parametrize("stated", [0.7, 1.4])

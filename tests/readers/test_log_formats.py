@@ -35,7 +35,7 @@ from rose2_logs.config.parameters import ReadingParameters
 from rose2_logs.config.selection import Selection
 from rose2_logs.errors import InvalidMapError, LogError, NoMapTopicError
 from rose2_logs.io import inspect_log, open_log
-from rose2_logs.system.warnings import StrictError, gathered
+from rose2_logs.system.warnings import StrictError, collect_warnings
 
 needs_shared = pytest.mark.skipif(
     not SHARED.is_dir(), reason="the folder of real logs is not beside the project"
@@ -290,14 +290,14 @@ def test_an_invalid_map_is_left_out_and_told_or_an_error_where_that_is_asked_for
         ("/map", START_NS + 1, Map(np.zeros((2, 2)), resolution=-1)),
     ]
     path = FORMATS[name](tmp_path, log)
-    with gathered() as notices, open_log(path) as reader:
+    with collect_warnings() as warning_log, open_log(path) as reader:
         assert_are(list(reader.snapshots()), growing_maps(1))
         assert (reader.counts.messages, reader.counts.invalid) == (2, 1)
-    (told,) = notices.kinds["invalid_map"].first
+    (told,) = warning_log.kinds["invalid_map"].first
     assert f"{path}: message 2 of 2 on /map: the map's resolution is -1" in told["message"]
     assert "\n" not in told["message"]
     assert (told["topic"], told["index"]) == ("/map", 2)
-    with gathered(strict=True), open_log(path) as reader, pytest.raises(StrictError) as caught:
+    with collect_warnings(strict=True), open_log(path) as reader, pytest.raises(StrictError) as caught:
         list(reader.snapshots())
     assert told["message"] in str(caught.value)
 
@@ -393,10 +393,10 @@ def test_a_split_ros2_bag_is_read_through_all_its_files(storage, tmp_path):
     (bag / "metadata.yaml").write_text(metadata.replace(entry, f"{entry}{indent}- run_1.{suffix}\n", 1))
     assert_are(read(bag), growing_maps())
     (bag / f"run_1.{suffix}").unlink()
-    with gathered() as notices:
+    with collect_warnings() as warning_log:
         assert_are(read(bag), growing_maps()[:3])
-    assert f"run_1.{suffix}: is missing" in notices.kinds["file_missing"].first[0]["message"]
-    with gathered(strict=True), pytest.raises(StrictError, match=f"run_1.{suffix}"):
+    assert f"run_1.{suffix}: is missing" in warning_log.kinds["file_missing"].first[0]["message"]
+    with collect_warnings(strict=True), pytest.raises(StrictError, match=f"run_1.{suffix}"):
         open_log(bag)
     (bag / f"run.{suffix}").unlink()
     with pytest.raises(LogError, match=f"run.{suffix}"):
@@ -416,20 +416,20 @@ def test_a_folder_of_several_logs_is_not_taken_for_one_without_a_word(tmp_path):
     (tmp_path / "run").mkdir()
     one = write_mcap(tmp_path / "run" / "run_0.mcap", log[:6])
     two = write_mcap(tmp_path / "run" / "run_1.mcap", log[6:])
-    with gathered() as notices:
+    with collect_warnings() as warning_log:
         assert_are(read(one.parent), growing_maps())
-    assert not notices.kinds
+    assert not warning_log.kinds
     two.rename(two.with_name("another.mcap"))
-    with gathered() as notices:
+    with collect_warnings() as warning_log:
         assert_are(read(one.parent), growing_maps())
-    assert "2 files from another.mcap on" in notices.kinds["files_as_one"].first[0]["message"]
+    assert "2 files from another.mcap on" in warning_log.kinds["files_as_one"].first[0]["message"]
     write_bag(one.with_name("third.bag"), log)
     (one.parent / "another.mcap").unlink()
-    with gathered() as notices:
+    with collect_warnings() as warning_log:
         assert_are(read(one.parent), growing_maps()[:3])
     assert (
         "its run_0.mcap is read as one log, third.bag left out"
-        in (notices.kinds["files_as_one"].first[0]["message"])
+        in (warning_log.kinds["files_as_one"].first[0]["message"])
     )
 
 
@@ -438,9 +438,9 @@ def test_an_annotated_copy_beside_a_log_is_no_part_of_it(tmp_path):
     (tmp_path / "run").mkdir()
     write_mcap(tmp_path / "run" / "run_0.mcap", log[:6])
     write_mcap(tmp_path / "run" / "run_0.rose2.mcap", log)
-    with gathered() as notices:
+    with collect_warnings() as warning_log:
         assert_are(read(tmp_path / "run"), growing_maps()[:3])
-    assert not notices.kinds
+    assert not warning_log.kinds
     (tmp_path / "run" / "run_0.mcap").unlink()
     assert_are(read(tmp_path / "run"), growing_maps())
 
@@ -593,7 +593,7 @@ def test_a_real_canvas_that_moves_and_grows_stays_in_place_in_the_world():
         # the mapper's corrections move the others.
         rows, columns = np.nonzero(before.cells == 100)
         walls = binary_dilation(now.cells == 100, np.ones((3, 3)), iterations=2)
-        there = now.geometry.world_to_cell(before.geometry.cell_centres(rows, columns))
+        there = now.geometry.world_to_cell(before.geometry.cell_centers(rows, columns))
         assert walls[there[:, 0], there[:, 1]].mean() > 0.5
 
 

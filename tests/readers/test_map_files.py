@@ -91,9 +91,9 @@ def test_raw_pixels_are_percent_and_the_rest_unknown(tmp_path):
     assert snapshot.cells.tolist() == [[0, 1, 100, -1, -1]]
 
 
-def test_colours_count_by_their_mean_and_sixteen_bits_by_their_share(tmp_path):
-    colours = np.array([[[255, 255, 255], [0, 0, 0], [255, 120, 0]]], np.uint8)
-    assert read(save(tmp_path / "rgb", colours, image="rgb.png"))[0].cells.tolist() == [[0, 100, -1]]
+def test_colors_count_by_their_mean_and_sixteen_bits_by_their_share(tmp_path):
+    colors = np.array([[[255, 255, 255], [0, 0, 0], [255, 120, 0]]], np.uint8)
+    assert read(save(tmp_path / "rgb", colors, image="rgb.png"))[0].cells.tolist() == [[0, 100, -1]]
     deep = np.array([[65535, 0, 33000]], np.uint16)
     Image.fromarray(deep).save(tmp_path / "deep.png")
     yaml = save(tmp_path / "other", PIXELS)

@@ -233,7 +233,7 @@ def test_a_fixed_transform_from_long_before_the_selection_still_holds(tmp_path):
 
 @pytest.mark.parametrize("topic", ["/tf", "/odom"])
 def test_a_fast_robot_is_looked_at_no_oftener_than_its_poses_are_far_apart_in_time(tmp_path, topic):
-    """A hundred messages a second, a metre from each to the next."""
+    """A hundred messages a second, a meter from each to the next."""
     kind = ROS2.types[TF]
     messages = (
         (tick * SECOND // 100, topic, TF, kind([transform(ROS2, 0, "map", "base_link", tick, 0.0, 0.0)]))

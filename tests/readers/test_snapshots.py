@@ -14,7 +14,7 @@ from rose2_logs.io import open_log
 from rose2_logs.io.map_stream import known_area_change_m2
 from rose2_logs.io.messages import Grid
 from rose2_logs.model.occupancy import GridGeometry
-from rose2_logs.system.warnings import gathered
+from rose2_logs.system.warnings import collect_warnings
 
 SECOND = 10**9
 WRITERS = {
@@ -271,11 +271,11 @@ def test_a_patch_that_reaches_out_of_the_map_is_left_out_and_told(place, tmp_pat
         ("/map_updates", START_NS + 1, Update(*place, np.zeros((1, 2)))),
     ]
     path = write_bag(tmp_path / "run.bag", log)
-    with gathered() as notices:
+    with collect_warnings() as warning_log:
         snapshots, counts = read(path)
     assert (len(snapshots), counts.invalid) == (1, 1)
     assert not snapshots[0].cells.any()
-    text = notices.kinds["invalid_map"].first[0]["message"]
+    text = warning_log.kinds["invalid_map"].first[0]["message"]
     assert "message 1 of 1 on /map_updates: the patch of 2 x 1 cells" in text
     assert "reaches out of the map of 8 x 6" in text
 

@@ -22,7 +22,7 @@ def report(tmp_path_factory) -> Path:
     """A report whose log and topic are named like programs."""
     folder = tmp_path_factory.mktemp("browser")
     log = renamed_topic(SAMPLE_LOGS / "office.mcap", TOPIC, folder / "<i>office.mcap")
-    return write_report(run_of(log, folder / "out", 4, topic=TOPIC, smooth=True))
+    return write_report(run_of(log, folder / "out", 4, topic=TOPIC, back_project=True))
 
 
 @pytest.fixture(scope="module")

@@ -35,7 +35,7 @@ def told(results: RunResults, plan=None) -> str:
 
 def test_what_is_lost_is_said(changed):
     text = told(changed(results={"invalid_maps": 2}, messages={"damaged": 3, "skipped": 4, "messages": 9}))
-    assert "2 maps could not be analysed" in text
+    assert "2 maps could not be analyzed" in text
     assert "3 messages of the log were damaged" in text
     assert "4 of 9 map messages were not taken" in text
 
@@ -61,7 +61,7 @@ def test_a_layout_that_came_late_is_said(changed, final, said, on_tile):
 def test_rooms_that_are_unsure_or_unseen_are_named(changed):
     """Also one without any wall; the right room was half seen, the left one wholly."""
     plan = two_rooms_plan()
-    bare = dataclasses.replace(plan.rooms[0], confidence=0.0, frontier_m=0.5)
+    bare = dataclasses.replace(plan.rooms[0], wall_support=0.0, frontier_m=0.5)
     text = told(changed(), dataclasses.replace(plan, rooms=(bare, plan.rooms[1])))
     assert "unsure (?): Room 3 (0%)." in text
     assert "open frontier, not explored to the end: Room 120 (3.0 m)." in text

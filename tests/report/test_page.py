@@ -82,23 +82,27 @@ def test_it_says_what_the_tables_say(office_results: Path, tmp_path: Path):
     assert parameters["floor_plan.room_min_area_m2"] == "3"
 
 
-def test_it_says_when_each_room_was_seen_where_the_run_was_smoothed(office_results: Path, tmp_path: Path):
+def test_it_says_when_each_room_was_seen_where_the_run_was_back_projected(
+    office_results: Path, tmp_path: Path
+):
     """First, and 90 % of it, in that order; without smoothing there is no such section."""
     assert "seen-table" not in Reader(write_report(office_results, tmp_path / "plain.html")).tables
-    folder = run_of(SAMPLE_LOGS / "office.mcap", tmp_path / "out", annotated_log=False, smooth=True)
+    folder = run_of(SAMPLE_LOGS / "office.mcap", tmp_path / "out", annotated_log=False, back_project=True)
     told = Reader(write_report(folder)).rows("seen-table")
-    smoothed = pd.read_parquet(folder / "smoothed.parquet")
+    back_projected = pd.read_parquet(folder / "back_projected.parquet")
     coverage = pd.read_parquet(folder / "snapshots.parquet").set_index("snapshot").coverage
-    assert {row[0] for row in told} == {f"Room {track}" for track in smoothed.track.unique()}
+    assert {row[0] for row in told} == {f"Room {track}" for track in back_projected.track.unique()}
     for row in told:
-        of_room = smoothed[smoothed.track == int(row[0].removeprefix("Room "))].sort_values("snapshot")
+        of_room = back_projected[back_projected.track == int(row[0].removeprefix("Room "))].sort_values(
+            "snapshot"
+        )
         mostly = of_room[of_room.last_area_share >= 0.9]
         assert row[2] == f"{coverage[of_room.snapshot.iloc[0]]:.0%}"
         assert row[4] == (f"{coverage[mostly.snapshot.iloc[0]]:.0%}" if len(mostly) else "–")
     first = [int(row[2].removesuffix("%")) for row in told]
     assert first == sorted(first)
     assert len(set(first)) > 2
-    (folder / "smoothed.parquet").unlink()
+    (folder / "back_projected.parquet").unlink()
     assert "seen-table" not in Reader(write_report(folder, overwrite=True)).tables
 
 
@@ -106,7 +110,7 @@ def test_lanes_tell_when_each_room_was_right(office_results: Path, tmp_path: Pat
     """A room of the last map has settled by then; one that was right later than it came formed before."""
     text = write_report(office_results, tmp_path / "report.html").read_text(encoding="utf-8")
     tracks = pq.read_table(office_results / "tracks.parquet").to_pylist()
-    signs = {row["track"]: "?" if row["outline_wall_share"] < 0.7 else "" for row in tracks}
+    signs = {row["track"]: "?" if row["wall_support"] < 0.7 else "" for row in tracks}
     for row in tracks:
         name = f"{row['track']}{signs[row['track']]}"
         if row["in_last_map"]:

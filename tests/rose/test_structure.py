@@ -95,8 +95,8 @@ def test_the_picture_of_the_spectrum_has_a_ridge_across_the_walls(turn_deg):
     """Bright along the line at right angles to the walls; the same turned by half a circle."""
     occupied = np.zeros((300, 300), np.uint8)
     turn = np.deg2rad(turn_deg)
-    centre, along = np.array([150, 150]), np.array([np.cos(turn), np.sin(turn)])
-    ends = np.rint([centre - 100 * along, centre + 100 * along]).astype(int)
+    center, along = np.array([150, 150]), np.array([np.cos(turn), np.sin(turn)])
+    ends = np.rint([center - 100 * along, center + 100 * along]).astype(int)
     cv2.line(occupied, tuple(ends[0].tolist()), tuple(ends[1].tolist()), 1)
     picture = spectrum_picture(compute_spectrum(occupied.astype(bool), 0.05, PARAMETERS), PARAMETERS)
     assert picture.shape == (PICTURE_SIDE, PICTURE_SIDE)

@@ -30,7 +30,7 @@ for await (const message of reader.readMessages({ validateCrcs: true })) {
     found.markers[ns].x += marker.points.reduce((sum, point) => sum + point.x, 0);
   }
   if (topic === "/rose2/rooms") {
-    found.rooms.push(content.rooms.map((room) => [room.track, room.area, Array.from(room.neighbours)]));
+    found.rooms.push(content.rooms.map((room) => [room.track, room.area, Array.from(room.neighbors)]));
   }
 }
 await file.close();

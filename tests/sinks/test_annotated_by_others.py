@@ -23,7 +23,7 @@ from rose2_logs.errors import OutputError
 from rose2_logs.io import open_log
 from rose2_logs.outputs.mcap.annotated import ADDED
 from rose2_logs.outputs.mcap.viewer_layouts import offered
-from rose2_logs.workflows.analyze import RunOptions, analyse_log
+from rose2_logs.workflows.analyze import RunOptions, analyze_log
 
 PROJECT = Path(__file__).parents[2]
 OFFICE, WING = PROJECT / "sample_logs" / "office.mcap", PROJECT / "sample_logs" / "wing.bag"
@@ -37,15 +37,15 @@ PACKAGES = {
 INSTALL_S = 240
 
 
-def analysed(log: Path, folder: Path, **changes) -> Path:
+def analyzed(log: Path, folder: Path, **changes) -> Path:
     """Folder with an annotated log of three maps, as a bag."""
     options = RunOptions(selection=Selection(max_snapshots=3), recording=False, bag=True, **changes)
-    return analyse_log(log, folder / log.stem, options).folder
+    return analyze_log(log, folder / log.stem, options).folder
 
 
 @pytest.fixture(scope="module", params=[OFFICE, WING], ids=lambda log: log.suffix)
 def folder(request, tmp_path_factory):
-    return analysed(request.param, tmp_path_factory.mktemp("annotated"))
+    return analyzed(request.param, tmp_path_factory.mktemp("annotated"))
 
 
 @pytest.fixture(scope="session")
@@ -73,7 +73,7 @@ def node_packages(tmp_path_factory):
 
 def test_foxgloves_packages_read_every_message_and_every_marker(tmp_path, node_packages):
     """And find in them what rosbags finds."""
-    annotated = analysed(OFFICE, tmp_path) / "office.rose2.mcap"
+    annotated = analyzed(OFFICE, tmp_path) / "office.rose2.mcap"
     done = subprocess.run(
         ["node", "read_annotated.mjs", annotated],
         cwd=node_packages,
@@ -96,7 +96,7 @@ def test_foxgloves_packages_read_every_message_and_every_marker(tmp_path, node_p
                 told["points"] += len(marker.points)
                 told["x"] += sum(point.x for point in marker.points)
             if connection.topic == "/rose2/rooms":
-                rooms.append([[room.track, room.area, room.neighbours.tolist()] for room in message.rooms])
+                rooms.append([[room.track, room.area, room.neighbors.tolist()] for room in message.rooms])
     assert found["profile"] == "ros2"
     assert found["messages"] == messages
     assert set(found["markers"]) == {"", "rooms", "outlines", "labels", "walls", "lines", "doorways"}
@@ -140,7 +140,7 @@ def test_a_log_with_messages_of_other_kinds_is_refused_as_a_bag(tmp_path):
         writer.add_message(note, 1, b"{}", 1)
         writer.finish()
     with pytest.raises(OutputError, match=r"/note holds json messages.*leave --bag out"):
-        analysed(mixed, tmp_path / "out")
+        analyzed(mixed, tmp_path / "out")
     assert not [file for file in (tmp_path / "out").rglob("*") if file.is_file()]
 
 
@@ -193,7 +193,7 @@ def test_viewers_ask_for_no_more_than_is_offered(qos, expected):
 def test_layouts_of_saved_maps_look_at_their_rooms(tmp_path):
     """Where the log is no log of messages, the map is on the topic that the annotated one has."""
     options = RunOptions(recording=False)
-    done = analyse_log(save_run(tmp_path / "run"), tmp_path / "out", options)
+    done = analyze_log(save_run(tmp_path / "run"), tmp_path / "out", options)
     (layout,) = done.folder.glob("*.foxglove.json")
     world = json.loads(layout.read_text(encoding="utf-8"))["configById"]["3D!rooms"]
     assert world["topics"]["/map"]["visible"]

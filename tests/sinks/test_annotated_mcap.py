@@ -26,7 +26,7 @@ from rose2_logs.outputs.mcap.writer import McapWriter
 from rose2_logs.runs.sink import RunInfo
 from rose2_logs.runs.stream import start_workers, tracked_snapshots
 from rose2_logs.runs.summary import RunTotals
-from rose2_logs.workflows.analyze import RunOptions, analyse_log
+from rose2_logs.workflows.analyze import RunOptions, analyze_log
 
 PROJECT = Path(__file__).parents[2]
 SHARED = PROJECT.parent / "shared" / "bags"
@@ -45,7 +45,7 @@ def annotate(log: Path, folder: Path, **changes) -> Path:
     from rose2_logs.config.selection import Selection
 
     options = RunOptions(selection=Selection(max_snapshots=3), recording=False, **changes)
-    result = analyse_log(log, folder, options)
+    result = analyze_log(log, folder, options)
     (path,) = [file for file in result.files if file.suffix == ".mcap"]
     return path
 
@@ -117,7 +117,7 @@ def test_the_added_topics_have_stamp_frame_and_latching_of_the_map(annotated):
             assert 0 <= rooms.coverage <= 1
             tracks = [room.track for room in rooms.rooms]
             assert tracks == sorted(set(tracks))
-            assert all(set(room.neighbours) <= set(tracks) for room in rooms.rooms)
+            assert all(set(room.neighbors) <= set(tracks) for room in rooms.rooms)
         for time, grid in by_topic["/rose2/segmented_map"]:
             source = maps[time]
             assert (grid.info.width, grid.info.height) == (source.info.width, source.info.height)
@@ -325,7 +325,7 @@ def test_nothing_is_kept_of_chunks_that_were_taken_apart(tmp_path):
     options = RunOptions()
     with open_log(log.path) as reader, start_workers(options) as workers:
         totals = RunTotals()
-        frame = next(tracked_snapshots(reader, reader.last(), workers, options.parameters, totals))
+        step = next(tracked_snapshots(reader, reader.last(), workers, options.parameters, totals))
         times = [snapshot.log_time_ns for snapshot in reader.snapshots()]
     info = RunInfo(log.path, "/map", "rose2", options.parameters, {}, {})
     held = []
@@ -333,12 +333,12 @@ def test_nothing_is_kept_of_chunks_that_were_taken_apart(tmp_path):
     try:
         with AnnotatedMcap(tmp_path / "out.mcap", info) as sink:
             for time in times:
-                snapshot = dataclasses.replace(frame.snapshot, log_time_ns=time)
-                sink.write(dataclasses.replace(frame, snapshot=snapshot))
+                snapshot = dataclasses.replace(step.snapshot, log_time_ns=time)
+                sink.write(dataclasses.replace(step, snapshot=snapshot))
                 held.append(tracemalloc.get_traced_memory()[0])
     finally:
         tracemalloc.stop()
-    assert held[-1] - held[1] < frame.snapshot.cells.nbytes
+    assert held[-1] - held[1] < step.snapshot.cells.nbytes
 
 
 def test_a_log_without_an_index_is_copied_message_by_message(tmp_path):

@@ -1,4 +1,4 @@
-"""Comparison pictures: colours of partners, marked errors, readable size, text that fits."""
+"""Comparison pictures: colors of partners, marked errors, readable size, text that fits."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from rose2_logs.drawing.case_picture import (
-    MARK_COLOURS,
+    MARK_COLORS,
     SIDE_MIN_PX,
     draw_comparison,
     draw_panels,
-    room_colours,
+    room_colors,
     text_line,
 )
 from rose2_logs.evaluation.case_errors import Mark, compare
@@ -33,29 +33,29 @@ def drawn():
 
 
 def at(panel, row: int, column: int) -> tuple[int, ...]:
-    """Colour of a cell of the drawing in a panel, which is cropped to rows 2..37 and columns 4..57."""
+    """Color of a cell of the drawing in a panel, which is cropped to rows 2..37 and columns 4..57."""
     scale = panel.shape[1] // 54
     assert panel.shape == (36 * scale, 54 * scale, 3)
     y, x = int((row - 2 + 0.5) * scale), int((column - 4 + 0.5) * scale)
     return tuple(panel[y, x].tolist())
 
 
-def test_partners_share_their_colour_and_errors_are_marked(drawn):
-    """Found 3 has the colour of true room 1 also where it took cells of room 2, which are marked merged."""
+def test_partners_share_their_color_and_errors_are_marked(drawn):
+    """Found 3 has the color of true room 1 also where it took cells of room 2, which are marked merged."""
     cells, truth, found = drawn
     plain, true_panel, found_panel, errors = draw_panels(cells, compare(truth, found), numbered=False)
-    colours = [tuple(colour) for colour in room_colours(2).tolist()]
-    assert at(true_panel, 12, 14) == at(found_panel, 12, 14) == at(found_panel, 12, 40) == colours[1]
-    assert at(true_panel, 25, 40) == at(found_panel, 25, 40) == colours[2]
-    assert at(errors, 12, 14) == MARK_COLOURS[Mark.RIGHT]
-    assert at(errors, 12, 40) == MARK_COLOURS[Mark.MERGED]
-    assert at(errors, 25, 48) == MARK_COLOURS[Mark.MISSED]
+    colors = [tuple(color) for color in room_colors(2).tolist()]
+    assert at(true_panel, 12, 14) == at(found_panel, 12, 14) == at(found_panel, 12, 40) == colors[1]
+    assert at(true_panel, 25, 40) == at(found_panel, 25, 40) == colors[2]
+    assert at(errors, 12, 14) == MARK_COLORS[Mark.RIGHT]
+    assert at(errors, 12, 40) == MARK_COLORS[Mark.MERGED]
+    assert at(errors, 25, 48) == MARK_COLORS[Mark.MISSED]
     assert at(errors, 9, 20) == at(plain, 9, 20) == at(true_panel, 9, 20) == (0, 0, 0)
     assert at(plain, 4, 5) == at(errors, 4, 5) == (205, 205, 205)
 
 
-def test_a_found_room_without_partner_has_a_colour_of_its_own_and_stripes(drawn):
-    """Neither of the true rooms' colours, and white stripes on it."""
+def test_a_found_room_without_partner_has_a_color_of_its_own_and_stripes(drawn):
+    """Neither of the true rooms' colors, and white stripes on it."""
     cells, truth, found = drawn
     found[18:30, 40:50] = 5
     found[18:30, 32:40] = 4
@@ -63,11 +63,11 @@ def test_a_found_room_without_partner_has_a_colour_of_its_own_and_stripes(drawn)
     _, _, found_panel, errors = draw_panels(cells, compare(truth, found), numbered=False)
     scale = found_panel.shape[1] // 54
     alone = found_panel[(20 - 2) * scale : (28 - 2) * scale, (42 - 4) * scale : (48 - 4) * scale]
-    kinds = {tuple(colour) for colour in alone.reshape(-1, 3).tolist()}
+    kinds = {tuple(color) for color in alone.reshape(-1, 3).tolist()}
     assert len(kinds) == 2
     assert (255, 255, 255) in kinds
-    assert not kinds & {tuple(colour) for colour in room_colours(2).tolist()}
-    assert at(errors, 24, 45) == MARK_COLOURS[Mark.SPLIT]
+    assert not kinds & {tuple(color) for color in room_colors(2).tolist()}
+    assert at(errors, 24, 45) == MARK_COLORS[Mark.SPLIT]
 
 
 def test_small_maps_are_scaled_up_and_numbers_written(drawn):
@@ -81,14 +81,14 @@ def test_small_maps_are_scaled_up_and_numbers_written(drawn):
 
 
 def test_the_whole_picture_holds_title_panels_and_legend(drawn):
-    """Larger than its four panels; the legend shows each mark's colour."""
+    """Larger than its four panels; the legend shows each mark's color."""
     cells, truth, found = drawn
     comparison = compare(truth, found)
     picture = draw_comparison(cells, comparison, score(truth, found), "group/name")
     panel = draw_panels(cells, comparison)[0]
     assert picture.shape[0] * picture.shape[1] > 4 * panel.shape[0] * panel.shape[1]
-    legend = {tuple(colour) for colour in picture[-60:].reshape(-1, 3).tolist()}
-    assert set(MARK_COLOURS.values()) <= legend
+    legend = {tuple(color) for color in picture[-60:].reshape(-1, 3).tolist()}
+    assert set(MARK_COLORS.values()) <= legend
 
 
 def test_a_map_without_any_room_or_known_cell_is_drawn():

@@ -38,7 +38,7 @@ def test_lines_lie_where_a_shape_is_unknown_and_fill_it_evenly(yaw_rad):
     assert set(room) == {0}
     lines = shapely.linestrings(lines_m.reshape(-1, 2, 2))
     assert shapely.within(lines, hidden.buffer(RESOLUTION_M)).all()
-    # Lines on diagonals, so far apart along a row: so many metres to a square metre.
+    # Lines on diagonals, so far apart along a row: so many meters to a square meter.
     length_m = shapely.length(lines).sum()
     assert length_m == pytest.approx(hidden.area * math.sqrt(2) / HATCH_STEP_M, rel=0.2)
 

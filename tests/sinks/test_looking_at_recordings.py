@@ -15,12 +15,12 @@ from itertools import cycle, pairwise
 from pathlib import Path
 
 import numpy as np
-from looking import CHROMIUM, coloured_share, free_port, needs_chromium, needs_vulkan, small
+from looking import CHROMIUM, colored_share, free_port, needs_chromium, needs_vulkan, small
 from numpy.typing import NDArray
 from PIL import Image
 
 from rose2_logs.config.selection import Selection
-from rose2_logs.workflows.analyze import RunOptions, analyse_log
+from rose2_logs.workflows.analyze import RunOptions, analyze_log
 
 PROJECT = Path(__file__).parents[2]
 GOLDEN = Path(__file__).with_name("golden")
@@ -51,9 +51,9 @@ FROM_OUTSIDE = ("Failed to load resource", "Failed to fetch")
 
 
 def record(folder: Path) -> Path:
-    options = RunOptions(selection=Selection(max_snapshots=8), annotated_log=False, smooth=True)
+    options = RunOptions(selection=Selection(max_snapshots=8), annotated_log=False, back_project=True)
     log = PROJECT / "sample_logs" / "office.mcap"
-    return analyse_log(log, folder, options).folder / "office.rrd"
+    return analyze_log(log, folder, options).folder / "office.rrd"
 
 
 def shots(folder: Path) -> dict[str, Path]:
@@ -84,10 +84,10 @@ def test_the_viewer_shows_the_rooms_as_it_did_and_finds_no_fault_in_any_view(tmp
         assert now.shape == kept(at).shape
         assert np.abs(now - kept(at)).mean() < MOST_DIFFERENCE, name
     # The map fills its view.
-    assert coloured_share(pictures["rooms_100"], (slice(None), slice(None))) > 0.35
+    assert colored_share(pictures["rooms_100"], (slice(None), slice(None))) > 0.35
     # Curves and lanes go over the whole run along the log's time, too; the curves are no stroke at the rim.
-    assert coloured_share(pictures["over time"], END_OF_CURVES) > CURVES_SHARE
-    assert coloured_share(pictures["over time"], LANES) > LANES_SHARE
+    assert colored_share(pictures["over time"], END_OF_CURVES) > CURVES_SHARE
+    assert colored_share(pictures["over time"], LANES) > LANES_SHARE
     for name in TABS:
         assert np.asarray(Image.open(pictures[name]).convert("L")).std() > 5, name
 
@@ -131,7 +131,7 @@ def test_the_web_viewer_draws_the_recording_without_an_error(tmp_path):
             picture = tmp_path / "page.png"
             while True:
                 page.screenshot(path=picture)
-                if coloured_share(picture, view_of_rooms) > 0.3:
+                if colored_share(picture, view_of_rooms) > 0.3:
                     break
                 assert time.monotonic() < end, "the rooms were not drawn"
                 time.sleep(1)

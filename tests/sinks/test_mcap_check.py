@@ -14,7 +14,7 @@ from saved_maps import save_run
 from rose2_logs.errors import OutputError
 from rose2_logs.outputs.mcap import annotated as annotated_mcap
 from rose2_logs.outputs.mcap.check import Tallies, Tally, checked_copy
-from rose2_logs.workflows.analyze import RunOptions, analyse_log
+from rose2_logs.workflows.analyze import RunOptions, analyze_log
 
 OFFICE = Path(__file__).parents[2] / "sample_logs" / "office.mcap"
 TOPICS = ("/a", "/b", "/silent")
@@ -110,7 +110,7 @@ def test_the_summary_tells_what_was_copied(tmp_path: Path):
     from rose2_logs.config.selection import Selection
 
     options = RunOptions(recording=False, selection=Selection(max_snapshots=2))
-    analyse_log(OFFICE, tmp_path / "out", options)
+    analyze_log(OFFICE, tmp_path / "out", options)
     told = json.loads((tmp_path / "out" / "summary.json").read_text())["annotated_log"]
     with OFFICE.open("rb") as file:
         summary = make_reader(file).get_summary()
@@ -138,6 +138,6 @@ def test_a_message_that_is_lost_on_the_way_is_an_error_and_no_file_appears(tmp_p
     monkeypatch.setattr(annotated_mcap.McapWriter, "add_message", add_message)
     maps = save_run(tmp_path / "maps")
     with pytest.raises(OutputError, match=r"maps\.rose2\.mcap: /map has 2 messages .*3 .*went in"):
-        analyse_log(maps, tmp_path / "out", RunOptions(recording=False))
+        analyze_log(maps, tmp_path / "out", RunOptions(recording=False))
     assert len(dropped) == 1
     assert not (tmp_path / "out").exists()

@@ -17,20 +17,20 @@ from saved_maps import save_run
 
 from rose2_logs.errors import LogError, OutputError
 from rose2_logs.outputs.rerun.catalog import find_recordings, serve_recordings
-from rose2_logs.workflows.analyze import RunOptions, analyse_log
+from rose2_logs.workflows.analyze import RunOptions, analyze_log
 
 BIN = Path(sys.executable).parent
 
 
 @pytest.fixture(scope="module")
 def results(tmp_path_factory) -> Path:
-    """Two runs below a folder, as a batch writes them; one is smoothed."""
+    """Two runs below a folder, as a batch writes them; one is back_projected."""
     folder = tmp_path_factory.mktemp("runs")
     for name, seen in (("first", (115, 240)), ("second", (150, 240))):
         save_run(folder / "logs" / name, seen)
         results = folder / "results" / "logs" / name
-        options = RunOptions(annotated_log=False, smooth=name == "first")
-        analyse_log(folder / "logs" / name, results, options)
+        options = RunOptions(annotated_log=False, back_project=name == "first")
+        analyze_log(folder / "logs" / name, results, options)
     return folder / "results"
 
 

@@ -116,8 +116,8 @@ def test_stamps_that_go_back_make_everything_be_logged_until_they_have_caught_up
     assert [shown(found["/picture"], "ros2_timestamp", at) for at in (4, 5, 9)] == [1, 1, 1]
 
 
-def test_lines_of_their_own_colours_and_none_at_all():
-    """Rows of several strips, of one, of none: each strip keeps its corners and its colour."""
+def test_lines_of_their_own_colors_and_none_at_all():
+    """Rows of several strips, of one, of none: each strip keeps its corners and its color."""
     strips = [[3, 2], [], [2]]
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "run.rrd"
@@ -126,10 +126,10 @@ def test_lines_of_their_own_colours_and_none_at_all():
         layers = Layers(recording)
         for index, lengths in enumerate(strips):
             points = np.arange(3 * sum(lengths), dtype=np.float32).reshape(-1, 3)
-            colours = np.full((len(lengths), 3), index, np.uint8)
+            colors = np.full((len(lengths), 3), index, np.uint8)
             layers.begin(index, index, index, index)
-            layers.show("/line", Strips(points, np.array(lengths, np.int32), colours))
-            layers.show("/none", Strips(points[:0], np.zeros(0, np.int32), colours[:0]))
+            layers.show("/line", Strips(points, np.array(lengths, np.int32), colors))
+            layers.show("/none", Strips(points[:0], np.zeros(0, np.int32), colors[:0]))
         layers.flush()
         recording.flush(timeout_sec=10)
         recording.disconnect()

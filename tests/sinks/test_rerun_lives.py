@@ -6,20 +6,20 @@ import rerun as rr
 
 from rose2_logs.outputs.rerun.lanes import FORMING, LOST, SETTLED, SHAPED, Lives
 from rose2_logs.outputs.rerun.layers import Instant
-from rose2_logs.tracking.convergence import Hindsight
-from rose2_logs.tracking.track_history import Moment
+from rose2_logs.tracking.convergence import Convergence
+from rose2_logs.tracking.track_history import SnapshotRef
 
 
-def lanes(tmp_path, tracks_of_maps, hindsight) -> dict[str, list[tuple[int, str]]]:
+def lanes(tmp_path, tracks_of_maps, convergence) -> dict[str, list[tuple[int, str]]]:
     """Snapshot and state of each change, by lane, as they stand in the recording."""
     from rerun.chunk import RrdReader
 
     recording = rr.RecordingStream("test")
     recording.set_sinks(rr.FileSink(str(tmp_path / "run.rrd")))
-    lives = Lives(recording)
+    histories = Lives(recording)
     for index, tracks in enumerate(tracks_of_maps):
-        lives.add(Instant(index, index, 10 + index, 100 * index), tracks)
-    lives.log(hindsight)
+        histories.add(Instant(index, index, 10 + index, 100 * index), tracks)
+    histories.log(convergence)
     recording.flush(timeout_sec=10)
     recording.disconnect()
     found = {}
@@ -33,17 +33,18 @@ def lanes(tmp_path, tracks_of_maps, hindsight) -> dict[str, list[tuple[int, str]
     return found
 
 
-def moment(snapshot: int) -> Moment:
-    return Moment(snapshot, 0.0, 0.0)
+def snapshot_ref(snapshot: int) -> SnapshotRef:
+    return SnapshotRef(snapshot, 0.0, 0.0)
 
 
 def test_states_follow_one_another_and_a_lost_room_leaves_a_gap(tmp_path):
     """Room 1 is there throughout; 2 is lost for a map and comes back when it is settled; 3 comes and goes."""
     maps = [(1,), (1, 2), (1, 2, 3), (1,), (1, 2), (1, 2)]
-    hindsight = Hindsight(
-        area_settled={1: moment(14), 2: moment(14), 3: moment(12)}, shape_right={1: moment(12)}
+    convergence = Convergence(
+        area_settled={1: snapshot_ref(14), 2: snapshot_ref(14), 3: snapshot_ref(12)},
+        shape_right={1: snapshot_ref(12)},
     )
-    found = lanes(tmp_path, maps, hindsight)
+    found = lanes(tmp_path, maps, convergence)
     assert found["/room/001"] == [(10, FORMING), (12, SHAPED), (14, SETTLED)]
     assert found["/room/002"] == [(11, FORMING), (13, LOST), (14, SETTLED)]
     assert found["/room/003"] == [(12, SETTLED), (13, LOST)]

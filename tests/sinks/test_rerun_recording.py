@@ -19,7 +19,7 @@ from rose2_logs.errors import OutputError
 from rose2_logs.outputs.rerun.world import room_label
 from rose2_logs.tracking.registration import RigidMotion
 from rose2_logs.tracking.tracked_snapshot import MAP_TRACK, RoomEvent
-from rose2_logs.workflows.analyze import RunOptions, analyse_log
+from rose2_logs.workflows.analyze import RunOptions, analyze_log
 
 PROJECT = Path(__file__).parents[2]
 BIN = Path(sys.executable).parent
@@ -28,7 +28,7 @@ BIN = Path(sys.executable).parent
 @pytest.fixture(scope="module")
 def result(tmp_path_factory):
     options = RunOptions(selection=Selection(max_snapshots=8), annotated_log=False)
-    return analyse_log(PROJECT / "sample_logs" / "office.mcap", tmp_path_factory.mktemp("out"), options)
+    return analyze_log(PROJECT / "sample_logs" / "office.mcap", tmp_path_factory.mktemp("out"), options)
 
 
 @pytest.fixture(scope="module")
@@ -84,7 +84,7 @@ def test_layers_that_were_not_asked_for_are_not_written(tmp_path):
 
     layers = ("path", "lines")
     options = RunOptions(selection=Selection(max_snapshots=2), annotated_log=False, layers=layers)
-    done = analyse_log(PROJECT / "sample_logs" / "office.mcap", tmp_path, options)
+    done = analyze_log(PROJECT / "sample_logs" / "office.mcap", tmp_path, options)
     logged = {
         str(chunk.entity_path)
         for chunk in RrdReader(str(done.folder / "office.rrd")).stream()
@@ -118,7 +118,7 @@ def test_a_run_is_shown_in_the_viewer_that_is_open_and_stored_too(tmp_path, monk
     with ViewerClient.spawn(headless=True, port=port, detach_process=False) as viewer:
         options = RunOptions(selection=Selection(max_snapshots=3), annotated_log=False, live=True)
         log = PROJECT / "sample_logs" / "office.mcap"
-        done = analyse_log(log, tmp_path / "out", options)
+        done = analyze_log(log, tmp_path / "out", options)
         end = time.monotonic() + 60
         while not viewer.get_state().views and time.monotonic() < end:
             time.sleep(0.5)
@@ -138,14 +138,14 @@ def test_a_viewer_that_is_closed_along_the_way_does_not_stop_the_run(tmp_path, m
     with ExitStack() as stack:
         stack.enter_context(ViewerClient.spawn(headless=True, port=port, detach_process=False))
 
-        def close_after_two(frame, share):
-            seen.append(frame.snapshot.index)
+        def close_after_two(step, share):
+            seen.append(step.snapshot.index)
             if len(seen) == 2:
                 stack.close()
 
         options = RunOptions(selection=Selection(max_snapshots=4), annotated_log=False, live=True)
         log = PROJECT / "sample_logs" / "office.mcap"
-        done = analyse_log(log, tmp_path / "out", options, close_after_two)
+        done = analyze_log(log, tmp_path / "out", options, close_after_two)
     assert seen == [0, 1, 2, 3]
     assert set(values(done.folder / "office.rrd", "/run/coverage")) == set(seen)
 
@@ -158,7 +158,7 @@ def test_live_without_a_viewer_or_a_screen_says_what_to_do(tmp_path, monkeypatch
     monkeypatch.setattr("rose2_logs.outputs.rerun.viewer.VIEWER_PORT", free_port())
     options = RunOptions(selection=Selection(max_snapshots=1), annotated_log=False, live=True)
     with pytest.raises(OutputError, match="no Rerun viewer is open"):
-        analyse_log(PROJECT / "sample_logs" / "office.mcap", tmp_path / "out", options)
+        analyze_log(PROJECT / "sample_logs" / "office.mcap", tmp_path / "out", options)
     assert not list((tmp_path / "out").glob("*.rrd"))
 
 

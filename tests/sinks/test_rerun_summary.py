@@ -10,52 +10,57 @@ import shapely
 from rose2_logs.config.parameters import Parameters
 from rose2_logs.outputs.rerun.summary import summary_text
 from rose2_logs.runs.sink import RunInfo
-from rose2_logs.tracking.convergence import Hindsight
+from rose2_logs.tracking.convergence import Convergence
 from rose2_logs.tracking.registration import RigidMotion
-from rose2_logs.tracking.track_history import Moment, RoomLife, RoomLives
+from rose2_logs.tracking.track_history import SnapshotRef, TrackHistories, TrackHistory
 
 
 def test_the_summary_tells_rooms_and_since_when_they_were_right():
-    first, last = Moment(0, 0.0, 0.25), Moment(9, 90.0, 1.0)
-    lives = RoomLives()
-    lives.lives = {
-        1: RoomLife(first, last, area_m2=20.04, polygon=shapely.box(0, 0, 5, 5), outline_wall_share=0.9),
-        2: RoomLife(first, first),
+    first, last = SnapshotRef(0, 0.0, 0.25), SnapshotRef(9, 90.0, 1.0)
+    histories = TrackHistories()
+    histories.tracks = {
+        1: TrackHistory(first, last, area_m2=20.04, polygon=shapely.box(0, 0, 5, 5), wall_support=0.9),
+        2: TrackHistory(first, first),
     }
-    lives.in_last_map, lives.last = (1,), last
-    hindsight = Hindsight(
-        area_settled={1: last}, shape_right={1: Moment(3, 30.0, 0.5)}, layout_final=Moment(7, 75.0, 0.8)
+    histories.in_last_map, histories.last = (1,), last
+    convergence = Convergence(
+        area_settled={1: last},
+        shape_right={1: SnapshotRef(3, 30.0, 0.5)},
+        layout_final=SnapshotRef(7, 75.0, 0.8),
     )
     info = RunInfo(Path("a|b.mcap"), "/map", "rose2", Parameters(), {"tool": "1"}, {})
-    text = summary_text(info, lives, hindsight, 10)
+    text = summary_text(info, histories, convergence, 10)
     assert text.startswith("# a/b.mcap\n")
     assert "**1 room** at the end, 2 over the run; 10 maps, 1 min 30 s." in text
     assert "**from 80 % coverage on** (1 min 15 s)" in text
     assert "| 1 | 20.0 | 25 % | 50 % | 100 % | 90 % |" in text
     assert "| version of tool | 1 |" in text
-    assert "as in the end" not in summary_text(info, lives, None, 10)
-    late = dataclasses.replace(hindsight, layout_final=last)
-    for never in (late, dataclasses.replace(hindsight, layout_final=None)):
-        assert "still changed up to the last map" in summary_text(info, lives, never, 10)
-    assert "**from 100 % coverage on**" in summary_text(info, lives, late, 1)
+    assert "as in the end" not in summary_text(info, histories, None, 10)
+    late = dataclasses.replace(convergence, layout_final=last)
+    for never in (late, dataclasses.replace(convergence, layout_final=None)):
+        assert "still changed up to the last map" in summary_text(info, histories, never, 10)
+    assert "**from 100 % coverage on**" in summary_text(info, histories, late, 1)
 
 
 def test_the_summary_names_unsure_rooms_and_the_largest_shift():
     """The least sure first, six at most by number; nothing of it where there is none."""
-    first, last = Moment(0, 0.0, 0.25), Moment(9, 90.0, 1.0)
-    lives = RoomLives()
-    lives.lives = {
-        track: RoomLife(first, last, outline_wall_share=share)
+    first, last = SnapshotRef(0, 0.0, 0.25), SnapshotRef(9, 90.0, 1.0)
+    histories = TrackHistories()
+    histories.tracks = {
+        track: TrackHistory(first, last, wall_support=share)
         for track, share in enumerate((0.9, 0.5, 0.31, 0.69, 0.7, 0.6, 0.6, 0.6, 0.6, None), start=1)
     }
-    lives.in_last_map, lives.last = tuple(lives.lives), last
+    histories.in_last_map, histories.last = tuple(histories.tracks), last
     info = RunInfo(Path("a.mcap"), "/map", "rose2", Parameters(), {}, {})
-    text = summary_text(info, lives, None, 1)
+    text = summary_text(info, histories, None, 1)
     assert "room 3? (31 %), 2? (50 %), 6? (60 %), 7? (60 %), 8? (60 %), 9? (60 %) and 1 more." in text
     assert "1 map, 1 min" in text
     assert "shifted" not in text
-    lives.shifts, lives.largest_shift = 2, (Moment(4, 40.0, 0.4), RigidMotion((0.0, 0.0), (0.3, -0.4), 0.02))
-    text = summary_text(info, lives, None, 10)
+    histories.shifts, histories.largest_shift = (
+        2,
+        (SnapshotRef(4, 40.0, 0.4), RigidMotion((0.0, 0.0), (0.3, -0.4), 0.02)),
+    )
+    text = summary_text(info, histories, None, 10)
     assert "shifted** 2 times, most by 0.50 m and +1.1° at 40 % coverage" in text
-    lives.in_last_map = (1,)
-    assert "Unsure" not in summary_text(info, lives, None, 10)
+    histories.in_last_map = (1,)
+    assert "Unsure" not in summary_text(info, histories, None, 10)

@@ -21,7 +21,7 @@ from rose2_logs.outputs.mcap.ros_messages import (
     ring_segments,
     ros2_typestore,
 )
-from rose2_logs.segmentation.pipeline import METHODS, analyse
+from rose2_logs.segmentation.pipeline import METHODS, analyze
 from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot
 from rose2_logs.tracking.tracker import RoomTracker
 
@@ -41,28 +41,28 @@ def frame(request) -> TrackedSnapshot:
     cells, _ = office(turn_rad=0.2, clutter=8)
     cells[:, 170:] = -1
     taken = snapshot(cells, origin_xy_m=(-3.25, 7.5), yaw_rad=0.7)
-    analysis = analyse(taken, Parameters(), request.param)
+    analysis = analyze(taken, Parameters(), request.param)
     ids, events = RoomTracker(TrackingParameters()).update(taken, analysis)
     assert len(ids) >= 2
     return TrackedSnapshot(taken, analysis, 0.5, ids, events)
 
 
 @pytest.mark.parametrize("name", KINDS)
-def test_each_message_is_what_another_serializer_writes(frame: TrackedSnapshot, name: str):
+def test_each_message_is_what_another_serializer_writes(step: TrackedSnapshot, name: str):
     """Read by rosbags and written again, every byte comes back: fields, alignment, lengths."""
     store = ros2_typestore()
-    written = getattr(MessageMaker(), name)(frame)
+    written = getattr(MessageMaker(), name)(step)
     if written is None:
-        assert (name, frame.analysis.structure) == ("clean_map", None)
+        assert (name, step.analysis.structure) == ("clean_map", None)
         return
     message = store.deserialize_cdr(written, KINDS[name])
     assert bytes(store.serialize_cdr(message, KINDS[name])) == written
 
 
-def test_the_fields_stand_where_they_belong(frame: TrackedSnapshot):
-    store, maker, rooms = ros2_typestore(), MessageMaker(), frame.analysis.rooms
-    grid = store.deserialize_cdr(maker.segmented_map(frame), GRID)
-    geometry = frame.analysis.geometry
+def test_the_fields_stand_where_they_belong(step: TrackedSnapshot):
+    store, maker, rooms = ros2_typestore(), MessageMaker(), step.analysis.rooms
+    grid = store.deserialize_cdr(maker.segmented_map(step), GRID)
+    geometry = step.analysis.geometry
     assert (grid.info.height, grid.info.width) == geometry.shape
     assert grid.info.resolution == pytest.approx(geometry.resolution_m)
     assert (grid.info.origin.position.x, grid.info.origin.position.y) == geometry.origin_xy_m
@@ -70,26 +70,26 @@ def test_the_fields_stand_where_they_belong(frame: TrackedSnapshot):
         0.7
     )
     cells = np.asarray(grid.data).reshape(geometry.shape)
-    for number, track in enumerate(frame.track_ids, start=1):
+    for number, track in enumerate(step.track_ids, start=1):
         assert (cells[rooms.labels == number] == track).all()
     outside = rooms.labels == 0
-    np.testing.assert_array_equal(cells[outside], frame.snapshot.cells[outside])
+    np.testing.assert_array_equal(cells[outside], step.snapshot.cells[outside])
 
-    told = store.deserialize_cdr(maker.rooms(frame), ROOMS_TYPE)
+    told = store.deserialize_cdr(maker.rooms(step), ROOMS_TYPE)
     assert told.coverage == 0.5
     assert (told.header.stamp.nanosec, told.header.frame_id) == (2, "map")
     for room in told.rooms:
-        number = frame.track_ids.index(room.track)
+        number = step.track_ids.index(room.track)
         assert room.area == rooms.areas_m2[number]
         shape = rooms.polygons[number]
         assert shape.contains(shapely.Point(room.label_point.x, room.label_point.y))
         corners = [(point.x, point.y) for point in room.outline[0].points]
         assert shapely.Polygon(corners).area == pytest.approx(shapely.Polygon(shape.exterior).area, rel=1e-3)
 
-    markers = store.deserialize_cdr(maker.markers(frame), KINDS["markers"]).markers
+    markers = store.deserialize_cdr(maker.markers(step), KINDS["markers"]).markers
     by_name = {(marker.ns, marker.id): marker for marker in markers}
     assert markers[0].action == 3
-    for track, shape in zip(frame.track_ids, rooms.polygons, strict=True):
+    for track, shape in zip(step.track_ids, rooms.polygons, strict=True):
         fill, line = by_name["rooms", track], by_name["outlines", track]
         corners = np.array([(point.x, point.y) for point in fill.points]).reshape(-1, 3, 2)
         assert shapely.area(shapely.polygons(corners)).sum() == pytest.approx(shape.area)
@@ -98,10 +98,10 @@ def test_the_fields_stand_where_they_belong(frame: TrackedSnapshot):
         assert by_name["labels", track].text.startswith(f"{track}\n")
 
 
-def test_a_shape_that_stays_gives_the_same_triangles_again(frame: TrackedSnapshot):
+def test_a_shape_that_stays_gives_the_same_triangles_again(step: TrackedSnapshot):
     """Those of the map before are used again, and nothing of the message differs."""
     maker = MessageMaker()
-    assert maker.markers(frame) == maker.markers(frame) == MessageMaker().markers(frame)
+    assert maker.markers(step) == maker.markers(step) == MessageMaker().markers(step)
 
 
 def test_rings_of_shapes_with_parts_and_holes():
@@ -145,11 +145,11 @@ def test_triangles_fill_four_corners_of_any_kind():
             assert found.symmetric_difference(shape).area == pytest.approx(0.0, abs=1e-9)
 
 
-def test_probabilities_between_rooms_do_not_look_like_rooms(frame: TrackedSnapshot):
+def test_probabilities_between_rooms_do_not_look_like_rooms(step: TrackedSnapshot):
     """Beside rooms the segmented map knows free, occupied and what is neither."""
-    outside = np.argwhere(frame.analysis.rooms.labels == 0)[:3]
-    cells = frame.snapshot.cells.copy()
+    outside = np.argwhere(step.analysis.rooms.labels == 0)[:3]
+    cells = step.snapshot.cells.copy()
     cells[tuple(outside.T)] = 5, 40, 90
-    changed = dataclasses.replace(frame, snapshot=dataclasses.replace(frame.snapshot, cells=cells))
+    changed = dataclasses.replace(step, snapshot=dataclasses.replace(step.snapshot, cells=cells))
     grid = ros2_typestore().deserialize_cdr(MessageMaker().segmented_map(changed), GRID)
     assert np.asarray(grid.data).reshape(cells.shape)[tuple(outside.T)].tolist() == [0, -1, 100]

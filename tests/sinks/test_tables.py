@@ -38,8 +38,8 @@ def frames() -> list[TrackedSnapshot]:
 
 def write(folder: Path) -> dict[str, list[dict]]:
     with Tables(folder) as sink:
-        for frame in frames():
-            sink.write(frame)
+        for step in frames():
+            sink.write(step)
     return {name: pq.read_table(folder / f"{name}.parquet").to_pylist() for name in NAMES}
 
 
@@ -54,7 +54,7 @@ def test_snapshots_have_one_row_a_map(tmp_path: Path):
 
 
 def test_rooms_are_told_by_track_with_their_shape_in_the_world(tmp_path: Path):
-    """Rows are ordered by track; polygon, label point and neighbours belong to the track, not the label."""
+    """Rows are ordered by track; polygon, label point and neighbors belong to the track, not the label."""
     table = write(tmp_path)["rooms"]
     assert [(row["snapshot"], row["track"], row["room"]) for row in table] == [
         (0, 1, 1),
@@ -67,7 +67,7 @@ def test_rooms_are_told_by_track_with_their_shape_in_the_world(tmp_path: Path):
     polygon = shapely.from_wkb(last["polygon_wkb"])
     assert polygon.equals(shapely.box(2, 0, 4, 2))
     assert polygon.contains(shapely.Point(last["label_x_m"], last["label_y_m"]))
-    assert last["neighbours"] == [1]
+    assert last["neighbors"] == [1]
     assert last["area_m2"] == last["predicted_area_m2"] == 4.0
 
 
@@ -102,7 +102,7 @@ def test_tracks_have_one_row_a_room_over_the_run(tmp_path: Path):
     assert (two["area_settled_snapshot"], two["shape_right_coverage"]) == (0, 1.0)
     assert shapely.from_wkb(two["polygon_wkb"]).equals(shapely.box(2, 0, 4, 2))
     # These frames carry no evidence: not measured is not zero.
-    assert one["outline_wall_share"] is None
+    assert one["wall_support"] is None
 
 
 def test_snapshots_are_compared_with_the_last_one(tmp_path: Path):
@@ -115,10 +115,10 @@ def test_snapshots_are_compared_with_the_last_one(tmp_path: Path):
 
 def test_a_shift_of_the_map_is_an_event_of_no_track(tmp_path: Path):
     """How far it moved and turned; other events have no motion."""
-    frame = frames()[0]
+    step = frames()[0]
     shift = RoomEvent("shifted", 0, MAP_TRACK, motion=RigidMotion((9.0, 9.0), (0.5, -0.25), 0.01))
     with Tables(tmp_path) as sink:
-        sink.write(dataclasses.replace(frame, events=(shift, *frame.events)))
+        sink.write(dataclasses.replace(step, events=(shift, *step.events)))
     first, *others = pq.read_table(tmp_path / "events.parquet").to_pylist()
     assert (first["kind"], first["track"]) == ("shifted", 0)
     assert (first["shift_x_m"], first["shift_y_m"], first["turn_rad"]) == (0.5, -0.25, 0.01)

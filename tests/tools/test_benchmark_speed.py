@@ -102,7 +102,7 @@ def test_everything_is_measured_and_reported(log: Path, tmp_path: Path):
     assert (tmp_path / "out" / "speed.png").stat().st_size > 0
 
 
-def test_a_log_is_analysed_as_a_user_does(log: Path, tmp_path: Path):
+def test_a_log_is_analyzed_as_a_user_does(log: Path, tmp_path: Path):
     """Two worker processes beside the main one; what went wrong is told."""
     from benchmarking.scaling import time_log
 

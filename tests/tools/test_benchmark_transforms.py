@@ -42,7 +42,7 @@ def test_labels_go_where_their_cells_go(drawn, name: str):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_areas_of_rooms_stay(drawn, name: str):
-    """In square metres: exactly, or within what a turn by nearest cells and the removed cells cost."""
+    """In square meters: exactly, or within what a turn by nearest cells and the removed cells cost."""
     snapshot, labels = drawn
     changed, expected = transforms()[name](snapshot, labels)
     areas = np.bincount(expected.ravel(), minlength=3)[1:] * changed.geometry.cell_area_m2

@@ -115,4 +115,4 @@ def test_real_logs_give_twenty_to_sixty_growing_maps(tmp_path, name):
     assert 20 <= len(grids) <= 60
     free = [int((grid.data == 0).sum()) for grid in grids]
     assert free[-1] > 3 * free[0]
-    assert 0.0025 * free[-1] > 250  # square metres of floor: no building is smaller than that
+    assert 0.0025 * free[-1] > 250  # square meters of floor: no building is smaller than that

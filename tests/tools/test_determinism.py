@@ -19,10 +19,10 @@ from rose2_logs.runs.tables import TABLES
 PROGRAM = """
 import sys
 from pathlib import Path
-from rose2_logs.workflows.analyze import RunOptions, analyse_log
+from rose2_logs.workflows.analyze import RunOptions, analyze_log
 if __name__ == "__main__":
     log, folder, workers = sys.argv[1:]
-    analyse_log(Path(log), Path(folder), RunOptions(recording=False, workers=int(workers)))
+    analyze_log(Path(log), Path(folder), RunOptions(recording=False, workers=int(workers)))
 """
 LABELS = "/rose2/segmented_map"
 

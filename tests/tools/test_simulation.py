@@ -97,7 +97,7 @@ def test_growing_canvas_keeps_what_it_holds_at_its_place_in_the_world():
     after, new = mapper.trinary(), mapper.geometry()
     assert new.origin_xy_m < old.origin_xy_m
     rows, columns = np.nonzero(before == 100)
-    moved = new.world_to_cell(old.cell_centres(rows, columns))
+    moved = new.world_to_cell(old.cell_centers(rows, columns))
     assert (after[moved[:, 0], moved[:, 1]] == 100).all()
 
 
@@ -152,13 +152,13 @@ def test_truth_labels_free_cells_of_rooms_only_and_no_tiny_room(flat, flat_run):
     assert (step.cells[labels > 0] == 0).all()
     assert np.unique(labels[labels > 0], return_counts=True)[1].min() > MIN_ROOM_CELLS
     rows, columns = np.nonzero((step.cells == 0) & (labels == 0))
-    xy = step.geometry.cell_centres(rows, columns)
+    xy = step.geometry.cell_centers(rows, columns)
     # What has no label is outside, or a room of a few cells.
     depth = shapely.union_all([room.polygon for room in flat.rooms]).buffer(-0.05)
     assert shapely.contains_xy(depth, xy[:, 0], xy[:, 1]).sum() <= MIN_ROOM_CELLS
     for room in flat.rooms:
         own = np.nonzero(labels == room.number)
-        points = step.geometry.cell_centres(*own)
+        points = step.geometry.cell_centers(*own)
         assert shapely.contains_xy(room.polygon.buffer(0.3), points[:, 0], points[:, 1]).all()
 
 
@@ -169,12 +169,12 @@ def test_static_cases_have_the_form_of_the_benchmark(tmp_path):
     cases = json.loads((tmp_path / "cases.json").read_text())["cases"]
     assert {case["group"] for case in cases} == {"simulated_full", "simulated_partial"}
     for case in cases:
-        grey, rooms = (np.asarray(Image.open(tmp_path / case[key])) for key in ("map", "rooms"))
-        assert list(grey.shape) == list(rooms.shape) == case["shape"]
-        assert set(np.unique(grey)) <= {0, 205, 254}
+        gray, rooms = (np.asarray(Image.open(tmp_path / case[key])) for key in ("map", "rooms"))
+        assert list(gray.shape) == list(rooms.shape) == case["shape"]
+        assert set(np.unique(gray)) <= {0, 205, 254}
         assert np.unique(rooms).tolist() == list(range(case["n_rooms"] + 1))
-        assert (grey[rooms > 0] == 254).all()
-        assert case["free"] == (grey == 254).sum()
+        assert (gray[rooms > 0] == 254).all()
+        assert case["free"] == (gray == 254).sum()
 
 
 def test_runs_are_cases_in_their_order_with_origins(tmp_path):

@@ -101,7 +101,7 @@ def test_pieces_of_a_room_that_do_not_touch_are_parts():
     assert ((part > 0) == inside).all()
 
 
-def test_a_room_of_three_parts_is_split_twice_and_its_neighbour_not_at_all():
+def test_a_room_of_three_parts_is_split_twice_and_its_neighbor_not_at_all():
     walls = np.zeros((100, 300), bool)
     walls[:, 84:86] = walls[:, 184:186] = walls[:, 270] = True
     walls[47:53, 84:86] = walls[47:53, 184:186] = False

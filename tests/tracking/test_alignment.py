@@ -34,7 +34,7 @@ def motion_between(*maps: OccupancySnapshot) -> RigidMotion | None:
 
 
 def test_a_motion_moves_points_and_grids_alike():
-    """The corners of a moved grid are the moved corners; the centre moves by the shift."""
+    """The corners of a moved grid are the moved corners; the center moves by the shift."""
     motion = RigidMotion((1.0, 2.0), (0.5, -0.25), math.radians(30))
     grid = GridGeometry(0.1, (-3.0, 4.0), 0.2, "map", (7, 9))
     assert motion.grid(grid).corners_m() == pytest.approx(motion.points(grid.corners_m()))
@@ -48,13 +48,13 @@ def test_a_motion_moves_points_and_grids_alike():
     [((0.15, 0.0), 0.0), ((-0.2, 0.3), 1.0), ((0.0, 0.0), -2.0), ((1.2, -0.9), 3.0), ((-1.3, 1.3), -4.5)],
 )
 def test_a_known_motion_is_found_while_the_map_grows(sample_maps, shift_xy_m, turn_deg: float):
-    """Within 3 cm for every point of the map before, also for leaps of metres and turns of degrees."""
+    """Within 3 cm for every point of the map before, also for leaps of meters and turns of degrees."""
     before, after = sample_maps[1:3]
     motion = motion_about(before, shift_xy_m, turn_deg)
     leapt, _ = moved(after, np.zeros(after.cells.shape, np.int32), motion)
     found = motion_between(before, leapt)
     assert found is not None
-    walls = before.geometry.cell_centres(*np.nonzero(before.cells > 65))
+    walls = before.geometry.cell_centers(*np.nonzero(before.cells > 65))
     assert np.linalg.norm(found.points(walls) - motion.points(walls), axis=1).max() < 0.03
 
 
@@ -79,8 +79,8 @@ def test_less_than_the_least_motion_is_none():
 def test_another_building_is_no_motion(sample_maps):
     """Where the walls of one map are not found in the next, nothing is claimed."""
     cells, _ = office()
-    centre = sample_maps[-1].geometry.corners_m().mean(axis=0)
-    x, y = (centre - np.array(cells.shape[::-1]) * 0.05 / 2).tolist()
+    center = sample_maps[-1].geometry.corners_m().mean(axis=0)
+    x, y = (center - np.array(cells.shape[::-1]) * 0.05 / 2).tolist()
     assert motion_between(sample_maps[-1], snapshot(cells, origin_xy_m=(x, y))) is None
 
 

@@ -12,10 +12,10 @@ from drawn_rooms import drawn, rows
 
 from rose2_logs.config.parameters import TrackingParameters
 from rose2_logs.model.rooms import RoomMap
-from rose2_logs.tracking.convergence import Hindsight, RoomRows, look_back
+from rose2_logs.tracking.convergence import Convergence, RoomRows, measure_convergence
 from rose2_logs.tracking.layout_change import LayoutFollower, variation_of_information
 from rose2_logs.tracking.registration import RigidMotion
-from rose2_logs.tracking.track_history import Moment, RoomLives
+from rose2_logs.tracking.track_history import SnapshotRef, TrackHistories
 from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot
 from rose2_logs.tracking.tracker import RoomTracker
 
@@ -82,23 +82,25 @@ def test_a_motion_and_its_inverse_leave_everything_where_it_is():
     assert twice.points(points) == pytest.approx(MOTION.points(MOTION.points(points)))
 
 
-def lived(*labels: np.ndarray) -> tuple[RoomLives, list[RoomRows], dict[int, Moment]]:
+def lived(*labels: np.ndarray) -> tuple[TrackHistories, list[RoomRows], dict[int, SnapshotRef]]:
     """Lives of the rooms of a run, its rooms as rows, and its maps; coverage is a tenth a map."""
-    lives, tracker, all_rows, moments = RoomLives(), RoomTracker(TrackingParameters()), [], {}
+    histories, tracker, all_rows, snapshot_refs = TrackHistories(), RoomTracker(TrackingParameters()), [], {}
     for index, map_ in enumerate(labels):
         snapshot, analysis = drawn(map_, index)
         ids, events = tracker.update(snapshot, analysis)
-        frame = TrackedSnapshot(snapshot, analysis, (index + 1) / 10, ids, events)
-        lives.add(frame)
-        moments[index] = lives.moment(frame)
+        step = TrackedSnapshot(snapshot, analysis, (index + 1) / 10, ids, events)
+        histories.add(step)
+        snapshot_refs[index] = histories.snapshot_ref(step)
         polygons = np.array(analysis.rooms.polygons, object)
         all_rows.append(RoomRows(np.full(len(ids), index), np.array(ids), analysis.rooms.areas_m2, polygons))
-    return lives, all_rows, moments
+    return histories, all_rows, snapshot_refs
 
 
-def looked_back(*labels: np.ndarray) -> tuple[RoomLives, Hindsight]:
-    lives, all_rows, moments = lived(*labels)
-    return lives, look_back(all_rows, lives, moments, dict.fromkeys(moments, RigidMotion.none()))
+def measured(*labels: np.ndarray) -> tuple[TrackHistories, Convergence]:
+    histories, all_rows, snapshot_refs = lived(*labels)
+    return histories, measure_convergence(
+        all_rows, histories, snapshot_refs, dict.fromkeys(snapshot_refs, RigidMotion.none())
+    )
 
 
 GROWING = (
@@ -113,42 +115,47 @@ GROWING = (
 
 def test_a_life_is_gathered_map_by_map():
     """First and last map, number of maps, last area, losses."""
-    lives, _ = looked_back(*GROWING)
-    one, two = lives.lives[1], lives.lives[2]
+    histories, _ = measured(*GROWING)
+    one, two = histories.tracks[1], histories.tracks[2]
     assert (one.first.snapshot, one.last.snapshot, one.maps, one.area_m2) == (0, 4, 5, 9.0)
-    assert (two.first, two.last) == (Moment(2, 2.0, 0.3), Moment(4, 4.0, 0.5))
+    assert (two.first, two.last) == (SnapshotRef(2, 2.0, 0.3), SnapshotRef(4, 4.0, 0.5))
     assert (two.maps, two.losses) == (2, 1)
-    assert lives.in_last_map == (1, 2)
+    assert histories.in_last_map == (1, 2)
 
 
 def test_since_when_a_room_was_right():
     """Area within a tenth of the last, shape within 0.8 of it: the growing room from its third map on."""
-    _, found = looked_back(*GROWING)
-    assert {track: moment.snapshot for track, moment in found.area_settled.items()} == {1: 2, 2: 2}
-    assert {track: moment.snapshot for track, moment in found.shape_right.items()} == {1: 2, 2: 2}
+    _, found = measured(*GROWING)
+    assert {track: snapshot_ref.snapshot for track, snapshot_ref in found.area_settled.items()} == {
+        1: 2,
+        2: 2,
+    }
+    assert {track: snapshot_ref.snapshot for track, snapshot_ref in found.shape_right.items()} == {1: 2, 2: 2}
     assert found.shape_right_seen == {1: 1.0, 2: 1.0}
 
 
 def test_an_area_that_changes_again_has_not_settled():
     """Right, wrong, right: it settled the second time; its shape was right the first time."""
     full, half = rows("1111111111"), rows("1111......")
-    _, found = looked_back(full, half, full)
+    _, found = measured(full, half, full)
     assert found.area_settled[1].snapshot == 2
     assert found.shape_right[1].snapshot == 0
 
 
 def test_a_prediction_is_right_before_the_room_is_seen():
     """The shape counts with its predicted part; how much was seen is told."""
-    lives, all_rows, moments = lived(rows("1111......"), rows("1111111111"))
+    histories, all_rows, snapshot_refs = lived(rows("1111......"), rows("1111111111"))
     all_rows[0].polygons[0] = shapely.box(0, 0, 9, 1)
-    found = look_back(all_rows, lives, moments, dict.fromkeys(moments, RigidMotion.none()))
+    found = measure_convergence(
+        all_rows, histories, snapshot_refs, dict.fromkeys(snapshot_refs, RigidMotion.none())
+    )
     assert found.shape_right[1].snapshot == 0
     assert found.shape_right_seen[1] == pytest.approx(0.4)
 
 
 def test_how_far_a_layout_was_the_last_one():
     """Weighted by the last rooms' area; final from the first map after which it stays so."""
-    _, found = looked_back(*GROWING)
+    _, found = measured(*GROWING)
     assert found.final_iou == pytest.approx({0: 0.4, 1: 0.7, 2: 1.0, 3: 0.9, 4: 1.0})
     assert found.final_share == pytest.approx({0: 0.0, 1: 0.0, 2: 1.0, 3: 0.9, 4: 1.0})
     assert found.layout_final is not None
@@ -157,23 +164,29 @@ def test_how_far_a_layout_was_the_last_one():
 
 def test_a_last_map_without_rooms_has_no_layout():
     """There is nothing to compare with."""
-    _, found = looked_back(rows("11"), rows(".."))
+    _, found = measured(rows("11"), rows(".."))
     assert found.final_iou == {0: None, 1: None}
     assert found.layout_final is None
 
 
 def test_shapes_are_compared_where_the_last_map_has_them():
     """A room that moved with the whole map was right from the beginning."""
-    lives, all_rows, moments = lived(rows("1111", "1111"), rows("1111", "1111"))
+    histories, all_rows, snapshot_refs = lived(rows("1111", "1111"), rows("1111", "1111"))
     moved = shapely.transform(all_rows[1].polygons, MOTION.points)
-    lives.lives[1] = dataclasses.replace(lives.lives[1], polygon=moved[0])
+    histories.tracks[1] = dataclasses.replace(histories.tracks[1], polygon=moved[0])
     all_rows[1] = dataclasses.replace(all_rows[1], polygons=moved)
     drifts = {0: RigidMotion.none(), 1: RigidMotion.none().then(MOTION)}
     # And if the map had moved before: only the way from map to map counts.
     earlier = RigidMotion.none().then(RigidMotion((2.0, -1.0), (0.7, 0.3), -0.4))
     later = {0: earlier, 1: earlier.then(MOTION)}
-    assert look_back(all_rows, lives, moments, later).final_iou == pytest.approx({0: 1.0, 1: 1.0})
-    assert look_back(all_rows, lives, moments, drifts).final_iou == pytest.approx({0: 1.0, 1: 1.0})
-    unmoved = look_back(all_rows, lives, moments, dict.fromkeys(moments, RigidMotion.none()))
+    assert measure_convergence(all_rows, histories, snapshot_refs, later).final_iou == pytest.approx(
+        {0: 1.0, 1: 1.0}
+    )
+    assert measure_convergence(all_rows, histories, snapshot_refs, drifts).final_iou == pytest.approx(
+        {0: 1.0, 1: 1.0}
+    )
+    unmoved = measure_convergence(
+        all_rows, histories, snapshot_refs, dict.fromkeys(snapshot_refs, RigidMotion.none())
+    )
     assert unmoved.final_iou[0] is not None
     assert unmoved.final_iou[0] < 0.8

@@ -22,16 +22,16 @@ SHARES = st.floats(-6, 6).map(lambda value: round(value, 2))
     st.integers(0, 100),
 )
 @settings(max_examples=60, deadline=None)
-def test_each_centre_gets_the_label_of_the_cell_that_holds_it(origin, resolution, yaw, source_yaw, seed):
-    """As looked up point by point; centres that lie on a border of cells up to rounding are left out."""
+def test_each_center_gets_the_label_of_the_cell_that_holds_it(origin, resolution, yaw, source_yaw, seed):
+    """As looked up point by point; centers that lie on a border of cells up to rounding are left out."""
     labels = np.random.default_rng(seed).integers(0, 5, (7, 9)).astype(np.int32)
     source = GridGeometry(1.0, (0.25, -0.5), source_yaw, "map", labels.shape)
     target = GridGeometry(resolution, origin, yaw, "map", (8, 6))
     found = resample_labels(labels, source, target)
     rows, columns = np.indices(target.shape)
-    in_source = source.world_to_grid(target.cell_centres(rows, columns))
+    in_source = source.world_to_grid(target.cell_centers(rows, columns))
     clear = (np.abs(in_source - np.round(in_source)) > 1e-4).all(axis=-1)
-    cells = source.world_to_cell(target.cell_centres(rows, columns))
+    cells = source.world_to_cell(target.cell_centers(rows, columns))
     inside = ((cells >= 0) & (cells < labels.shape)).all(axis=-1)
     expected = np.where(inside, labels[tuple(np.where(inside[..., None], cells, 0).transpose(2, 0, 1))], 0)
     np.testing.assert_array_equal(found[clear], expected[clear])

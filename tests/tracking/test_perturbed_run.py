@@ -55,7 +55,7 @@ def followed(maps: list[Map], found: list[NDArray[np.int32]]) -> TrackScores:
     return comparison.scores()
 
 
-def renumbered(labels: NDArray[np.int32], seed: int) -> NDArray[np.int32]:
+def renumber_in_place(labels: NDArray[np.int32], seed: int) -> NDArray[np.int32]:
     """The same rooms under other numbers, 1, 2, ... in any order: nothing tells who is who."""
     occurring = np.unique(labels[labels > 0])
     number = np.zeros(int(labels.max(initial=0)) + 1, np.int32)
@@ -65,13 +65,13 @@ def renumbered(labels: NDArray[np.int32], seed: int) -> NDArray[np.int32]:
 
 def test_rooms_keep_their_numbers_while_they_come_to_light(run):
     """Half-seen rooms on a growing canvas: no room has two numbers, no number two rooms."""
-    scores = followed(run, [renumbered(truth, seed) for seed, (_, truth) in enumerate(run)])
+    scores = followed(run, [renumber_in_place(truth, seed) for seed, (_, truth) in enumerate(run)])
     assert (scores.idf1, scores.id_switches) == (100, 0)
     assert scores.tracks == scores.true_tracks > 10
 
 
 def test_rooms_keep_their_numbers_when_the_map_leaps_and_turns(run):
-    """Every other map lies elsewhere, by up to 1.5 metres and 3 degrees, and a room in four is not found."""
+    """Every other map lies elsewhere, by up to 1.5 meters and 3 degrees, and a room in four is not found."""
     rng = np.random.default_rng(3)
     maps, found = [], []
     for number, (snapshot, truth) in enumerate(run):
@@ -79,7 +79,7 @@ def test_rooms_keep_their_numbers_when_the_map_leaps_and_turns(run):
         motion = motion_about(snapshot, (float(shift[0]), float(shift[1])), float(rng.uniform(-3, 3)))
         maps.append(moved(snapshot, truth, motion))
         seen = np.where(rng.random(truth.max() + 1)[maps[-1][1]] < 0.75, maps[-1][1], 0)
-        found.append(renumbered(seen.astype(np.int32), number))
+        found.append(renumber_in_place(seen.astype(np.int32), number))
     scores = followed(maps, found)
     assert (scores.idf1, scores.id_switches) == (scores.idf1_bound, 0)
     assert scores.tracks == scores.true_tracks
@@ -100,7 +100,7 @@ def test_rooms_get_their_numbers_back_after_merges_and_splits(run):
             rows, columns = np.nonzero(truth == others[1])
             upper = rows > np.quantile(rows, 0.6)
             labels[rows[upper], columns[upper]] = labels.max() + 1
-        found.append(renumbered(labels, number))
+        found.append(renumber_in_place(labels, number))
     scores = followed(run, found)
     assert scores.idf1_bound < 99
     assert scores.idf1 >= scores.idf1_bound - 1

@@ -12,11 +12,11 @@ from moved_maps import motion_about, moved
 from rose2_logs.config.parameters import TrackingParameters
 from rose2_logs.model.occupancy import GridGeometry, OccupancySnapshot
 from rose2_logs.model.rooms import RoomMap
-from rose2_logs.tracking.back_projection import Smoother, motions_to_last
+from rose2_logs.tracking.back_projection import BackProjector, motions_to_last
 from rose2_logs.tracking.registration import RigidMotion
 
 RESOLUTION_M = 0.1
-PARAMETERS = TrackingParameters(smoothed_min_area_m2=0.5)
+PARAMETERS = TrackingParameters(back_projected_min_area_m2=0.5)
 
 
 def drawn(rows: list[str]) -> OccupancySnapshot:
@@ -37,27 +37,27 @@ def rooms_of(rows: list[str]) -> RoomMap:
 LAST = ["#" * 25, *["#" + "1" * 11 + "#" + "2" * 11 + "#"] * 11, "#" * 25]
 
 
-def smoothed(rows: list[str], parameters: TrackingParameters = PARAMETERS) -> list[str]:
-    smoother = Smoother(drawn(LAST), rooms_of(LAST), parameters)
-    found = smoother.rooms(drawn(rows), RigidMotion.none())
+def back_projected(rows: list[str], parameters: TrackingParameters = PARAMETERS) -> list[str]:
+    projector = BackProjector(drawn(LAST), rooms_of(LAST), parameters)
+    found = projector.rooms(drawn(rows), RigidMotion.none())
     return ["".join(map(str, row)) for row in found.labels[::-1].tolist()]
 
 
 def test_what_was_seen_of_a_room_is_that_room():
     seen = [row[:18] + "?" * 7 for row in LAST]
-    assert smoothed(seen)[3] == "0" + "1" * 11 + "0" + "2" * 5 + "0" * 7
+    assert back_projected(seen)[3] == "0" + "1" * 11 + "0" + "2" * 5 + "0" * 7
 
 
 def test_areas_are_those_of_the_cells():
     seen = drawn([row[:18] + "?" * 7 for row in LAST])
-    found = Smoother(drawn(LAST), rooms_of(LAST), PARAMETERS).rooms(seen, RigidMotion.none())
+    found = BackProjector(drawn(LAST), rooms_of(LAST), PARAMETERS).rooms(seen, RigidMotion.none())
     assert found.areas_m2.tolist() == pytest.approx([1.21, 0.55])
 
 
 def test_free_cells_where_no_room_is_in_the_end_take_the_nearest():
     """The wall between was not seen, and free space went on to the left."""
     seen = ["#" * 25, *["." * 25] * 11, "#" * 25]
-    assert smoothed(seen)[5] in ("1" * 12 + "2" * 13, "1" * 13 + "2" * 12)
+    assert back_projected(seen)[5] in ("1" * 12 + "2" * 13, "1" * 13 + "2" * 12)
 
 
 def test_what_is_outside_in_the_end_is_no_room_before_either():
@@ -66,34 +66,34 @@ def test_what_is_outside_in_the_end_is_no_room_before_either():
         row.replace("#", ".", 1) + ".." if 3 <= number < 6 else row + "??" for number, row in enumerate(LAST)
     ]
     last = ["...." + row if 3 <= number < 6 else "????" + row for number, row in enumerate(last)]
-    smoother = Smoother(drawn(last), rooms_of(last), PARAMETERS)
-    found = smoother.rooms(drawn(last), RigidMotion.none()).labels[::-1]
+    projector = BackProjector(drawn(last), rooms_of(last), PARAMETERS)
+    found = projector.rooms(drawn(last), RigidMotion.none()).labels[::-1]
     assert np.array_equal(found, rooms_of(last).labels[::-1])
 
 
 def test_a_glimpse_is_the_room_it_was_seen_from():
-    """Through the door 2 columns of the second room: 0.22 square metres are no room yet."""
+    """Through the door 2 columns of the second room: 0.22 square meters are no room yet."""
     seen = [row[:15] + "?" * 10 for row in LAST]
     seen[5:8] = [row[:12] + "1" + row[13:] for row in seen[5:8]]  # a door
-    assert smoothed(seen)[3] == "0" + "1" * 11 + "0" + "1" * 2 + "0" * 10
-    assert smoothed(seen, TrackingParameters(smoothed_min_area_m2=0.2))[3][13:15] == "22"
+    assert back_projected(seen)[3] == "0" + "1" * 11 + "0" + "1" * 2 + "0" * 10
+    assert back_projected(seen, TrackingParameters(back_projected_min_area_m2=0.2))[3][13:15] == "22"
 
 
 def test_a_glimpse_stays_where_nothing_else_was_seen():
-    assert set("".join(smoothed([row[:3] + "?" * 22 for row in LAST]))) == {"0", "1"}
+    assert set("".join(back_projected([row[:3] + "?" * 22 for row in LAST]))) == {"0", "1"}
 
 
 def test_no_rooms_in_the_end_and_nothing_seen():
     empty = RoomMap.from_labels(np.zeros((13, 25), np.int32), drawn(LAST).geometry)
-    found = Smoother(drawn(LAST), empty, PARAMETERS).rooms(drawn(LAST), RigidMotion.none())
+    found = BackProjector(drawn(LAST), empty, PARAMETERS).rooms(drawn(LAST), RigidMotion.none())
     assert not found.labels.any()
     assert len(found.areas_m2) == 0
-    assert not any("1" in row for row in smoothed(["?" * 25] * 13))
+    assert not any("1" in row for row in back_projected(["?" * 25] * 13))
 
 
 @pytest.mark.parametrize(("shift_m", "turn"), [((0.2, -0.1), 0.6), ((-1.4, 0.9), -3.0)])
 def test_a_map_that_lay_elsewhere(shift_m: tuple[float, float], turn: float):
-    """Known from the shifts of the run or, where it is only some decimetres, from the walls alone."""
+    """Known from the shifts of the run or, where it is only some decimeters, from the walls alone."""
     cells, truth = office()
     geometry = GridGeometry(0.05, (1.0, -2.0), 0.3, "map", cells.shape)
     last = OccupancySnapshot(0, 0, 0, "/map", cells, geometry)
@@ -101,7 +101,7 @@ def test_a_map_that_lay_elsewhere(shift_m: tuple[float, float], turn: float):
     motion = motion_about(last, shift_m, turn)
     before, expected = moved(last, np.where(cells == 0, truth, 0).astype(np.int32), motion)
     start = motion.inverse() if abs(turn) > 1 else RigidMotion.none()
-    found = Smoother(last, rooms, TrackingParameters()).rooms(before, start).labels
+    found = BackProjector(last, rooms, TrackingParameters()).rooms(before, start).labels
     here = expected > 0
     assert (found[here] == expected[here]).mean() > 0.99
 
@@ -113,9 +113,9 @@ def test_a_canvas_that_grew_and_has_other_cells():
         cells=np.zeros((6, 4), np.int8),
         geometry=GridGeometry(0.2, (0.1, 0.1), 0.0, "map", (6, 4)),
     )
-    assert np.unique(Smoother(last, rooms, PARAMETERS).rooms(coarse, RigidMotion.none()).labels).tolist() == [
-        1
-    ]
+    assert np.unique(
+        BackProjector(last, rooms, PARAMETERS).rooms(coarse, RigidMotion.none()).labels
+    ).tolist() == [1]
 
 
 def test_motions_add_up_to_the_last():

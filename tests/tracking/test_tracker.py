@@ -190,7 +190,7 @@ def test_a_good_pair_is_not_given_up_for_two_poor_ones():
 
 
 def test_when_the_whole_map_shifts_rooms_are_looked_for_where_they_now_are():
-    """Rooms a metre wide that all move by a metre keep their numbers, a lost one too."""
+    """Rooms a meter wide that all move by a meter keep their numbers, a lost one too."""
     cells, labels = office(pad=(30, 30))
     narrow = np.where(labels > 0, 1 + np.arange(labels.shape[1]) // 20, 0).astype(np.int32)
     narrow = np.unique(narrow, return_inverse=True)[1].reshape(labels.shape).astype(np.int32)

@@ -97,7 +97,7 @@ class LookTimes:
 
 
 def sink_costs(log: Path, parameters: Parameters, folder: Path) -> SinkCosts:
-    """Analyse a log in this process and time its parts.
+    """Analyze a log in this process and time its parts.
 
     Rerun's own threads write the recording; their time is that of the part during which they do so.
     """
@@ -125,16 +125,16 @@ def sink_costs(log: Path, parameters: Parameters, folder: Path) -> SinkCosts:
         path = reader.robot_path(last.geometry.frame_id)
         frames = tracked_snapshots(reader, last, workers, parameters, totals, path)
         while True:
-            frame, took = timed(partial(next, frames, None))
-            if frame is None:
+            step, took = timed(partial(next, frames, None))
+            if step is None:
                 break
             # Stages tell wall-clock times.
             share = took.cpu_s / took.wall_s
-            within = sum(frame.analysis.seconds.values()) * share
+            within = sum(step.analysis.seconds.values()) * share
             analysis_s, others_s = analysis_s + within, others_s + took.cpu_s - within
-            totals.add(frame)
+            totals.add(step)
             for name, sink in sinks.items():
-                spent[name] += timed(partial(sink.write, frame))[1].cpu_s
+                spent[name] += timed(partial(sink.write, step))[1].cpu_s
         for name, sink in sinks.items():
             spent[name] += timed(partial(sink.__exit__, None, None, None))[1].cpu_s
     sizes = {name: file.stat().st_size for name, file in files.items()}
@@ -155,8 +155,8 @@ def copy_times(sample: Path, size_bytes: int, folder: Path) -> CopyTimes:
 
     def copy() -> None:
         with AnnotatedMcap(folder / "copy.mcap", info) as sink:
-            for frame in frames:
-                sink.write(frame)
+            for step in frames:
+                sink.write(step)
 
     _, took = timed(copy)
     return CopyTimes(log.stat().st_size, took.cpu_s, took.wall_s)

@@ -19,12 +19,12 @@ from rose2_logs.io import open_log
 from rose2_logs.model.analysis import SnapshotAnalysis
 from rose2_logs.model.labels import known_window
 from rose2_logs.model.occupancy import BoolArray, OccupancySnapshot, classify
-from rose2_logs.segmentation.pipeline import analyse
+from rose2_logs.segmentation.pipeline import analyze
 
 HOUGH_THRESHOLD = 20
-"""Votes of a line in the floor's Hough transform: about a metre of wall at 5 cm."""
+"""Votes of a line in the floor's Hough transform: about a meter of wall at 5 cm."""
 HOUGH_MIN_LENGTH, HOUGH_MAX_GAP = 20, 5
-"""Cells; a metre of wall with a gap of a quarter metre at 5 cm."""
+"""Cells; a meter of wall with a gap of a quarter meter at 5 cm."""
 
 
 @dataclass(frozen=True)
@@ -130,8 +130,8 @@ def time_map(map_: MapToTime, parameters: Parameters, methods: Sequence[str], re
     floor_s = float(np.median([timed(lambda: floor(explored))[1].cpu_s for _ in range(repeats)]))
     others = {}
     for method in methods:
-        analyse(snapshot, parameters, method)
-        others[method] = timed(partial(analyse, snapshot, parameters, method))[1].cpu_s
+        analyze(snapshot, parameters, method)
+        others[method] = timed(partial(analyze, snapshot, parameters, method))[1].cpu_s
     return MapTimes(
         map_.group,
         map_.name,
@@ -143,8 +143,8 @@ def time_map(map_: MapToTime, parameters: Parameters, methods: Sequence[str], re
         stages,
         floor_s,
         others,
-        peak_memory(partial(analyse, snapshot, parameters)),
-        peak_allocated(partial(analyse, snapshot, parameters)),
+        peak_memory(partial(analyze, snapshot, parameters)),
+        peak_allocated(partial(analyze, snapshot, parameters)),
     )
 
 
@@ -156,8 +156,8 @@ def time_analysis(
     The stages tell wall-clock times; each run's are scaled to the processor time that the run got.
     """
     if warm:
-        analyse(snapshot, parameters)
-    runs = [timed(lambda: analyse(snapshot, parameters)) for _ in range(repeats)]
+        analyze(snapshot, parameters)
+    runs = [timed(lambda: analyze(snapshot, parameters)) for _ in range(repeats)]
     stages = {
         stage: float(np.median([result.seconds[stage] * took.cpu_s / took.wall_s for result, took in runs]))
         for stage in runs[0][0].seconds

@@ -14,7 +14,7 @@ from benchmarking.transforms import TRANSFORMS
 from rose2_logs.config.parameters import Parameters
 from rose2_logs.evaluation.cases import Case
 from rose2_logs.evaluation.scores import score
-from rose2_logs.segmentation.pipeline import analyse
+from rose2_logs.segmentation.pipeline import analyze
 from rose2_logs.system.workers import ordered_map
 
 
@@ -68,11 +68,11 @@ def check_robustness(
 def robustness_of(case: Case, method: str, parameters: Parameters) -> Robustness:
     """Compare one case's segmentation with itself under every transform."""
     snapshot = case.snapshot()
-    labels = analyse(snapshot, parameters, method).rooms.labels
+    labels = analyze(snapshot, parameters, method).rooms.labels
     agreement = {}
     for transform in TRANSFORMS:
         changed, expected = transform(snapshot, labels)
-        agreement[transform.name] = agreement_of(expected, analyse(changed, parameters, method).rooms.labels)
+        agreement[transform.name] = agreement_of(expected, analyze(changed, parameters, method).rooms.labels)
     return Robustness(case.group, case.name, agreement)
 
 

@@ -20,7 +20,7 @@ from rose2_logs.config.parameters import Parameters
 from rose2_logs.errors import Rose2LogsError
 from rose2_logs.model.labels import known_window
 from rose2_logs.model.occupancy import GridGeometry, OccupancySnapshot
-from rose2_logs.segmentation.pipeline import analyse
+from rose2_logs.segmentation.pipeline import analyze
 
 START_NS = 1_700_000_000_000_000_000
 MAP_EVERY_S = 5.0
@@ -41,7 +41,7 @@ class TileTimes:
 
 @dataclass(frozen=True)
 class LogTimes:
-    """A log analysed by the command line.
+    """A log analyzed by the command line.
 
     Attributes
     ----------
@@ -87,7 +87,7 @@ def time_tiles(
         seconds, _, analysis = time_analysis(
             snapshot, parameters, repeats if copies <= counts[0] * 4 else 1, warm=copies == counts[0]
         )
-        peak = peak_memory(partial(analyse, snapshot, parameters))
+        peak = peak_memory(partial(analyze, snapshot, parameters))
         yield TileTimes(
             copies, snapshot.cells.size, len(analysis.rooms), seconds, analysis.resolution_m, peak
         )

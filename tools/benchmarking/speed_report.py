@@ -148,7 +148,7 @@ def _tiles(speed: Speed) -> list[str]:
         "microseconds a cell",
         "over n log n",
         "bytes a cell",
-        "analysed at m",
+        "analyzed at m",
     ]
     return [
         "## The same building laid out again and again",

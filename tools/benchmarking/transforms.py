@@ -68,7 +68,7 @@ def _upsampled(cells: Cells, labels: Labels) -> tuple[Cells, Labels]:
 
 
 def _rotated(cells: Cells, labels: Labels) -> tuple[Cells, Labels]:
-    """Turn about the centre onto a canvas that holds all; each cell takes the value at its centre."""
+    """Turn about the center onto a canvas that holds all; each cell takes the value at its center."""
     cosine, sine = np.cos(ROTATION_RAD), np.sin(ROTATION_RAD)
     height, width = cells.shape
     rows = int(np.ceil(height * abs(cosine) + width * abs(sine)))

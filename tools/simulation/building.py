@@ -29,7 +29,7 @@ class Room:
     name : str
         Kind and number, e.g. ``office 3``.
     polygon : shapely Polygon
-        Clear floor from wall to wall, furniture included, world metres.
+        Clear floor from wall to wall, furniture included, world meters.
     """
 
     number: int
@@ -52,7 +52,7 @@ class Building:
     furniture : shapely geometry
         Cross-section of furniture, door leaves, and chair and table legs at the lidar's height.
     segments : (S, 4) float
-        Everything that returns a ray: x0, y0, x1, y1 in world metres.
+        Everything that returns a ray: x0, y0, x1, y1 in world meters.
     transmission : (S,) float
         Probability that a ray passes the segment: 0 for what is opaque, more for glass.
     start_xy_m : (float, float)
@@ -79,12 +79,12 @@ class Building:
         return tuple(pairs)
 
     def bounds(self, margin_m: float) -> tuple[float, float, float, float]:
-        """Extent (x min, y min, x max, y max) of the rooms with a margin, metres."""
+        """Extent (x min, y min, x max, y max) of the rooms with a margin, meters."""
         x0, y0, x1, y1 = shapely.union_all([room.polygon for room in self.rooms]).bounds
         return x0 - margin_m, y0 - margin_m, x1 + margin_m, y1 + margin_m
 
     def walkable(self, clearance_m: float) -> BaseGeometry:
-        """The floor on which the centre of a robot of radius `clearance_m` can stand."""
+        """The floor on which the center of a robot of radius `clearance_m` can stand."""
         floor = shapely.union_all([room.polygon for room in self.rooms] + list(self.doorways))
         solid = self.furniture.buffer(clearance_m, quad_segs=2)
         return floor.buffer(-clearance_m, quad_segs=2).difference(solid)

@@ -34,11 +34,11 @@ class RobotSettings:
     pose_memory : float
         Correlation of that error from scan to scan.
     odometry_drift : float
-        Standard deviation of the odometry's error per metre moved and per radian turned.
+        Standard deviation of the odometry's error per meter moved and per radian turned.
     plan_cell_m : float
         Cell of the planner.
     greed : float
-        Metres of way that one metre of frontier is worth: 0 always goes to the nearest frontier.
+        Meters of way that one meter of frontier is worth: 0 always goes to the nearest frontier.
     """
 
     radius_m: float = 0.2
@@ -63,7 +63,7 @@ class PoseSample:
     time_s : float
         Seconds since the start.
     estimate, odometry, truth : (3,) float
-        x, y in metres and heading in radians: of the mapper in the map frame, of the wheels in the odometry
+        x, y in meters and heading in radians: of the mapper in the map frame, of the wheels in the odometry
         frame, and the true one.
     """
 
@@ -113,7 +113,7 @@ class Planner:
         self._greed = settings.greed
         x0, y0, x1, y1 = building.bounds(1.0)
         x, y = np.meshgrid(np.arange(x0, x1, self._cell_m), np.arange(y0, y1, self._cell_m))
-        self._centres = np.stack([x, y], -1)
+        self._centers = np.stack([x, y], -1)
         floor = building.walkable(settings.radius_m)
         shapely.prepare(floor)
         self._walkable = shapely.contains_xy(floor, x, y)
@@ -126,14 +126,14 @@ class Planner:
     def update(self, mapper: LogOddsMapper) -> None:
         """Look up what the map knows by now."""
         todo = self._walkable & ~self._known
-        self._known[todo] = mapper.known_at(self._centres[todo])
+        self._known[todo] = mapper.known_at(self._centers[todo])
 
     def way_to_frontier(self, xy_m: FloatArray) -> FloatArray | None:
         """Points (N, 2) to the frontier that is worth most, or None where no frontier can be reached."""
         ground = self._walkable & self._known
         unknown = self._walkable & ~self._known & ~self._given_up
         frontier = ground & binary_dilation(unknown, np.ones((3, 3)))
-        distance = np.hypot(*(self._centres - xy_m).transpose(2, 0, 1))
+        distance = np.hypot(*(self._centers - xy_m).transpose(2, 0, 1))
         here = np.unravel_index(np.argmin(np.where(ground, distance, np.inf)), distance.shape)
         router = MCP_Geometric(np.where(ground, self._price, -1.0))
         costs, _ = router.find_costs([here])
@@ -147,12 +147,12 @@ class Planner:
         value = nearest - self._greed * np.minimum(size, 20)
         best = int(np.argmin(np.where(size > 0, value, np.inf)))
         goal = np.unravel_index(np.argmin(np.where(groups == best, costs, np.inf)), costs.shape)
-        way: FloatArray = self._centres[tuple(np.array(router.traceback(goal)).T)]
+        way: FloatArray = self._centers[tuple(np.array(router.traceback(goal)).T)]
         return way
 
     def give_up_near(self, xy_m: FloatArray) -> None:
         """Forget unknown ground around a point: the robot stood there and could not see it."""
-        self._given_up |= np.hypot(*(self._centres - xy_m).transpose(2, 0, 1)) < 3 * self._cell_m
+        self._given_up |= np.hypot(*(self._centers - xy_m).transpose(2, 0, 1)) < 3 * self._cell_m
 
 
 class _Robot:
@@ -261,7 +261,7 @@ def _moves(planner: Planner, mapper: LogOddsMapper, body: _Robot) -> Iterator[tu
 
 
 def _follow(way: FloatArray, body: _Robot) -> Generator[tuple[float, float], None, float]:
-    """Drive along a way, at most a few metres before the robot plans anew; returns the metres driven."""
+    """Drive along a way, at most a few meters before the robot plans anew; returns the meters driven."""
     s = body.settings
     lengths = np.concatenate([[0], np.cumsum(np.hypot(*np.diff(way, axis=0).T))])
     at = 0.0

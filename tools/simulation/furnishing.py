@@ -177,7 +177,7 @@ def door_leaves(rng: np.random.Generator, hinges: list[FloatArray]) -> list[Poly
 
 
 def surroundings(rng: np.random.Generator, footprint: BaseGeometry) -> list[Polygon]:
-    """Trees, cars, and a neighbour's walls: what rays meet that leave through a window."""
+    """Trees, cars, and a neighbor's walls: what rays meet that leave through a window."""
     x0, y0, x1, y1 = footprint.buffer(8.0).bounds
     near = footprint.buffer(2.0)
     found = []

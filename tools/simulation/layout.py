@@ -16,7 +16,7 @@ from simulation.building import FloatArray, Room, boundary_segments
 STYLES = ("straight", "bent", "ring", "hall", "flat", "campus")
 MIN_ROOM_AREA_M2 = 4.0
 MIN_ROOM_WIDTH_M = 1.3
-"""What is left of a room after a neighbour took its part must still be a room."""
+"""What is left of a room after a neighbor took its part must still be a room."""
 DOOR_POST_M = 0.15
 """Wall that stays on each side of a door."""
 

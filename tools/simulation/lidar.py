@@ -9,7 +9,7 @@ import numpy as np
 from simulation.building import Building, FloatArray
 
 EDGE_STEP_M = 0.3
-"""A step between neighbouring ranges that counts as a depth edge."""
+"""A step between neighboring ranges that counts as a depth edge."""
 
 
 @dataclass(frozen=True)
@@ -55,14 +55,14 @@ class Lidar:
         building : Building
             Where the lidar is.
         pose : (3,) float
-            x, y in metres and heading in radians.
+            x, y in meters and heading in radians.
         rng : numpy Generator
             Source of the sensor's errors.
 
         Returns
         -------
         (B,) float
-            Ranges in metres; NaN where nothing returned.
+            Ranges in meters; NaN where nothing returned.
         """
         angles = pose[2] + self.bearings_rad
         ranges = cast_rays(building, pose[:2], angles, self.max_range_m, rng)

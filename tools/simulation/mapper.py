@@ -56,7 +56,7 @@ class LogOddsMapper:
         Parameters
         ----------
         pose : (3,) float
-            The lidar's x, y in metres and heading in radians.
+            The lidar's x, y in meters and heading in radians.
         bearings_rad : (B,) float
             Angle of each ray to the heading.
         ranges_m : (B,) float

@@ -13,7 +13,7 @@ from PIL import Image
 from rose2_logs.model.occupancy import GridGeometry
 from simulation.building import Building
 
-FREE_GREY, OCCUPIED_GREY, UNKNOWN_GREY = 254, 0, 205
+FREE_GRAY, OCCUPIED_GRAY, UNKNOWN_GRAY = 254, 0, 205
 """map_server's convention for map images."""
 MIN_ROOM_CELLS = 200
 """Rooms of which a map knows this few cells, or fewer, are not asked for."""
@@ -50,9 +50,9 @@ def true_labels(building: Building, cells: NDArray[np.int8], geometry: GridGeome
 
 def map_image(cells: NDArray[np.int8]) -> NDArray[np.uint8]:
     """A map as an image (H, W) in map_server's convention, the row of largest y on top."""
-    image = np.full(cells.shape, UNKNOWN_GREY, np.uint8)
-    image[cells == 0] = FREE_GREY
-    image[cells > 50] = OCCUPIED_GREY
+    image = np.full(cells.shape, UNKNOWN_GRAY, np.uint8)
+    image[cells == 0] = FREE_GRAY
+    image[cells > 50] = OCCUPIED_GRAY
     return np.flipud(image)
 
 
@@ -121,5 +121,5 @@ def write_truth(directory: Path, name: str, building: Building, resolution_m: fl
 
 
 def _rounded(point: tuple[float, ...]) -> list[float]:
-    """Coordinates in metres to the millimetre."""
+    """Coordinates in meters to the millimeter."""
     return [round(float(value), 3) for value in point]

@@ -39,7 +39,7 @@ from rose2_logs.io.mcap.records import (
     records_in,
 )
 from rose2_logs.io.source import DamagedMessageError
-from rose2_logs.system.warnings import notice
+from rose2_logs.system.warnings import log_warning
 
 logger = logging.getLogger(__name__)
 
@@ -90,7 +90,7 @@ class McapFile(LogFile):
                 self._scan()
                 if self.whole and index_damage:
                     text = f"{path}: its index is damaged or cut off ({index_damage}); all before it was read"
-                    notice(logger, "damaged_index", text, file=path)
+                    log_warning(logger, "damaged_index", text, file=path)
             else:
                 self._take_summary()
         except BaseException:
@@ -143,7 +143,7 @@ class McapFile(LogFile):
 
     def _tell_damaged(self, begin: int, error: Exception) -> None:
         text = f"{self.path}: the chunk at byte {begin} is damaged ({error}); its messages are left out"
-        notice(logger, "damaged_chunk", text, file=self.path)
+        log_warning(logger, "damaged_chunk", text, file=self.path)
 
     def _message_index(self, chunk: ChunkIndex, channel_id: int) -> list[tuple[int, int]]:
         """Log time and offset of each message of a channel in a chunk, from the index behind that.
@@ -243,7 +243,7 @@ class McapFile(LogFile):
                 yield parsed(kind, memoryview(self._record(offset)))
             except DAMAGE as error:
                 text = f"{self.path}: the {kind.__name__.lower()} at byte {offset} is left out ({error})"
-                notice(logger, "damaged_record", text, file=self.path)
+                log_warning(logger, "damaged_record", text, file=self.path)
 
     def messages_in(self, chunk: ChunkIndex) -> list[StoredMessage]:
         """Messages of one chunk by log time; raises what `DAMAGE` lists where they cannot be read."""
@@ -279,7 +279,7 @@ class McapFile(LogFile):
                     text = (
                         f"{self.path}: cut off or damaged after {begin} bytes; what is whole before is read"
                     )
-                    notice(logger, "cut_off", text, file=self.path)
+                    log_warning(logger, "cut_off", text, file=self.path)
                 if opcode == Opcode.CHUNK and length <= self.limits.chunk_max_bytes:
                     yield Record(begin, opcode, memoryview(self._stream.read(length)))
                 return
@@ -310,7 +310,7 @@ class McapFile(LogFile):
                     f"{self.path}: what is at byte {record.offset} is damaged ({error}); what is whole of it "
                     "is read"
                 )
-                notice(logger, "damaged_chunk", text, file=self.path)
+                log_warning(logger, "damaged_chunk", text, file=self.path)
 
     def _take(self, record: Record, place: int, offset: int) -> None:
         if record.opcode == Opcode.MESSAGE:

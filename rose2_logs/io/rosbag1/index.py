@@ -43,7 +43,7 @@ from rose2_logs.io.rosbag1.records import (
     time_ns,
 )
 from rose2_logs.io.source import DamagedMessageError
-from rose2_logs.system.warnings import notice
+from rose2_logs.system.warnings import log_warning
 
 logger = logging.getLogger(__name__)
 
@@ -232,7 +232,7 @@ class BagFile(LogFile):
                 return
         self.whole = False
         text = f"{self.path}: the chunk at byte {place} is damaged ({why}); its {count} messages are left out"
-        notice(logger, "damaged_chunk", text, file=self.path)
+        log_warning(logger, "damaged_chunk", text, file=self.path)
 
     def _scan(self, parts: list[NDArray[np.void]]) -> None:
         """Index the bag chunk by chunk, as far as it is whole."""
@@ -255,10 +255,10 @@ class BagFile(LogFile):
         if reason:
             self.whole = False
             text = f"{self.path}: cut off or damaged ({reason}) after {min(begin, self._size)} bytes; "
-            notice(logger, "cut_off", text + "what is whole before is read", file=self.path)
+            log_warning(logger, "cut_off", text + "what is whole before is read", file=self.path)
         else:
             text = f"{self.path}: was not closed, or its index is damaged; all that is there was read"
-            notice(logger, "damaged_index", text, file=self.path)
+            log_warning(logger, "damaged_index", text, file=self.path)
 
     def _scan_chunk(self, chunk: Head, parts: list[NDArray[np.void]]) -> None:
         found: list[tuple[int, int, int, int]] = []
@@ -277,7 +277,7 @@ class BagFile(LogFile):
         except _DAMAGE as error:
             self.whole = False
             text = f"{self.path}: the chunk at byte {chunk.begin} is damaged ({error}); "
-            notice(logger, "damaged_chunk", text + "what is whole of it is read", file=self.path)
+            log_warning(logger, "damaged_chunk", text + "what is whole of it is read", file=self.path)
         if found:
             parts.append(np.array(found, INDEX_DTYPE))
 

@@ -20,7 +20,7 @@ from rose2_logs.config.parameters import ReadingParameters
 from rose2_logs.errors import LogError
 from rose2_logs.io.log_file import LATEST_NS, Channel, LogFile, Place, StoredMessage, check_count
 from rose2_logs.io.source import DamagedMessageError
-from rose2_logs.system.warnings import notice
+from rose2_logs.system.warnings import log_warning
 
 logger = logging.getLogger(__name__)
 
@@ -185,7 +185,7 @@ class SqliteFile(LogFile):
                     text = (
                         f"{self.path}: damaged or cut off ({error}) after row {max(last, 0)}; the messages "
                     )
-                    notice(logger, "cut_off", f"{text}that can be reached are read", file=self.path)
+                    log_warning(logger, "cut_off", f"{text}that can be reached are read", file=self.path)
                 # To the pages behind those that are lost: twice as far each time.
                 step = 2 * step or 1
         return np.concatenate(parts)
@@ -212,4 +212,4 @@ class SqliteFile(LogFile):
                 f"{self.path}: {journal.name} holds messages that are not in the database yet and are left "
                 f"out; `sqlite3 {self.path.name} .tables` on a copy of both takes them up"
             )
-            notice(logger, "journal", text, file=self.path)
+            log_warning(logger, "journal", text, file=self.path)

@@ -1,4 +1,4 @@
-"""Floor plans as DXF for CAD programs, by ezdxf: metres, a layer for each kind of thing."""
+"""Floor plans as DXF for CAD programs, by ezdxf: meters, a layer for each kind of thing."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from rose2_logs.drawing.palette import track_colour
+from rose2_logs.drawing.palette import track_color
 from rose2_logs.model.room_plan import RoomPlan, predicted_parts
 from rose2_logs.system.files import replacing
 
@@ -17,16 +17,16 @@ if TYPE_CHECKING:
     from ezdxf.layouts.layout import Modelspace
 
 VERSION = "R2010"
-"""Read by every CAD program in use, and the first release with true colours on all entities."""
+"""Read by every CAD program in use, and the first release with true colors on all entities."""
 ROOMS, PREDICTED, DOORWAYS, WALLS, LABELS = "ROOMS", "PREDICTED", "DOORWAYS", "WALLS", "LABELS"
 LAYERS = {ROOMS: 7, PREDICTED: 8, DOORWAYS: 1, WALLS: 7, LABELS: 7}
-"""Layers and their colours by AutoCAD's index: 7 is black or white, 8 grey, 1 red."""
+"""Layers and their colors by AutoCAD's index: 7 is black or white, 8 gray, 1 red."""
 TEXT_HEIGHT_M = 0.25
 """Labels can be read on a print at 1:100 (2.5 mm)."""
 LABEL_RISE_M = 0.75 * TEXT_HEIGHT_M
 """The middles of a label's two lines lie this far above and below its point: half a line apart."""
 HATCH_PATTERN, HATCH_SCALE = "ANSI31", 0.08
-"""Lines at 45 degrees about a quarter of a metre apart."""
+"""Lines at 45 degrees about a quarter of a meter apart."""
 
 
 def write_dxf(plan: RoomPlan, path: Path) -> None:
@@ -44,8 +44,8 @@ def write_dxf(plan: RoomPlan, path: Path) -> None:
     fixed, options.write_fixed_meta_data_for_testing = options.write_fixed_meta_data_for_testing, True
     try:
         document = new(VERSION, units=units.M)
-        for name, colour in LAYERS.items():
-            document.layers.add(name, color=colour)
+        for name, color in LAYERS.items():
+            document.layers.add(name, color=color)
         _draw(plan, document.modelspace())
         # Of itself it lists the classes in the order of a set, which changes from run to run.
         for name in sorted(document.entitydb.dxf_types_in_use()):
@@ -63,18 +63,18 @@ def _draw(plan: RoomPlan, space: Modelspace) -> None:
 
     predicted = predicted_parts(plan)
     for room in plan.rooms:
-        colour = rgb2int(track_colour(room.number))
+        color = rgb2int(track_color(room.number))
         for ring in _rings(room.shape):
-            space.add_lwpolyline(ring, close=True, dxfattribs={"layer": ROOMS, "true_color": colour})
+            space.add_lwpolyline(ring, close=True, dxfattribs={"layer": ROOMS, "true_color": color})
         unseen = predicted.get(room.number)
         for part in [] if unseen is None else shapely.get_parts(unseen):
-            hatch = space.add_hatch(dxfattribs={"layer": PREDICTED, "true_color": colour})
+            hatch = space.add_hatch(dxfattribs={"layer": PREDICTED, "true_color": color})
             hatch.set_pattern_fill(HATCH_PATTERN, scale=HATCH_SCALE)
             for number, ring in enumerate(_rings(part)):
                 outer = const.BOUNDARY_PATH_EXTERNAL | const.BOUNDARY_PATH_OUTERMOST
                 inner = const.BOUNDARY_PATH_DEFAULT
                 hatch.paths.add_polyline_path(ring, is_closed=True, flags=inner if number else outer)
-                attributes = {"layer": PREDICTED, "true_color": colour}
+                attributes = {"layer": PREDICTED, "true_color": color}
                 space.add_lwpolyline(ring, close=True, dxfattribs=attributes)
         if room.label_point_m is None:
             continue

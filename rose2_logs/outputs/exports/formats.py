@@ -12,7 +12,7 @@ from rose2_logs.model.room_plan import RoomPlan
 from rose2_logs.outputs.exports.dxf import write_dxf
 from rose2_logs.outputs.exports.geojson import plan_geojson
 from rose2_logs.outputs.exports.graph import plan_graph
-from rose2_logs.outputs.exports.map_server import ENDINGS, write_labelled_map
+from rose2_logs.outputs.exports.map_server import ENDINGS, write_labeled_map
 from rose2_logs.runs.summary import write_json
 from rose2_logs.system.files import replacing
 
@@ -66,7 +66,7 @@ def write_plan(plan: RoomPlan, formats: Sequence[str], folder: Path, stem: str) 
         "svg": lambda path: _write_text(path, as_svg(draw_plan(plan))),
         "dxf": lambda path: write_dxf(plan, path),
         "graph": lambda path: write_json(path, plan_graph(plan)),
-        "map_server": lambda path: write_labelled_map(plan, folder, stem),
+        "map_server": lambda path: write_labeled_map(plan, folder, stem),
     }
     for name in dict.fromkeys(formats):
         writers[name](folder / f"{stem}{FORMATS[name][0]}")

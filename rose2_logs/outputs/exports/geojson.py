@@ -1,4 +1,4 @@
-"""Floor plans as GeoJSON (RFC 7946), in metres."""
+"""Floor plans as GeoJSON (RFC 7946), in meters."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from rose2_logs.model.analysis import Walls
 from rose2_logs.model.room_plan import RoomPlan, predicted_parts
 
 DECIMALS = 4
-"""Of coordinates in metres: a tenth of a millimetre."""
+"""Of coordinates in meters: a tenth of a millimeter."""
 CAVEAT = (
-    "x and y are metres in the frame of the robot's map, not longitude and latitude: programs that expect "
+    "x and y are meters in the frame of the robot's map, not longitude and latitude: programs that expect "
     "degrees have to be told, as by an engineering or local coordinate system"
 )
 
@@ -23,7 +23,7 @@ def plan_geojson(plan: RoomPlan, walls: Walls | None = None) -> dict[str, Any]:
     """Return rooms, their unseen parts, doorways and walls as a feature collection.
 
     Each feature's property ``kind`` is room, predicted, doorway, wall or line. The member ``map_frame``, none
-    of the standard's, names the frame and says that coordinates are metres. Rings turn as the standard asks.
+    of the standard's, names the frame and says that coordinates are meters. Rings turn as the standard asks.
 
     Parameters
     ----------
@@ -40,9 +40,9 @@ def plan_geojson(plan: RoomPlan, walls: Walls | None = None) -> dict[str, Any]:
             name=room.name,
             area_m2=room.area_m2,
             predicted_area_m2=room.predicted_area_m2,
-            confidence=room.confidence,
+            wall_support=room.wall_support,
             frontier_m=room.frontier_m,
-            neighbours=list(room.neighbours),
+            neighbors=list(room.neighbors),
         )
         for room in plan.rooms
     ]
@@ -70,7 +70,7 @@ def plan_geojson(plan: RoomPlan, walls: Walls | None = None) -> dict[str, Any]:
     return {
         "type": "FeatureCollection",
         "name": plan.title,
-        "map_frame": {"frame_id": plan.frame_id, "unit": "metre", "note": CAVEAT},
+        "map_frame": {"frame_id": plan.frame_id, "unit": "meter", "note": CAVEAT},
         "features": features,
     }
 

@@ -22,7 +22,7 @@ def plan_graph(plan: RoomPlan) -> dict[str, Any]:
                 "name": room.name,
                 "area_m2": room.area_m2,
                 "predicted_area_m2": room.predicted_area_m2,
-                "confidence": room.confidence,
+                "wall_support": room.wall_support,
                 "frontier_m": room.frontier_m,
                 "x_m": x,
                 "y_m": y,

@@ -1,4 +1,4 @@
-"""Floor plans as a labelled map that map_server and Nav2 load: the rooms are the values of its cells."""
+"""Floor plans as a labeled map that map_server and Nav2 load: the rooms are the values of its cells."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ ENDINGS = (".rooms.pgm", ".rooms.yaml", ".rooms.list.yaml", ".rooms.labels.png")
 """The image, its description for map_server, what rooms its values are, and the rooms by their numbers."""
 
 
-def write_labelled_map(plan: RoomPlan, folder: Path, stem: str) -> tuple[Path, ...]:
+def write_labeled_map(plan: RoomPlan, folder: Path, stem: str) -> tuple[Path, ...]:
     """Write a plan's map with its rooms.
 
     The description says ``mode: raw``, so that cells load with the values of the image: 0 free, 100 occupied,
@@ -61,7 +61,7 @@ def write_labelled_map(plan: RoomPlan, folder: Path, stem: str) -> tuple[Path, .
             f"{stem}{ENDINGS[3]}",
         )
     image, about, listing, labels = (folder / f"{stem}{ending}" for ending in ENDINGS)
-    pixels = labelled_pixels(plan.map, values)
+    pixels = labeled_pixels(plan.map, values)
     with replacing(image) as part:
         Image.fromarray(pixels).save(part, format="PPM")
     geometry = plan.map.geometry
@@ -86,7 +86,7 @@ def room_values(plan: RoomPlan) -> dict[int, int]:
     return {room.number: 1 + place % ROOM_VALUES for place, room in enumerate(plan.rooms)}
 
 
-def labelled_pixels(below: PlanMap, values: dict[int, int]) -> np.ndarray[Any, np.dtype[np.uint8]]:
+def labeled_pixels(below: PlanMap, values: dict[int, int]) -> np.ndarray[Any, np.dtype[np.uint8]]:
     """Pixels (H, W) uint8 of a map and its rooms, row 0 at the top."""
     free, occupied = classify(below.cells, below.occupancy)
     pixels = np.full(below.cells.shape, UNKNOWN_PIXEL, np.uint8)
@@ -95,8 +95,8 @@ def labelled_pixels(below: PlanMap, values: dict[int, int]) -> np.ndarray[Any, n
     for number, value in values.items():
         if number < len(of_room):
             of_room[number] = value
-    labelled = of_room[below.labels]
-    return np.flipud(np.where(labelled > 0, labelled, pixels)).copy()
+    labeled = of_room[below.labels]
+    return np.flipud(np.where(labeled > 0, labeled, pixels)).copy()
 
 
 def _listing(plan: RoomPlan, values: dict[int, int], map_name: str, labels_name: str) -> dict[str, Any]:
@@ -107,11 +107,11 @@ def _listing(plan: RoomPlan, values: dict[int, int], map_name: str, labels_name:
             "name": room.name,
             "area_m2": round(room.area_m2, 4),
             "predicted_area_m2": round(room.predicted_area_m2, 4),
-            "confidence": None if room.confidence is None else round(room.confidence, 4),
-            "centre_m": None
+            "wall_support": None if room.wall_support is None else round(room.wall_support, 4),
+            "center_m": None
             if room.label_point_m is None
             else [round(value, 4) for value in room.label_point_m],
-            "neighbours": list(room.neighbours),
+            "neighbors": list(room.neighbors),
         }
         for room in plan.rooms
     ]

@@ -33,7 +33,7 @@ from rose2_logs.outputs.mcap.viewer_layouts import MapScene, bag_metadata_path, 
 from rose2_logs.outputs.mcap.writer import McapWriter
 from rose2_logs.runs.sink import RunInfo
 from rose2_logs.system.files import part_of
-from rose2_logs.system.warnings import notice
+from rose2_logs.system.warnings import log_warning
 from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot
 
 logger = logging.getLogger(__name__)
@@ -159,21 +159,21 @@ class AnnotatedMcap:
         self._waiting = next(self._items, None)
         return self._waiting is not None
 
-    def write(self, frame: TrackedSnapshot) -> None:
+    def write(self, step: TrackedSnapshot) -> None:
         """Copy the input up to the map's log time, then add what was found in the map."""
-        time_ns = frame.snapshot.log_time_ns
-        self._extent.add(frame)
-        self._frame_id = frame.analysis.geometry.frame_id
+        time_ns = step.snapshot.log_time_ns
+        self._extent.add(step)
+        self._frame_id = step.analysis.geometry.frame_id
         with self._writing():
             self._copy_until(time_ns)
             made = {
-                "/rose2/segmented_map": self._maker.segmented_map(frame),
-                "/rose2/clean_map": self._maker.clean_map(frame),
-                "/rose2/markers": self._maker.markers(frame),
-                "/rose2/rooms": self._maker.rooms(frame),
+                "/rose2/segmented_map": self._maker.segmented_map(step),
+                "/rose2/clean_map": self._maker.clean_map(step),
+                "/rose2/markers": self._maker.markers(step),
+                "/rose2/rooms": self._maker.rooms(step),
             }
             if self._own_map is not None:
-                self._add(self._own_map, time_ns, self._maker.source_map(frame))
+                self._add(self._own_map, time_ns, self._maker.source_map(step))
             for topic, data in made.items():
                 if data is not None:
                     self._add(self._added[topic], time_ns, data)
@@ -244,7 +244,7 @@ class AnnotatedMcap:
         except DAMAGE as error:
             begin = chunk.index.chunk_start_offset
             text = f"{self._info.log_path}: the chunk at byte {begin} is damaged ({error}); it is not copied"
-            notice(logger, "not_copied", text, file=self._info.log_path)
+            log_warning(logger, "not_copied", text, file=self._info.log_path)
             self._input.leave_out(chunk)
             return
         for message in messages:
@@ -263,7 +263,7 @@ class AnnotatedMcap:
         if channel.key not in self._channels:
             if channel.topic.startswith(PREFIX):
                 raise OutputError(
-                    f"{self._info.log_path}: holds {channel.topic} already; analyse the log it was made from"
+                    f"{self._info.log_path}: holds {channel.topic} already; analyze the log it was made from"
                 )
             if self._is_bag and channel.message_encoding != "cdr":
                 raise OutputError(

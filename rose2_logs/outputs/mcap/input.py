@@ -18,7 +18,7 @@ from rose2_logs.io.mcap.index import McapFile
 from rose2_logs.io.mcap.records import INDEX, INDEX_ENTRY, Summary
 from rose2_logs.io.source import MessageSource
 from rose2_logs.outputs.mcap.ros_messages import ros2_typestore
-from rose2_logs.system.warnings import notice
+from rose2_logs.system.warnings import log_warning
 
 if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore
@@ -250,9 +250,9 @@ class _Files(CopiedLog):
                     data = file.decompressed(data)
                 if channel.key in self._converters:
                     data = self._converters[channel.key](bytes(data))
-            except Exception as error:  # whatever a deserialiser raises on bytes that are not what they say
+            except Exception as error:  # whatever a deserializer raises on bytes that are not what they say
                 text = f"{file.path}: a message on {channel.topic} cannot be copied ({error}); it is left out"
-                notice(logger, "not_copied", text, file=file.path, topic=channel.topic)
+                log_warning(logger, "not_copied", text, file=file.path, topic=channel.topic)
                 continue
             yield CopiedMessage(channel, message.log_time_ns, message.publish_time_ns, message.sequence, data)
 
@@ -307,7 +307,7 @@ def _definitions(channels: Sequence[Channel]) -> dict[str, Any]:
         except Exception as error:  # whatever a parser raises on a text that is none
             why = " ".join(str(error).split())
             text = f"the definition of {channel.schema_name} on {channel.topic} cannot be read ({why})"
-            notice(logger, "definition", f"{text}; the standard one is taken", topic=channel.topic)
+            log_warning(logger, "definition", f"{text}; the standard one is taken", topic=channel.topic)
     return types
 
 

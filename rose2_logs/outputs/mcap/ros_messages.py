@@ -12,11 +12,11 @@ import shapely
 from numpy.typing import NDArray
 
 from rose2_logs.config.parameters import OccupancyParameters
-from rose2_logs.drawing.palette import track_colour
+from rose2_logs.drawing.palette import track_color
 from rose2_logs.model.occupancy import UNKNOWN, FloatArray, classify
 from rose2_logs.model.room_quality import unsure_sign
 from rose2_logs.outputs.mcap.cdr import CdrWriter
-from rose2_logs.tracking.track_history import evidence_of
+from rose2_logs.tracking.track_history import quality_of
 from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ float64 area                # m2 of its known free cells
 float64 predicted_area      # m2 of its shape, the unseen part included
 geometry_msgs/Point label_point
 geometry_msgs/Polygon[] outline   # outer rings of its shape
-uint32[] neighbours         # tracks of the rooms that a doorway connects it with
+uint32[] neighbors         # tracks of the rooms that a doorway connects it with
 """
 WRITTEN_TYPES = ("nav_msgs/msg/OccupancyGrid", "visualization_msgs/msg/MarkerArray", ROOMS_TYPE)
 HIGHEST_VALUE = 98
@@ -102,7 +102,7 @@ def _type_name(kind: Any) -> str:
 
 
 class MessageMaker:
-    """Makes the serialised messages of a snapshot.
+    """Makes the serialized messages of a snapshot.
 
     Parameters
     ----------
@@ -122,35 +122,35 @@ class MessageMaker:
         """Text of a type's definition with all it is made of, as MCAP's ros2msg schema."""
         return self._store.generate_msgdef(message_type, ros_version=2)[0].encode()
 
-    def source_map(self, frame: TrackedSnapshot) -> bytearray:
+    def source_map(self, step: TrackedSnapshot) -> bytearray:
         """Make the map itself, for inputs that are no log of messages."""
-        return _grid(frame, frame.snapshot.cells)
+        return _grid(step, step.snapshot.cells)
 
-    def segmented_map(self, frame: TrackedSnapshot) -> bytearray:
+    def segmented_map(self, step: TrackedSnapshot) -> bytearray:
         """Make the segmented map: rooms as 1..98, occupied 100, other free cells 0, all others -1."""
-        values = np.array([0, *(1 + (track - 1) % HIGHEST_VALUE for track in frame.track_ids)], np.int8)
-        labels = frame.analysis.rooms.labels
+        values = np.array([0, *(1 + (track - 1) % HIGHEST_VALUE for track in step.track_ids)], np.int8)
+        labels = step.analysis.rooms.labels
         # A probability, as some maps hold, would look like a room.
-        known = np.ascontiguousarray(frame.snapshot.cells).view(np.uint8)
+        known = np.ascontiguousarray(step.snapshot.cells).view(np.uint8)
         cells = cv2.LUT(known, self._unroomed.view(np.uint8)).view(np.int8)
         np.copyto(cells, values.take(labels, mode="clip"), where=labels > 0)
-        return _grid(frame, cells)
+        return _grid(step, cells)
 
-    def clean_map(self, frame: TrackedSnapshot) -> bytearray | None:
+    def clean_map(self, step: TrackedSnapshot) -> bytearray | None:
         """Make the clean map: 100 where structure, 0 where free or clutter, -1 unknown; None without one."""
-        structure = frame.analysis.structure
+        structure = step.analysis.structure
         if structure is None:
             return None
-        known = np.minimum(frame.snapshot.cells, np.int8(0))
+        known = np.minimum(step.snapshot.cells, np.int8(0))
         np.copyto(known, np.int8(100), where=structure.clean)
-        return _grid(frame, known)
+        return _grid(step, known)
 
-    def rooms(self, frame: TrackedSnapshot) -> bytearray:
+    def rooms(self, step: TrackedSnapshot) -> bytearray:
         """Make the rooms message, by ascending track."""
-        rooms, tracks = frame.analysis.rooms, frame.track_ids
+        rooms, tracks = step.analysis.rooms, step.track_ids
         message = CdrWriter()
-        message.header(frame.snapshot.stamp_ns, frame.analysis.geometry.frame_id)
-        message.numbers("d", frame.coverage)
+        message.header(step.snapshot.stamp_ns, step.analysis.geometry.frame_id)
+        message.numbers("d", step.coverage)
         message.numbers("I", len(rooms))
         points = np.nan_to_num(rooms.label_points_m).tolist()
         for track, number in sorted(zip(tracks, range(1, len(rooms) + 1), strict=True)):
@@ -162,21 +162,21 @@ class MessageMaker:
             for ring in rings:
                 # The last corner of a ring repeats the first; a ROS polygon closes by itself.
                 message.points(ring[:-1], np.float32)
-            neighbours = sorted(tracks[other - 1] for other in rooms.neighbours(number))
-            message.sequence(np.array(neighbours, np.uint32))
+            neighbors = sorted(tracks[other - 1] for other in rooms.neighbors(number))
+            message.sequence(np.array(neighbors, np.uint32))
         return message.message()
 
-    def markers(self, frame: TrackedSnapshot) -> bytearray:
+    def markers(self, step: TrackedSnapshot) -> bytearray:
         """Make the markers: all old ones deleted, then fills, outlines, labels, walls, lines, doorways."""
-        analysis, rooms = frame.analysis, frame.analysis.rooms
+        analysis, rooms = step.analysis, step.analysis.rooms
         made = [Marker("", 0, TRIANGLES, action=DELETE_ALL)]
         points = np.nan_to_num(rooms.label_points_m).tolist()
         corners = self._triangles.corners_of(rooms.polygons)
-        for track, number in sorted(zip(frame.track_ids, range(len(rooms)), strict=True)):
-            red, green, blue = (value / 255 for value in track_colour(track))
+        for track, number in sorted(zip(step.track_ids, range(len(rooms)), strict=True)):
+            red, green, blue = (value / 255 for value in track_color(track))
             fill, line = (red, green, blue, FILL_OPACITY), (red * 0.7, green * 0.7, blue * 0.7, 1.0)
             x, y = points[number]
-            sign = unsure_sign(evidence_of(frame, number)[0])
+            sign = unsure_sign(quality_of(step, number)[0])
             made += [
                 Marker("rooms", track, TRIANGLES, corners[number], fill),
                 Marker(
@@ -191,7 +191,7 @@ class MessageMaker:
                     "labels",
                     track,
                     TEXT,
-                    colour=(0.0, 0.0, 0.0, 1.0),
+                    color=(0.0, 0.0, 0.0, 1.0),
                     width_m=LABEL_HEIGHT_M,
                     text=f"{track}{sign}\n{rooms.areas_m2[number]:.0f} m2",
                     position_m=(x, y),
@@ -207,7 +207,7 @@ class MessageMaker:
         heights = {name: LAYER_STEP_M * (layer + 1) for layer, name in enumerate(MARKER_LAYERS)}
         message = CdrWriter()
         message.numbers("I", len(made))
-        shared = SharedFields.of(frame.snapshot.stamp_ns, analysis.geometry.frame_id)
+        shared = SharedFields.of(step.snapshot.stamp_ns, analysis.geometry.frame_id)
         for marker in made:
             marker.write(message, shared, heights.get(marker.ns, 0.0))
         return message.message()
@@ -221,7 +221,7 @@ class SharedFields(NamedTuple):
     header : bytes
         Stamp and frame.
     after_points : bytes
-        Colours and texture, of which there are none, up to the text.
+        Colors and texture, of which there are none, up to the text.
     after_text : bytes
         The mesh, of which there is none.
     """
@@ -258,8 +258,8 @@ class Marker:
     kind : int
         Its type.
     points_m : (N, 2) float
-        World metres.
-    colour : (float, float, float, float)
+        World meters.
+    color : (float, float, float, float)
         Red, green, blue, opacity in [0, 1].
     width_m : float
         Scale: the width of lines, the height of text.
@@ -275,7 +275,7 @@ class Marker:
     number: int
     kind: int
     points_m: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
-    colour: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+    color: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
     width_m: float = 1.0
     action: int = ADD
     text: str = ""
@@ -288,7 +288,7 @@ class Marker:
         message.string(self.ns)
         message.numbers("i", self.number, self.kind, self.action)
         message.numbers("d", *self.position_m, height_m, *NO_TURN, width_m, width_m, width_m)
-        message.numbers("f", *self.colour)
+        message.numbers("f", *self.color)
         message.numbers("i", 0, 0)  # lifetime: for ever
         message.numbers("B", 0)  # frame_locked
         message.points(self.points_m)
@@ -297,9 +297,9 @@ class Marker:
         message.written(shared.after_text, 4)
 
 
-def _grid(frame: TrackedSnapshot, cells: NDArray[np.int8]) -> bytearray:
+def _grid(step: TrackedSnapshot, cells: NDArray[np.int8]) -> bytearray:
     """Make a nav_msgs/OccupancyGrid with the stamp and the geometry of the map."""
-    geometry, stamp_ns = frame.analysis.geometry, frame.snapshot.stamp_ns
+    geometry, stamp_ns = step.analysis.geometry, step.snapshot.stamp_ns
     message = CdrWriter()
     message.header(stamp_ns, geometry.frame_id)
     message.time(stamp_ns)  # map_load_time
@@ -321,7 +321,7 @@ class Triangles:
         self._known: dict[bytes, FloatArray] = {}
 
     def corners_of(self, shapes: Sequence[BaseGeometry]) -> list[FloatArray]:
-        """Corners (3 K, 2) of the triangles of each shape, world metres."""
+        """Corners (3 K, 2) of the triangles of each shape, world meters."""
         parts, shape = shapely.get_parts(np.array(shapes, object), return_index=True)
         keys = shapely.to_wkb(parts).tolist()
         new = {key: number for number, key in enumerate(keys) if key not in self._known}
@@ -353,7 +353,7 @@ def _triangulated(parts: NDArray[np.object_]) -> list[FloatArray]:
 
 
 def outer_rings(shape: BaseGeometry) -> list[FloatArray]:
-    """Closed outer rings (K, 2) of the polygons of a shape, world metres."""
+    """Closed outer rings (K, 2) of the polygons of a shape, world meters."""
     parts = shapely.get_parts(shape)
     rings = shapely.get_exterior_ring(parts[shapely.get_type_id(parts) == shapely.GeometryType.POLYGON])
     points, ring = shapely.get_coordinates(rings, return_index=True)
@@ -361,6 +361,6 @@ def outer_rings(shape: BaseGeometry) -> list[FloatArray]:
 
 
 def ring_segments(rings: Sequence[FloatArray]) -> FloatArray:
-    """Ends (2 N, 2) of the segments that closed rings are made of, world metres."""
+    """Ends (2 N, 2) of the segments that closed rings are made of, world meters."""
     ends = [np.repeat(ring, 2, axis=0)[1:-1] for ring in rings]
     return np.concatenate([np.zeros((0, 2)), *ends])

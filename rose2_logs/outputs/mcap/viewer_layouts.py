@@ -36,7 +36,7 @@ class MapScene:
     map_topic : str
         Where the map is sent.
     low_m, high_m : (2,) float
-        Corners of the part of the world to look at, metres.
+        Corners of the part of the world to look at, meters.
     qos : str
         Quality of service that all these topics are offered with, in rosbag2's spelling.
     """
@@ -48,7 +48,7 @@ class MapScene:
     qos: str
 
     @property
-    def centre_m(self) -> tuple[float, float]:
+    def center_m(self) -> tuple[float, float]:
         """Middle of what is in sight."""
         x, y = ((self.low_m + self.high_m) / 2).tolist()
         return x, y
@@ -135,7 +135,7 @@ def foxglove_layout(scene: MapScene) -> dict[str, Any]:
 
 
 def _foxglove_world(title: str, scene: MapScene, topics: dict[str, Any]) -> dict[str, Any]:
-    x, y = scene.centre_m
+    x, y = scene.center_m
     return {
         "foxglovePanelTitle": title,
         "cameraState": {
@@ -175,12 +175,12 @@ def _foxglove_plot(title: str, path: str) -> dict[str, Any]:
 
 def rviz_config(scene: MapScene) -> dict[str, Any]:
     """Make a configuration of RViz2: the maps, the markers over them, the frames, seen from above."""
-    x, y = scene.centre_m
+    x, y = scene.center_m
     width, height = RVIZ_VIEW_PX
     displays = [
         _rviz_map("Map", scene.map_topic, scene, is_on=True),
         _rviz_map("Clean map", "/rose2/clean_map", scene, is_on=False),
-        _rviz_map("Segmented map", "/rose2/segmented_map", scene, is_on=False, colours="costmap"),
+        _rviz_map("Segmented map", "/rose2/segmented_map", scene, is_on=False, colors="costmap"),
         {
             "Class": "rviz_default_plugins/MarkerArray",
             "Name": "Rooms",
@@ -239,13 +239,13 @@ def rviz_config(scene: MapScene) -> dict[str, Any]:
     }
 
 
-def _rviz_map(name: str, topic: str, scene: MapScene, *, is_on: bool, colours: str = "map") -> dict[str, Any]:
+def _rviz_map(name: str, topic: str, scene: MapScene, *, is_on: bool, colors: str = "map") -> dict[str, Any]:
     return {
         "Class": "rviz_default_plugins/Map",
         "Name": name,
         "Enabled": is_on,
         "Alpha": MAP_ALPHA,
-        "Color Scheme": colours,
+        "Color Scheme": colors,
         "Draw Behind": True,
         "Topic": _rviz_topic(topic, scene),
         "Update Topic": _rviz_topic(f"{topic}_updates", scene),

@@ -9,16 +9,16 @@ from typing import Any
 import numpy as np
 
 from rose2_logs.drawing.chart import Mark, Series, lane_chart, line_chart
-from rose2_logs.drawing.palette import state_colours
+from rose2_logs.drawing.palette import state_colors
 from rose2_logs.model.occupancy import BoolArray, FloatArray, IntArray
 from rose2_logs.model.room_quality import UNSURE_SIGN, unsure_sign
-from rose2_logs.outputs.report.words import css, css_colour, duration
+from rose2_logs.outputs.report.words import css, css_color, duration
 from rose2_logs.runs.folder import RunResults
 
 BLUE, ORANGE, GREEN, VIOLET = "#2f7ed8", "#e07b1a", "#2a9d5c", "#8a5fd0"
 AREAS_MOST = 8
 """Rooms whose area is drawn: the largest of the last map."""
-TRACK_COLUMNS = ["track", "shape_right_snapshot", "area_settled_snapshot", "outline_wall_share"]
+TRACK_COLUMNS = ["track", "shape_right_snapshot", "area_settled_snapshot", "wall_support"]
 LANES_MOST = 80
 """Rooms whose presence is drawn: those that were there in most maps."""
 
@@ -31,7 +31,7 @@ class Chart:
     ----------
     title, meaning : str
     legend : tuple of (str, str)
-        Names and CSS colours of the curves; empty where the chart names them itself.
+        Names and CSS colors of the curves; empty where the chart names them itself.
     over_coverage, over_time : str
         SVG.
     is_wide : bool
@@ -77,7 +77,7 @@ def run_charts(results: RunResults) -> list[Chart]:
             )
             for axis in axes
         ]
-        return Chart(title, meaning, tuple((each.name, each.colour) for each in series), drawn[0], drawn[1])
+        return Chart(title, meaning, tuple((each.name, each.color) for each in series), drawn[0], drawn[1])
 
     def percent(name: str) -> FloatArray:
         return 100 * snapshots[name].astype(float)
@@ -123,7 +123,7 @@ def run_charts(results: RunResults) -> list[Chart]:
         chart(
             "Area of the largest rooms, m²",
             "As far as they were seen.",
-            [Series(f"Room {numbers[k]}", areas[k], css_colour(int(numbers[k]))) for k in largest],
+            [Series(f"Room {numbers[k]}", areas[k], css_color(int(numbers[k]))) for k in largest],
         )
         if len(largest)
         else None,
@@ -201,17 +201,17 @@ def _lanes(
     shown = np.sort(np.argsort(-present.sum(1), kind="stable")[:LANES_MOST])
     if not len(shown):
         return []
-    lives = {row["track"]: row for row in results.table("tracks", TRACK_COLUMNS).to_pylist()}
-    rows = [lives[int(number)] for number in numbers[shown]]
+    histories = {row["track"]: row for row in results.table("tracks", TRACK_COLUMNS).to_pylist()}
+    rows = [histories[int(number)] for number in numbers[shown]]
     title = "When each room was there, and when it was right"
-    names = [f"{row['track']}{unsure_sign(row['outline_wall_share'])}" for row in rows]
-    colours = [{state: css(colour) for state, colour in state_colours(row["track"]).items()} for row in rows]
+    names = [f"{row['track']}{unsure_sign(row['wall_support'])}" for row in rows]
+    colors = [{state: css(color) for state, color in state_colors(row["track"]).items()} for row in rows]
     states = _states(results.snapshots["snapshot"], rows, present[shown])
     draw: Callable[[RunAxis], str] = lambda axis: lane_chart(  # noqa: E731
         axis.x,
         states,
         names,
-        colours,
+        colors,
         title=title,
         x_label=axis.label,
         marks=axis.marks,
@@ -222,7 +222,7 @@ def _lanes(
         "A lane for each room, by its number: pale while it forms, stronger once its shape was right, full "
         f"once its area has settled. {UNSURE_SIGN}: few walls back its last outline."
     ) + (f" {left_out} rooms that were there only shortly are left out." if left_out else "")
-    legend = tuple(colours[0].items())
+    legend = tuple(colors[0].items())
     return [Chart(title, meaning, legend, draw(axes[0]), draw(axes[1]), is_wide=True)]
 
 

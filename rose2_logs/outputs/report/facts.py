@@ -63,7 +63,7 @@ def tiles(results: RunResults, plan: RoomPlan) -> list[Tile]:
     seen = sum(room.area_m2 for room in plan.rooms)
     shapes = sum(room.predicted_area_m2 for room in plan.rooms)
     final = layout.get("final_since")
-    sure = layout.get("outline_wall_share_median")
+    sure = layout.get("wall_support_median")
     return [
         Tile(
             "Maps",
@@ -91,8 +91,8 @@ def _final(final: dict[str, Any] | None, last: int) -> tuple[str, str]:
     """Say from what map on the layout was final; if that is the last, it never was for sure."""
     if final is None or is_last(final, last):
         return NOT_FINAL, "it changed up to the last map"
-    moment = f"map {final['snapshot']}, {duration(final['time_s'])} into the run"
-    return f"{percent(final['coverage'])} coverage", moment
+    snapshot_ref = f"map {final['snapshot']}, {duration(final['time_s'])} into the run"
+    return f"{percent(final['coverage'])} coverage", snapshot_ref
 
 
 def notes(results: RunResults, plan: RoomPlan) -> list[Note]:
@@ -101,7 +101,7 @@ def notes(results: RunResults, plan: RoomPlan) -> list[Note]:
     found, messages = summary["results"], summary.get("messages", {})
     told: list[Note] = []
     if found.get("invalid_maps"):
-        told.append(Note(f"{found['invalid_maps']} maps could not be analysed and were left out."))
+        told.append(Note(f"{found['invalid_maps']} maps could not be analyzed and were left out."))
     if messages.get("damaged"):
         told.append(Note(f"{messages['damaged']} messages of the log were damaged and were left out."))
     if found["snapshots"] > 1:
@@ -114,9 +114,9 @@ def notes(results: RunResults, plan: RoomPlan) -> list[Note]:
         )
         told.append(Note(taken, is_warning=False))
     row = results.row(results.choose())
-    if row["analysed_resolution_m"] > row["resolution_m"] * 1.001:
-        cells = f"{row['analysed_resolution_m']:g} m instead of {row['resolution_m']:g} m"
-        coarse = f"The maps were analysed in cells of {cells}."
+    if row["analyzed_resolution_m"] > row["resolution_m"] * 1.001:
+        cells = f"{row['analyzed_resolution_m']:g} m instead of {row['resolution_m']:g} m"
+        coarse = f"The maps were analyzed in cells of {cells}."
         told.append(Note(coarse, is_warning=False))
     if results.annotated_log is None:
         told.append(
@@ -144,7 +144,9 @@ def _layout_notes(layout: dict[str, Any], last: int) -> list[Note]:
 def _room_notes(plan: RoomPlan) -> list[Note]:
     told = []
     unsure = sorted(
-        (room.confidence, room.name) for room in plan.rooms if room.confidence is not None and room.is_unsure
+        (room.wall_support, room.name)
+        for room in plan.rooms
+        if room.wall_support is not None and room.is_unsure
     )
     if unsure:
         names = _listed([f"{name} ({percent(sure)})" for sure, name in unsure])

@@ -66,7 +66,7 @@ def write_reports(
     Parameters
     ----------
     folder : path
-        What `analyse_log` or a batch has written.
+        What `analyze_log` or a batch has written.
     out : path, optional
         The page of one log; of several the folder for their pages. By default each lies with its results.
     panels, overwrite
@@ -115,7 +115,7 @@ def write_reports(
 
 
 def _failures(folder: Path) -> list[tuple[str, str]]:
-    """Names of the logs that a batch could not analyse, and why."""
+    """Names of the logs that a batch could not analyze, and why."""
     try:
         with (folder / BATCH_SUMMARY).open(encoding="utf-8", newline="") as file:
             rows = list(csv.DictReader(file))
@@ -129,7 +129,7 @@ def _picture(results: RunResults) -> str:
     """Picture of the last layout as a data URI."""
     with results.open_maps() as maps:
         plan = results.plan(results.choose(), maps)
-    return png_uri(as_pixels(draw_plan(plan, PICTURE), PICTURE_PX), few_colours=True)
+    return png_uri(as_pixels(draw_plan(plan, PICTURE), PICTURE_PX), few_colors=True)
 
 
 def _table(rows: list[tuple[Cell, ...]]) -> Table:
@@ -170,6 +170,6 @@ def _row(results: RunResults, name: str) -> tuple[Cell, ...]:
         count(events.get("split", 0)),
         count(events.get("merged", 0)),
         count(events.get("shifted", 0)),
-        share(layout.get("outline_wall_share_median")),
+        share(layout.get("wall_support_median")),
         number(layout.get("frontier_m")),
     )

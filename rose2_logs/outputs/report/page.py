@@ -43,7 +43,7 @@ def write_report(
     Parameters
     ----------
     folder : path
-        What `analyse_log` has written.
+        What `analyze_log` has written.
     out : path, optional
         The page; by default ``report.html`` in the folder.
     panels : int

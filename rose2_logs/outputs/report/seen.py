@@ -1,4 +1,4 @@
-"""When the rooms of the last map were seen: the layout's growth by `analyze --smooth`."""
+"""When the rooms of the last map were seen: the layout's growth by `analyze --back-project`."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from rose2_logs.drawing.chart import ShareLane, share_lanes
 from rose2_logs.model.occupancy import FloatArray
 from rose2_logs.outputs.report.charts import LANES_MOST, run_axes
-from rose2_logs.outputs.report.words import Cell, Column, Table, css_colour, number, room, share, when
+from rose2_logs.outputs.report.words import Cell, Column, Table, css_color, number, room, share, when
 from rose2_logs.runs.folder import RunResults
 
 MOSTLY = 0.9
@@ -27,7 +27,7 @@ class SeenRooms:
 
 
 def seen_rooms(results: RunResults) -> SeenRooms | None:
-    """Tell when each room of the last map was first seen, and mostly; None where the run was not smoothed."""
+    """Find when each room of the last map was first, and mostly, seen; None without back projection."""
     tracks, shares, areas_m2 = _shares(results)
     if not len(tracks) or shares.shape[1] < 2:
         return None
@@ -50,7 +50,7 @@ def seen_rooms(results: RunResults) -> SeenRooms | None:
             str(tracks[each]),
             f"{row[0].text}: first seen at {row[2].text}, {MOSTLY:.0%} of it at {row[4].text} coverage",
             np.minimum(shares[each], 1.0),
-            css_colour(int(tracks[each])),
+            css_color(int(tracks[each])),
             int(mostly[each]) if mostly[each] < len(axis.x) else None,
         )
         for each, row in rows.items()
@@ -77,7 +77,7 @@ def seen_rooms(results: RunResults) -> SeenRooms | None:
 
 def _shares(results: RunResults) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
     """Tracks (R,) of the last map's rooms, the share (R, N) that each map shows, their areas (R,)."""
-    table = results.smoothed()
+    table = results.back_projected()
     if table is None:
         return np.zeros(0, np.int64), np.zeros((0, 0)), np.zeros(0)
     snapshot, track, seen = (table[name].to_numpy() for name in ("snapshot", "track", "last_area_share"))

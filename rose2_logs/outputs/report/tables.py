@@ -39,7 +39,7 @@ EVENT_WORDS = {
 def room_table(results: RunResults, plan: RoomPlan) -> Table:
     """Every room of the run: where it is at the end, and since when it was right."""
     tracks = results.table("tracks").drop_columns(["polygon_wkb"]).to_pylist()
-    neighbours = {each.number: each.neighbours for each in plan.rooms}
+    neighbors = {each.number: each.neighbors for each in plan.rooms}
     tracks.sort(key=lambda row: (not row["in_last_map"], -row["area_m2"]))
     shown = sorted(tracks[:ROWS_MOST], key=lambda row: (not row["in_last_map"], row["track"]))
     rows = [
@@ -48,9 +48,9 @@ def room_table(results: RunResults, plan: RoomPlan) -> Table:
             Cell("yes" if row["in_last_map"] else "no"),
             number(row["area_m2"]),
             number(row["predicted_area_m2"]),
-            share(row["outline_wall_share"]),
+            share(row["wall_support"]),
             number(row["frontier_m"]),
-            Cell(", ".join(str(other) for other in neighbours.get(row["track"], ())) or MISSING),
+            Cell(", ".join(str(other) for other in neighbors.get(row["track"], ())) or MISSING),
             share(row["first_coverage"]),
             when(row["first_time_s"]),
             share(row["shape_right_coverage"]),
@@ -85,7 +85,7 @@ def room_table(results: RunResults, plan: RoomPlan) -> Table:
 
 
 def doorway_table(results: RunResults, plan: RoomPlan) -> Table:
-    """Doorways of the last map, and since when their rooms were known as neighbours."""
+    """Doorways of the last map, and since when their rooms were known as neighbors."""
     known = results.table("doorways", ["snapshot", "track_a", "track_b"])
     first: dict[tuple[int, int], int] = {}
     columns = (known[name].to_pylist() for name in ("snapshot", "track_a", "track_b"))

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
-from rose2_logs.drawing.palette import track_colour
+from rose2_logs.drawing.palette import track_color
 from rose2_logs.system.text import percent
 
 CLOCK_FROM_NS = 10**18
@@ -24,13 +24,13 @@ class Cell:
         What it shows.
     order : float, str or None
         What it is sorted by; by default its text, None for a missing value.
-    colour : str
-        CSS colour of a sample before the text; empty for none.
+    color : str
+        CSS color of a sample before the text; empty for none.
     """
 
     text: str
     order: float | str | None = None
-    colour: str = ""
+    color: str = ""
 
 
 @dataclass(frozen=True)
@@ -89,18 +89,18 @@ def when(seconds: float | None) -> Cell:
 
 
 def room(track: int) -> Cell:
-    """Cell of a room, with its colour."""
-    return Cell(f"Room {track}", float(track), css_colour(track))
+    """Cell of a room, with its color."""
+    return Cell(f"Room {track}", float(track), css_color(track))
 
 
-def css_colour(track: int) -> str:
-    """Colour of a track as CSS has it."""
-    return css(track_colour(track))
+def css_color(track: int) -> str:
+    """Color of a track as CSS has it."""
+    return css(track_color(track))
 
 
-def css(colour: tuple[int, int, int]) -> str:
-    """Colour, its red, green and blue in 0..255, as CSS has it."""
-    return "#{:02x}{:02x}{:02x}".format(*colour)
+def css(color: tuple[int, int, int]) -> str:
+    """Color, its red, green and blue in 0..255, as CSS has it."""
+    return "#{:02x}{:02x}{:02x}".format(*color)
 
 
 def duration(seconds: float) -> str:

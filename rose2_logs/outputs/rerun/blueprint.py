@@ -11,7 +11,7 @@ import rerun.blueprint as rrb
 from rose2_logs.config.run_options import RECORDING_LAYERS
 from rose2_logs.model.occupancy import FloatArray
 from rose2_logs.outputs.rerun.lanes import FINAL_IOU, FINAL_SHARE, LIVES, SHIFTS
-from rose2_logs.outputs.rerun.projected import SEEN_SHARE, SMOOTHED
+from rose2_logs.outputs.rerun.projected import BACK_PROJECTED, SEEN_SHARE
 from rose2_logs.outputs.rerun.world import (
     CLEAN,
     DOORWAYS,
@@ -46,18 +46,18 @@ def make_blueprint(
     high_m: FloatArray,
     layers: Collection[str] = RECORDING_LAYERS,
     *,
-    smoothed: bool = False,
+    back_projected: bool = False,
 ) -> rrb.Blueprint:
-    """Map from above, a tab for each stage of the method, beside curves, lives of rooms, events, summary.
+    """Map from above, a tab for each stage of the method, beside curves, histories of rooms, events, summary.
 
     Parameters
     ----------
     low_m, high_m : (2,) float
-        Corners of what is shown, world metres.
+        Corners of what is shown, world meters.
     layers : collection of str
         The optional layers that the recording has; tabs without any are left out.
-    smoothed : bool
-        Whether it has the smoothed rooms.
+    back_projected : bool
+        Whether it has the back-projected rooms.
     """
     stages = (
         ("Rooms", (), ()),
@@ -68,12 +68,12 @@ def make_blueprint(
         ("Voronoi graph", ("voronoi",), (VORONOI,)),
     )
     views: list[rrb.View] = [
-        _map_view(name, low_m, high_m, shown, (SMOOTHED,) if smoothed else ())
+        _map_view(name, low_m, high_m, shown, (BACK_PROJECTED,) if back_projected else ())
         for name, needed, shown in stages
         if not needed or set(needed) & set(layers)
     ]
-    if smoothed:
-        views.insert(1, _map_view("Smoothed rooms", low_m, high_m, (SMOOTHED,)))
+    if back_projected:
+        views.insert(1, _map_view("Smoothed rooms", low_m, high_m, (BACK_PROJECTED,)))
     if "spectrum" in layers:
         eye = eye_above(np.array([-1.0, -1.0]), np.array([1.0, 1.0]))
         views.append(
@@ -91,7 +91,7 @@ def make_blueprint(
                 rrb.Tabs(
                     _lives(),
                     _curves("Area, m²", ("/run/area/**",), legend=False),
-                    *([_curves("Seen share", (f"{SEEN_SHARE}/**",), legend=False)] if smoothed else []),
+                    *([_curves("Seen share", (f"{SEEN_SHARE}/**",), legend=False)] if back_projected else []),
                     _curves("Count", ("/run/rooms",)),
                     _curves("Change", ("/run/variation_bits",)),
                     active_tab=0,
@@ -123,7 +123,7 @@ def _map_view(
 ) -> rrb.Spatial3DView:
     """View of the map with some of the switched layers on; rooms step back where others are looked at."""
     hidden = [*(path for path in SWITCHED if path not in shown), *off]
-    if SMOOTHED in shown:
+    if BACK_PROJECTED in shown:
         hidden += [FILLS, ROOMS, PREDICTED, DOORWAYS]
     elif shown:
         hidden += [PREDICTED, PATH, ROBOT]
@@ -158,11 +158,11 @@ def view_side_m(low_m: FloatArray, high_m: FloatArray, aspect: float = MAP_ASPEC
 
 def eye_above(low: FloatArray, high: FloatArray, aspect: float = MAP_ASPECT) -> rrb.EyeControls3D:
     """Look from above so that a rectangle fills a view of such an aspect."""
-    centre, height = (low + high) / 2, EYE_HEIGHT * view_side_m(low, high, aspect)
+    center, height = (low + high) / 2, EYE_HEIGHT * view_side_m(low, high, aspect)
     return rrb.EyeControls3D(
         kind=rrb.Eye3DKind.Orbital,
-        position=[centre[0], centre[1] - 1e-3 * height, height],
-        look_target=[centre[0], centre[1], 0.0],
+        position=[center[0], center[1] - 1e-3 * height, height],
+        look_target=[center[0], center[1], 0.0],
         eye_up=[0.0, 1.0, 0.0],
     )
 

@@ -100,8 +100,8 @@ def _is_hidden(path: Path) -> bool:
 def _set_layout(server: Server, name: str, recordings: Sequence[Path], scratch: Path) -> None:
     """Open every run in our layout: the one in each file counts only where it is opened alone."""
     layout = scratch / "layout.rbl"
-    smoothed = any(path.with_name("smoothed.parquet").is_file() for path in recordings)
-    make_blueprint(*_corners_m(recordings), smoothed=smoothed).save("rose2_logs", str(layout))
+    back_projected = any(path.with_name("back_projected.parquet").is_file() for path in recordings)
+    make_blueprint(*_corners_m(recordings), back_projected=back_projected).save("rose2_logs", str(layout))
     try:
         server.client().get_dataset(name).register_blueprint(layout.as_uri())
     except ImportError:
@@ -111,7 +111,7 @@ def _set_layout(server: Server, name: str, recordings: Sequence[Path], scratch: 
 
 
 def _corners_m(recordings: Sequence[Path]) -> tuple[FloatArray, FloatArray]:
-    """Corners (2,), in world metres, of the part of the world where the runs have their rooms."""
+    """Corners (2,), in world meters, of the part of the world where the runs have their rooms."""
     import pyarrow.parquet as pq
 
     points = []

@@ -24,13 +24,13 @@ class Strips:
         Corners of all strips, one after the other.
     lengths : (S,) int32
         Number of corners of each strip.
-    colours : (S, 3) uint8, optional
+    colors : (S, 3) uint8, optional
         Of each strip, where they are not styled once for all.
     """
 
     points_m: NDArray[np.float32]
     lengths: NDArray[np.int32]
-    colours: NDArray[np.uint8] | None = None
+    colors: NDArray[np.uint8] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +40,7 @@ class Picture:
     Attributes
     ----------
     pixels : (H, W) or (H, W, 4) uint8
-        Grey or colours, the top row first.
+        Gray or colors, the top row first.
     cell_m : float
         Side of a pixel.
     corner_m : (float, float, float)
@@ -48,7 +48,7 @@ class Picture:
     yaw_rad : float
         How it is turned, counter-clockwise.
     colormap : Colormap, optional
-        Of grey pixels; the same in all rows.
+        Of gray pixels; the same in all rows.
     """
 
     pixels: NDArray[np.uint8]
@@ -60,7 +60,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class Label:
-    """A text at a point of the world, metres."""
+    """A text at a point of the world, meters."""
 
     point_m: tuple[float, float, float]
     text: str
@@ -109,8 +109,8 @@ def _strips(rows: Sequence[Strips]) -> rr.ComponentColumnList:
     points = rr.encodings.Vec3DBatch(np.concatenate([row.points_m for row in rows])).as_arrow_array()
     # As Rerun does it itself for arrays of strips that are all of one length.
     strips = pa.ListArray.from_arrays(pa.array(ends), points, type=_STRIPS_TYPE)
-    colours = [row.colours for row in rows if row.colours is not None]
-    columns = rr.LineStrips3D.columns(strips=strips, colors=np.concatenate(colours) if colours else None)
+    colors = [row.colors for row in rows if row.colors is not None]
+    columns = rr.LineStrips3D.columns(strips=strips, colors=np.concatenate(colors) if colors else None)
     return columns.partition([len(row.lengths) for row in rows])
 
 

@@ -15,8 +15,8 @@ from rose2_logs.comparison.final_layout import FinalLayout
 from rose2_logs.comparison.layouts import LayoutComparison
 from rose2_logs.comparison.room_changes import ROOM_STATUSES
 from rose2_logs.comparison.wall_changes import WALL_STATUSES
-from rose2_logs.drawing.layout_picture import ROOM_COLOURS, WALL_COLOURS
-from rose2_logs.drawing.palette import track_colour
+from rose2_logs.drawing.layout_picture import ROOM_COLORS, WALL_COLORS
+from rose2_logs.drawing.palette import track_color
 from rose2_logs.model.labels import known_window
 from rose2_logs.model.occupancy import UNKNOWN, FloatArray
 from rose2_logs.outputs.mcap.ros_messages import outer_rings
@@ -31,7 +31,7 @@ WALL_POINTS = 4.0
 """Width of walls that differ in points of the screen."""
 FAINT = (110, 110, 110)
 CELLS_OF_A, CELLS_OF_B = (200, 120, 120), (120, 140, 200)
-"""Colours of both maps' occupied cells below what differs."""
+"""Colors of both maps' occupied cells below what differs."""
 ROOM_ALPHA = 150
 """The map shows through rooms of this opacity, of 255."""
 WIDE_VIEW, FLAT_VIEW = 1.05, 1.65
@@ -78,9 +78,9 @@ def _log_layout(
     group_of = {track: number for number, tracks in enumerate(groups, start=1) for track in tracks}
     named = list(zip(layout.tracks, layout.shapes_moved(motion), strict=True))
     for track, shape in named:
-        fill = _mesh([shape], track_colour(group_of[track]), ROOM_ALPHA)
+        fill = _mesh([shape], track_color(group_of[track]), ROOM_ALPHA)
         recording.log(f"/{root}/rooms/{track}", fill, static=True)
-    rings = [(ring, track_colour(group_of[track])) for track, shape in named for ring in outer_rings(shape)]
+    rings = [(ring, track_color(group_of[track])) for track, shape in named for ring in outer_rings(shape)]
     recording.log(f"/{root}/outlines", _strips(rings, OUTLINE_POINTS, OUTLINES), static=True)
     recording.log(
         f"/{root}/names", _names([shape for _, shape in named], list(map(str, layout.tracks))), static=True
@@ -94,13 +94,13 @@ def _log_layout(
 
 def _log_differences(recording: rr.RecordingStream, comparison: LayoutComparison) -> None:
     # Both maps' walls below what differs.
-    for root, layout, motion, colour in (
+    for root, layout, motion, color in (
         ("walls_of_a", comparison.a, RigidMotion.none(), CELLS_OF_A),
         ("walls_of_b", comparison.b, comparison.placement.motion, CELLS_OF_B),
     ):
-        points = motion.points(layout.map.snapshot.geometry.cell_centres(*np.nonzero(layout.map.occupied)))
+        points = motion.points(layout.map.snapshot.geometry.cell_centers(*np.nonzero(layout.map.occupied)))
         radius = layout.map.resolution_m / 2
-        cells = rr.Points3D(lifted(points, CELLS), radii=radius, colors=[colour])
+        cells = rr.Points3D(lifted(points, CELLS), radii=radius, colors=[color])
         recording.log(f"/difference/{root}", cells, static=True)
     for status in ROOM_STATUSES:
         changes = [change for change in comparison.rooms if change.status == status]
@@ -108,8 +108,8 @@ def _log_differences(recording: rr.RecordingStream, comparison: LayoutComparison
             continue
         path = f"/difference/rooms/{status.replace(' ', '_')}"
         wholes = [shapely.union(change.shape_a, change.shape_b) for change in changes]
-        recording.log(f"{path}/fill", _mesh(wholes, ROOM_COLOURS[status]), static=True)
-        dark = tuple(int(value * OUTLINE_SHADE) for value in ROOM_COLOURS[status])
+        recording.log(f"{path}/fill", _mesh(wholes, ROOM_COLORS[status]), static=True)
+        dark = tuple(int(value * OUTLINE_SHADE) for value in ROOM_COLORS[status])
         rings = [
             (ring, dark)
             for change in changes
@@ -123,7 +123,7 @@ def _log_differences(recording: rr.RecordingStream, comparison: LayoutComparison
     for wall_status in WALL_STATUSES:
         walls = comparison.walls.changes if comparison.walls is not None else ()
         lines = [
-            (ends.reshape(2, 2), WALL_COLOURS[wall_status])
+            (ends.reshape(2, 2), WALL_COLORS[wall_status])
             for wall in walls
             if wall.status == wall_status
             for ends in (wall.ends_a_m, wall.ends_b_m)
@@ -143,7 +143,7 @@ def _map(layout: FinalLayout, motion: RigidMotion) -> rr.GridMap:
     snapshot = layout.map.snapshot
     window = known_window(snapshot.cells != UNKNOWN)
     place = motion.grid(snapshot.geometry.part(window))
-    # As an unsigned byte unknown is 255, which is what the RViz colours expect; a picture begins at its top.
+    # As an unsigned byte unknown is 255, which is what the RViz colors expect; a picture begins at its top.
     pixels = np.ascontiguousarray(snapshot.cells[window][::-1]).view(np.uint8)
     turn = rr.Quaternion(xyzw=(0.0, 0.0, float(np.sin(place.yaw_rad / 2)), float(np.cos(place.yaw_rad / 2))))
     return rr.GridMap(
@@ -163,12 +163,12 @@ def _strips(
 ) -> rr.LineStrips3D:
     return rr.LineStrips3D(
         [lifted(points, layer) for points, _ in lines],
-        colors=[colour for _, colour in lines],
+        colors=[color for _, color in lines],
         radii=rr.components.Radius.ui_points(width_points),
     )
 
 
-def _mesh(shapes: list[BaseGeometry], colour: tuple[int, int, int], alpha: int = 255) -> rr.Mesh3D:
+def _mesh(shapes: list[BaseGeometry], color: tuple[int, int, int], alpha: int = 255) -> rr.Mesh3D:
     """Fill shapes with triangles."""
     triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(shapes))
     # The last corner of a ring is its first.
@@ -176,7 +176,7 @@ def _mesh(shapes: list[BaseGeometry], colour: tuple[int, int, int], alpha: int =
     return rr.Mesh3D(
         vertex_positions=lifted(corners, FILLS),
         triangle_indices=np.arange(len(corners)).reshape(-1, 3),
-        vertex_colors=np.tile(np.array([*colour, alpha], np.uint8), (len(corners), 1)),
+        vertex_colors=np.tile(np.array([*color, alpha], np.uint8), (len(corners), 1)),
     )
 
 

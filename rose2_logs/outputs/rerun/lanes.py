@@ -1,4 +1,4 @@
-"""Each room's life as a lane over the run, and how right the layout was: known when the run is over."""
+"""Each room's history as a lane over the run, and how right the layout was: known when the run is over."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from array import array
 import numpy as np
 import rerun as rr
 
-from rose2_logs.drawing.palette import FORMING, SETTLED, SHAPED, state_colours
+from rose2_logs.drawing.palette import FORMING, SETTLED, SHAPED, state_colors
 from rose2_logs.outputs.rerun.layers import Instant, time_columns
-from rose2_logs.tracking.convergence import Hindsight
-from rose2_logs.tracking.track_history import Moment
+from rose2_logs.tracking.convergence import Convergence
+from rose2_logs.tracking.track_history import SnapshotRef
 
 LIVES, FINAL_SHARE, FINAL_IOU = "/room", "/run/final_share", "/run/final_iou"
 SHIFTS = "/run/map_shifted"
@@ -44,16 +44,16 @@ class Lives:
         self._shown = now
         self._times.extend(instant)
 
-    def log(self, hindsight: Hindsight | None) -> None:
+    def log(self, convergence: Convergence | None) -> None:
         """Log everything, once, after the last map."""
         instants = [
             Instant(*each) for each in np.array(self._times).reshape(-1, len(Instant._fields)).tolist()
         ]
         number = {instant.snapshot: index for index, instant in enumerate(instants)}
         for track, turns in sorted(self._turns.items()):
-            changes = self._changes(track, turns, number, hindsight)
+            changes = self._changes(track, turns, number, convergence)
             path = f"{LIVES}/{track:03d}"
-            tints = state_colours(track)
+            tints = state_colors(track)
             self._recording.log(
                 path,
                 rr.StateConfiguration(values=list(tints), colors=list(tints.values())),
@@ -62,10 +62,10 @@ class Lives:
             times = time_columns([instants[index] for index in changes])
             states = rr.StateChange.columns(state=list(changes.values()))
             self._recording.send_columns(path, times, states)
-        if hindsight is not None:
+        if convergence is not None:
             for path, figures in (
-                (FINAL_SHARE, hindsight.final_share),
-                (FINAL_IOU, hindsight.final_iou),
+                (FINAL_SHARE, convergence.final_share),
+                (FINAL_IOU, convergence.final_iou),
             ):
                 known = [(at, figures.get(at.snapshot)) for at in instants]
                 points = [(at, value) for at, value in known if value is not None]
@@ -78,15 +78,15 @@ class Lives:
         return len(self._times) // len(Instant._fields)
 
     def _changes(
-        self, track: int, turns: list[int], number: dict[int, int], hindsight: Hindsight | None
+        self, track: int, turns: list[int], number: dict[int, int], convergence: Convergence | None
     ) -> dict[int, str]:
         """State of a room from each index on where it changes, in order."""
 
-        def index_of(moment: Moment | None) -> int:
-            return self._maps if moment is None else number[moment.snapshot]
+        def index_of(snapshot_ref: SnapshotRef | None) -> int:
+            return self._maps if snapshot_ref is None else number[snapshot_ref.snapshot]
 
-        shaped = index_of(None if hindsight is None else hindsight.shape_right.get(track))
-        settled = index_of(None if hindsight is None else hindsight.area_settled.get(track))
+        shaped = index_of(None if convergence is None else convergence.shape_right.get(track))
+        settled = index_of(None if convergence is None else convergence.area_settled.get(track))
         ends = [*turns, self._maps] if len(turns) % 2 else turns
         changes: dict[int, str] = {}
         for begin, end in zip(ends[::2], ends[1::2], strict=True):

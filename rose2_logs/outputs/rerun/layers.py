@@ -156,7 +156,7 @@ def time_columns(instants: Sequence[Instant]) -> list[rr.TimeColumn]:
 
 # What `dataclasses.fields` would tell of each layer again.
 _VALUES = {
-    Strips: attrgetter("points_m", "lengths", "colours"),
+    Strips: attrgetter("points_m", "lengths", "colors"),
     Picture: attrgetter("pixels", "cell_m", "corner_m", "yaw_rad", "colormap"),
     Label: attrgetter("point_m", "text"),
     Scalar: attrgetter("value"),

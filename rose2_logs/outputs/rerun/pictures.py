@@ -1,4 +1,4 @@
-"""Cells of a map as the pictures of a recording: their pixels, painted by tables of colours."""
+"""Cells of a map as the pictures of a recording: their pixels, painted by tables of colors."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from rose2_logs.drawing.palette import track_colour
+from rose2_logs.drawing.palette import track_color
 from rose2_logs.model.labels import known_window
 from rose2_logs.model.occupancy import FloatArray, OccupancySnapshot
 from rose2_logs.outputs.rerun.columns import Picture
 
 FILL_OPACITY = 0.6
-"""Share of a room's colour in its cells: the map shows through."""
+"""Share of a room's color in its cells: the map shows through."""
 CLUTTER_VALUE = 20
 """Occupancy that cells left out of the clean map are drawn with: they can be seen and do not matter."""
 _VALUES = np.arange(256, dtype=np.uint8)
 CLUTTER_VALUES = np.where(_VALUES.view(np.int8) > 0, np.uint8(CLUTTER_VALUE), _VALUES)
 """What a cell of each value, as an unsigned byte, is drawn with that is no structure."""
 UNKNOWN_SHADE = 205
-"""Grey of unknown cells, as map_server draws them."""
+"""Gray of unknown cells, as map_server draws them."""
 
 
 class MapPictures:
@@ -38,7 +38,7 @@ class MapPictures:
         rows, columns = known_window(snapshot.cells >= 0)
         # A picture begins at its top, a grid at its origin.
         self._part = (slice(rows.stop - 1, rows.start - 1 if rows.start else None, -1), columns)
-        # As an unsigned byte unknown is 255, which is what the RViz colours expect.
+        # As an unsigned byte unknown is 255, which is what the RViz colors expect.
         self._cells = np.ascontiguousarray(snapshot.cells[self._part]).view(np.uint8)
         self._place = snapshot.geometry.part((rows, columns))
         self.corners_m = self._place.corners_m()
@@ -48,14 +48,14 @@ class MapPictures:
         return self._picture(self._cells, height_m, rr.components.Colormap.RvizMap)
 
     def rooms(self, labels: NDArray[np.int32], track_ids: Sequence[int], height_m: float) -> Picture:
-        """Draw the map with each room of a label image (H, W) in the colour of its track."""
+        """Draw the map with each room of a label image (H, W) in the color of its track."""
         shades = _shades()
-        colours = np.array([track_colour(track) for track in track_ids], float).reshape(-1, 1, 3)
-        painted = FILL_OPACITY * colours + (1 - FILL_OPACITY) * shades
+        colors = np.array([track_color(track) for track in track_ids], float).reshape(-1, 1, 3)
+        painted = FILL_OPACITY * colors + (1 - FILL_OPACITY) * shades
         return self._picture(self._painted(labels[self._part], [shades, *painted]), height_m)
 
     def clean_map(self, clean: NDArray[np.bool_], height_m: float) -> Picture:
-        """Draw the clean map (H, W): structure black, what was left out of it light grey."""
+        """Draw the clean map (H, W): structure black, what was left out of it light gray."""
         cells = np.asarray(cv2.LUT(self._cells, CLUTTER_VALUES), np.uint8)
         np.copyto(cells, 100, where=clean[self._part])
         return self._picture(cells, height_m, rr.components.Colormap.RvizMap)
@@ -66,10 +66,10 @@ class MapPictures:
         return self._picture(np.asarray(shown, np.uint8), height_m, rr.components.Colormap.Inferno)
 
     def _painted(
-        self, labels: NDArray[np.integer] | NDArray[np.bool_], colours: Iterable[FloatArray]
+        self, labels: NDArray[np.integer] | NDArray[np.bool_], colors: Iterable[FloatArray]
     ) -> NDArray[np.uint8]:
-        """Pixels (H, W, 4): for each label 0..K one table (256, 3) of the colour of each value of a cell."""
-        opaque = [np.pad(table, ((0, 0), (0, 1)), constant_values=255).astype(np.uint8) for table in colours]
+        """Pixels (H, W, 4): for each label 0..K one table (256, 3) of the color of each value of a cell."""
+        opaque = [np.pad(table, ((0, 0), (0, 1)), constant_values=255).astype(np.uint8) for table in colors]
         # A pixel as one number is looked up several times faster than as four.
         table = np.concatenate(opaque).view(np.uint32).ravel()
         index = labels.astype(np.intp)
@@ -95,7 +95,7 @@ def spectrum_picture(spectrum: NDArray[np.uint8], yaw_rad: float) -> Picture:
 
 
 def _shades() -> FloatArray:
-    """Grey (256, 3) of each value of a cell as an unsigned byte: white free, black occupied, grey unknown."""
+    """Gray (256, 3) of each value of a cell as an unsigned byte: white free, black occupied, gray unknown."""
     values = np.arange(256, dtype=np.uint8).view(np.int8)
     shade = np.where(values < 0, UNKNOWN_SHADE, 255 * (1 - np.minimum(values, 100) / 100.0))
     return np.repeat(shade[:, None], 3, axis=1)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import rerun as rr
 
-from rose2_logs.drawing.palette import track_colour
+from rose2_logs.drawing.palette import track_color
 from rose2_logs.model.rooms import RoomMap
 from rose2_logs.outputs.rerun.columns import Label, Scalar, Strips
 from rose2_logs.outputs.rerun.layers import Layers
@@ -22,17 +22,17 @@ from rose2_logs.outputs.rerun.world import (
     room_label,
 )
 from rose2_logs.system.text import percent
-from rose2_logs.tracking.back_projection import SmoothedSnapshot
+from rose2_logs.tracking.back_projection import BackProjectedSnapshot
 
-SMOOTHED, SEEN_SHARE = "/world/smoothed", "/run/seen_share"
-OUTLINES, NAMES = f"{SMOOTHED}/outlines", f"{SMOOTHED}/names"
+BACK_PROJECTED, SEEN_SHARE = "/world/back_projected", "/run/seen_share"
+OUTLINES, NAMES = f"{BACK_PROJECTED}/outlines", f"{BACK_PROJECTED}/names"
 LAYER = HEIGHTS.index(FILLS) + 0.5
 """They stand in place of the map's own rooms, right above them."""
 OUTLINE_LAYER, NAME_LAYER = LAYER + 1, len(HEIGHTS)
 
 
 class SmoothedWorld:
-    """Logs the smoothed rooms of one map after the other, in a second pass along the run.
+    """Logs the back-projected rooms of one map after the other, in a second pass along the run.
 
     Parameters
     ----------
@@ -49,12 +49,14 @@ class SmoothedWorld:
         self._named: set[int] = set()
         recording.log(OUTLINES, line_style(OUTLINE_POINTS, None), static=True)
 
-    def log(self, found: SmoothedSnapshot, coverage: int, view_side_m: float) -> None:
+    def log(self, found: BackProjectedSnapshot, coverage: int, view_side_m: float) -> None:
         """Log one map, in the order of the run, at its steps of coverage, for a view of that size."""
         snapshot = found.snapshot
         self._layers.begin(snapshot.log_time_ns, snapshot.stamp_ns, snapshot.index, coverage)
         pictures = MapPictures(snapshot)
-        self._layers.show(SMOOTHED, pictures.rooms(found.rooms.labels, found.track_ids, LAYER * LAYER_STEP_M))
+        self._layers.show(
+            BACK_PROJECTED, pictures.rooms(found.rooms.labels, found.track_ids, LAYER * LAYER_STEP_M)
+        )
         self._layers.show(OUTLINES, _outlines(found))
         seen = RoomMap.from_labels(found.rooms.labels, snapshot.geometry)
         points = lifted(seen.label_points_m, NAME_LAYER).tolist()
@@ -87,17 +89,17 @@ class SmoothedWorld:
     def _begin_track(self, track: int) -> None:
         """Log what stays the same for a room."""
         self._recording.log(f"{NAMES}/{track}", label_style(), static=True)
-        curve = rr.SeriesLines(colors=[track_colour(track)], names=f"room {track}")
+        curve = rr.SeriesLines(colors=[track_color(track)], names=f"room {track}")
         self._recording.log(f"{SEEN_SHARE}/{track}", curve, static=True)
 
 
-def _outlines(found: SmoothedSnapshot) -> Strips:
+def _outlines(found: BackProjectedSnapshot) -> Strips:
     """Outlines of the last map's rooms where they lay in this one."""
     then = found.to_last.inverse()
     rings = found.last_rooms.outer_rings_m
     count = [len(of_room) for of_room in rings]
     lengths = [len(ring) for of_room in rings for ring in of_room]
     points = then.points(np.concatenate([np.zeros((0, 2)), *(ring for of_room in rings for ring in of_room)]))
-    colours = np.array([track_colour(track) for track in found.track_ids], float).reshape(-1, 3)
-    of_rings = np.repeat((OUTLINE_SHADE * colours).astype(np.uint8), count, axis=0)
+    colors = np.array([track_color(track) for track in found.track_ids], float).reshape(-1, 3)
+    of_rings = np.repeat((OUTLINE_SHADE * colors).astype(np.uint8), count, axis=0)
     return Strips(lifted(points, OUTLINE_LAYER), np.array(lengths, np.int32), of_rings)

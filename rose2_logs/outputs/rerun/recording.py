@@ -13,7 +13,7 @@ import rerun as rr
 from rose2_logs.config.run_options import RECORDING_LAYERS
 from rose2_logs.drawing.event_text import event_text
 from rose2_logs.drawing.extent import Extent
-from rose2_logs.drawing.palette import track_colour
+from rose2_logs.drawing.palette import track_color
 from rose2_logs.errors import OutputError
 from rose2_logs.outputs.rerun import viewer as rerun_viewer
 from rose2_logs.outputs.rerun.blueprint import COVERAGE_UNIT, make_blueprint, view_side_m
@@ -28,8 +28,8 @@ from rose2_logs.runs.sink import RunInfo
 from rose2_logs.runs.tables import Tables
 from rose2_logs.system.files import part_of, writing
 from rose2_logs.system.text import percent
-from rose2_logs.tracking.back_projection import SmoothedSnapshot
-from rose2_logs.tracking.track_history import RoomLives
+from rose2_logs.tracking.back_projection import BackProjectedSnapshot
+from rose2_logs.tracking.track_history import TrackHistories
 from rose2_logs.tracking.tracked_snapshot import RoomEvent, TrackedSnapshot, map_motion
 
 logger = logging.getLogger(__name__)
@@ -42,8 +42,8 @@ CURVES = {
     "/run/rooms": ("rooms", (190, 130, 250)),
     "/run/variation_bits": ("variation of information, bits", (250, 100, 100)),
 }
-"""Curves of the whole run: what they are called and their colours."""
-SHIFT_COLOUR = (255, 80, 80)
+"""Curves of the whole run: what they are called and their colors."""
+SHIFT_COLOR = (255, 80, 80)
 
 
 class RerunRecording:
@@ -52,8 +52,8 @@ class RerunRecording:
     Timelines are ``message_log_time`` and ``ros2_timestamp`` (as in Rerun's own MCAP importer), ``snapshot``,
     and ``coverage``, the greatest so far, in steps of 1e-4. Rooms stand under ``/world/rooms/TRACK``, their
     areas under ``/run/area/TRACK``; they are cleared when their track is lost. What has not changed since the
-    snapshot before is not logged again. What only the last map tells, lanes of the rooms' lives and how right
-    the layout was, follows at the end; before that the smoothed rooms, in a second pass, if there is one.
+    snapshot before is not logged again. The lanes of the tracks and the convergence, which only the last map
+    tells, follow at the end; before them the back-projected rooms, in a second pass, if there is one.
 
     Parameters
     ----------
@@ -93,10 +93,10 @@ class RerunRecording:
         self._is_lost = False
         self._shown: set[int] = set()
         self._known: set[int] = set()
-        self._smoothed: SmoothedWorld | None = None
+        self._back_projected: SmoothedWorld | None = None
         self._extent = Extent()
         self._frames = 0
-        self._lives = RoomLives() if tables is None else tables.lives
+        self._lives = TrackHistories() if tables is None else tables.histories
 
     def __enter__(self) -> Self:
         # The same log gives the same recording id, so that a second run replaces the first in a viewer.
@@ -119,42 +119,42 @@ class RerunRecording:
         self._recording.set_log_tick_enabled(False)
         self._world = World(self._layers, self._recording, self._wanted)
         self._lanes = Lives(self._recording)
-        for path, (name, colour) in CURVES.items():
-            self._recording.log(path, rr.SeriesLines(names=name, colors=[colour], widths=2), static=True)
+        for path, (name, color) in CURVES.items():
+            self._recording.log(path, rr.SeriesLines(names=name, colors=[color], widths=2), static=True)
         jumps = rr.SeriesPoints(
-            names="the map shifted", colors=[SHIFT_COLOUR], markers="cross", marker_sizes=8
+            names="the map shifted", colors=[SHIFT_COLOR], markers="cross", marker_sizes=8
         )
         self._recording.log(SHIFTS, jumps, static=True)
         return self
 
-    def write(self, frame: TrackedSnapshot) -> None:
+    def write(self, step: TrackedSnapshot) -> None:
         """Log one snapshot at all its times."""
-        snapshot = frame.snapshot
-        coverage = _steps(frame.coverage)
+        snapshot = step.snapshot
+        coverage = _steps(step.coverage)
         self._layers.begin(snapshot.log_time_ns, snapshot.stamp_ns, snapshot.index, coverage)
-        self._extent.add(frame)
-        self._world.log(frame, view_side_m(self._extent.low_m, self._extent.high_m))
-        self._lanes.add(self._layers.now, frame.track_ids)
-        self._log_curves(frame)
-        for event in frame.events:
+        self._extent.add(step)
+        self._world.log(step, view_side_m(self._extent.low_m, self._extent.high_m))
+        self._lanes.add(self._layers.now, step.track_ids)
+        self._log_curves(step)
+        for event in step.events:
             if event.kind != "continued":
-                text = f"{percent(frame.coverage, ' %')}: {event_text(event)}"
+                text = f"{percent(step.coverage, ' %')}: {event_text(event)}"
                 self._layers.add("/events", Entry(text, _event_level(event)))
         if self._tables is None:
-            self._lives.add(frame)
+            self._lives.add(step)
         if self._live and self._frames == 0:
             # A live viewer shows the layout from the beginning; a file alone gets the final one.
             self._send_blueprint()
         self._frames += 1
         self._flush()
 
-    def write_smoothed(self, found: SmoothedSnapshot) -> None:
+    def write_back_projected(self, found: BackProjectedSnapshot) -> None:
         """Log what one map shows of the last map's rooms, after all maps, in their order again."""
-        if self._smoothed is None:
+        if self._back_projected is None:
             self._layers.flush()
-            self._smoothed = SmoothedWorld(self._new_layers(), self._recording)
+            self._back_projected = SmoothedWorld(self._new_layers(), self._recording)
         view_m = view_side_m(self._extent.low_m, self._extent.high_m)
-        self._smoothed.log(found, _steps(found.coverage), view_m)
+        self._back_projected.log(found, _steps(found.coverage), view_m)
         self._flush()
 
     def __exit__(
@@ -163,11 +163,11 @@ class RerunRecording:
         try:
             if kind is None:
                 self._layers.flush()
-                if self._smoothed is not None:
-                    self._smoothed.flush()
-                hindsight = None if self._tables is None else self._tables.hindsight
-                self._lanes.log(hindsight)
-                text = summary_text(self._info, self._lives, hindsight, self._frames)
+                if self._back_projected is not None:
+                    self._back_projected.flush()
+                convergence = None if self._tables is None else self._tables.convergence
+                self._lanes.log(convergence)
+                text = summary_text(self._info, self._lives, convergence, self._frames)
                 self._recording.log(
                     "/summary", rr.TextDocument(text, media_type="text/markdown"), static=True
                 )
@@ -189,7 +189,10 @@ class RerunRecording:
 
     def _send_blueprint(self) -> None:
         blueprint = make_blueprint(
-            self._extent.low_m, self._extent.high_m, self._wanted, smoothed=self._smoothed is not None
+            self._extent.low_m,
+            self._extent.high_m,
+            self._wanted,
+            back_projected=self._back_projected is not None,
         )
         self._recording.send_blueprint(blueprint)
 
@@ -209,20 +212,20 @@ class RerunRecording:
             self._viewer_answers = False
             logger.warning("the Rerun viewer does not answer any more; the run goes on without it")
 
-    def _log_curves(self, frame: TrackedSnapshot) -> None:
-        self._layers.add("/run/coverage", Scalar(frame.coverage))
-        self._layers.add("/run/rooms", Scalar(len(frame.track_ids)))
-        if map_motion(frame.events) is not None:
-            self._layers.add(SHIFTS, Scalar(frame.coverage))
-        if frame.change is not None and frame.change.variation_bits is not None:
-            self._layers.add("/run/variation_bits", Scalar(frame.change.variation_bits))
-        for track in sorted(self._shown - set(frame.track_ids)):
+    def _log_curves(self, step: TrackedSnapshot) -> None:
+        self._layers.add("/run/coverage", Scalar(step.coverage))
+        self._layers.add("/run/rooms", Scalar(len(step.track_ids)))
+        if map_motion(step.events) is not None:
+            self._layers.add(SHIFTS, Scalar(step.coverage))
+        if step.change is not None and step.change.variation_bits is not None:
+            self._layers.add("/run/variation_bits", Scalar(step.change.variation_bits))
+        for track in sorted(self._shown - set(step.track_ids)):
             self._layers.clear(f"/run/area/{track}")
-        self._shown = set(frame.track_ids)
-        for track, area in zip(frame.track_ids, frame.analysis.rooms.areas_m2.tolist(), strict=True):
+        self._shown = set(step.track_ids)
+        for track, area in zip(step.track_ids, step.analysis.rooms.areas_m2.tolist(), strict=True):
             if track not in self._known:
                 self._known.add(track)
-                name = rr.SeriesLines(colors=[track_colour(track)], names=f"room {track}")
+                name = rr.SeriesLines(colors=[track_color(track)], names=f"room {track}")
                 self._recording.log(f"/run/area/{track}", name, static=True)
             self._layers.add(f"/run/area/{track}", Scalar(area))
 

@@ -9,8 +9,8 @@ from rose2_logs.model.room_quality import UNSURE_SIGN, is_unsure
 from rose2_logs.outputs.rerun.blueprint import COVERAGE_UNIT
 from rose2_logs.runs.sink import RunInfo
 from rose2_logs.system.text import percent
-from rose2_logs.tracking.convergence import Hindsight
-from rose2_logs.tracking.track_history import Moment, RoomLives
+from rose2_logs.tracking.convergence import Convergence
+from rose2_logs.tracking.track_history import SnapshotRef, TrackHistories
 
 NAMED_MOST = 6
 """Rooms named in one sentence."""
@@ -18,48 +18,48 @@ _MARKUP = re.compile(r"[\\`*_{}\[\]<>()#!&~$]")
 """What has a meaning in Markdown; after a backslash it has none."""
 
 
-def summary_text(info: RunInfo, lives: RoomLives, hindsight: Hindsight | None, maps: int) -> str:
+def summary_text(info: RunInfo, histories: TrackHistories, convergence: Convergence | None, maps: int) -> str:
     """Write the summary of a run as Markdown.
 
     Parameters
     ----------
     info : RunInfo
         The run.
-    lives : RoomLives
+    histories : TrackHistories
         What is known of every room.
-    hindsight : Hindsight, optional
+    convergence : Convergence, optional
         Since when what was right; without it that is left out.
     maps : int
         Number of maps.
     """
-    minutes = "" if lives.last is None else f", {_duration(lives.last.time_s)}"
-    rooms = len(lives.in_last_map)
+    minutes = "" if histories.last is None else f", {_duration(histories.last.time_s)}"
+    rooms = len(histories.in_last_map)
     text = [
         f"# {_cell(info.log_path.name)}",
-        f"**{rooms} room{'' if rooms == 1 else 's'}** at the end, {len(lives.lives)} over the run; "
+        f"**{rooms} room{'' if rooms == 1 else 's'}** at the end, {len(histories.tracks)} over the run; "
         f"{maps} map{'' if maps == 1 else 's'}{minutes}.",
     ]
-    if hindsight is not None:
-        final = hindsight.layout_final
-        last = None if maps == 1 or lives.last is None else lives.last.snapshot
+    if convergence is not None:
+        final = convergence.layout_final
+        last = None if maps == 1 or histories.last is None else histories.last.snapshot
         text.append(
             "**The layout still changed up to the last map**: take the rooms as preliminary."
             if final is None or final.snapshot == last
             else f"The layout was as in the end **from {_percent(final.coverage)} coverage on** "
             f"({_duration(final.time_s)})."
         )
-    text += _worth_a_look(lives)
+    text += _worth_a_look(histories)
     rows = [
         "| room | area, m² | first seen | shape right | area settled | walls |",
         "|--:|--:|--:|--:|--:|--:|",
     ]
-    for track in lives.in_last_map:
-        life = lives.lives[track]
-        right = None if hindsight is None else hindsight.shape_right.get(track)
-        settled = None if hindsight is None else hindsight.area_settled.get(track)
-        walls = "" if life.outline_wall_share is None else _percent(life.outline_wall_share)
+    for track in histories.in_last_map:
+        history = histories.tracks[track]
+        right = None if convergence is None else convergence.shape_right.get(track)
+        settled = None if convergence is None else convergence.area_settled.get(track)
+        walls = "" if history.wall_support is None else _percent(history.wall_support)
         rows.append(
-            f"| {track} | {life.area_m2:.1f} | {_percent(life.first.coverage)} | {_moment(right)} "
+            f"| {track} | {history.area_m2:.1f} | {_percent(history.first.coverage)} | {_moment(right)} "
             f"| {_moment(settled)} | {walls} |"
         )
     text.append("\n".join(rows))
@@ -83,20 +83,21 @@ def summary_text(info: RunInfo, lives: RoomLives, hindsight: Hindsight | None, m
     return "\n\n".join(text) + "\n"
 
 
-def _worth_a_look(lives: RoomLives) -> list[str]:
+def _worth_a_look(histories: TrackHistories) -> list[str]:
     """Tell which rooms are unsure, and where the whole map shifted."""
     told = []
-    shares = [(lives.lives[track].outline_wall_share, track) for track in lives.in_last_map]
+    shares = [(histories.tracks[track].wall_support, track) for track in histories.in_last_map]
     unsure = sorted((share, track) for share, track in shares if share is not None and is_unsure(share))
     if unsure:
         named = ", ".join(f"{track}{UNSURE_SIGN} ({_percent(share)})" for share, track in unsure[:NAMED_MOST])
         more = f" and {len(unsure) - NAMED_MOST} more" if len(unsure) > NAMED_MOST else ""
         told.append(f"**Unsure**, with little wall around: room {named}{more}.")
-    if lives.largest_shift is not None:
-        at, motion = lives.largest_shift
+    if histories.largest_shift is not None:
+        at, motion = histories.largest_shift
         x, y = motion.shift_xy_m
         told.append(
-            f"**The whole map shifted** {'once' if lives.shifts == 1 else f'{lives.shifts} times'}, most by "
+            f"**The whole map shifted** {'once' if histories.shifts == 1 else f'{histories.shifts} times'}, "
+            "most by "
             f"{math.hypot(x, y):.2f} m and {math.degrees(motion.turn_rad):+.1f}° at {_percent(at.coverage)} "
             "coverage: loop closures, or trouble of SLAM."
         )
@@ -107,8 +108,8 @@ def _percent(share: float) -> str:
     return percent(share, " %")
 
 
-def _moment(moment: Moment | None) -> str:
-    return "" if moment is None else _percent(moment.coverage)
+def _moment(snapshot_ref: SnapshotRef | None) -> str:
+    return "" if snapshot_ref is None else _percent(snapshot_ref.coverage)
 
 
 def _duration(seconds: float) -> str:

@@ -9,32 +9,32 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from rose2_logs.drawing.hatching import hatch_unseen
-from rose2_logs.drawing.palette import track_colour
+from rose2_logs.drawing.palette import track_color
 from rose2_logs.model.occupancy import FloatArray
 from rose2_logs.model.room_quality import UNSURE_SIGN, is_unsure
 from rose2_logs.outputs.rerun.columns import Label, Strips
 from rose2_logs.outputs.rerun.layers import Layers
 from rose2_logs.outputs.rerun.pictures import MapPictures, spectrum_picture
-from rose2_logs.tracking.track_history import evidence_of
+from rose2_logs.tracking.track_history import quality_of
 from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot
 
 LAYER_STEP_M = 0.01
 """Layers lie this far above each other, so that none flickers through another."""
 OUTLINE_POINTS, DOOR_POINTS, PATH_POINTS, LINE_POINTS, THIN_POINTS = 2.0, 4.0, 2.0, 1.5, 0.75
 """Widths of lines in points of the screen, which stay readable at any zoom."""
-DOOR_COLOUR, PATH_COLOUR, ROBOT_COLOUR = (230, 90, 20), (20, 90, 200), (200, 20, 60)
-LINE_COLOUR, VORONOI_COLOUR, DIRECTION_COLOUR = (60, 110, 230), (150, 20, 150), (255, 190, 40)
-UNCLUSTERED_COLOUR = (130, 130, 130)
+DOOR_COLOR, PATH_COLOR, ROBOT_COLOR = (230, 90, 20), (20, 90, 200), (200, 20, 60)
+LINE_COLOR, VORONOI_COLOR, DIRECTION_COLOR = (60, 110, 230), (150, 20, 150), (255, 190, 40)
+UNCLUSTERED_COLOR = (130, 130, 130)
 STRONG_EDGE, WEAK_EDGE = (20, 20, 90), (80, 165, 235)
 """Edges that walls cover all along, and not at all; told apart without seeing red or green too."""
 OUTLINE_SHADE, SEGMENT_SHADE = 0.6, 0.75
-"""Share of the colour of a fill that its outline has, and of a track's that a wall's segments have."""
+"""Share of the color of a fill that its outline has, and of a track's that a wall's segments have."""
 PATH_GAP_M = 2.0
 """Poses farther apart are not joined: the robot was put elsewhere, or found itself again."""
 ROBOT_LENGTH_M, ROBOT_WIDTH_M = 0.7, 0.45
 """Size of the arrowhead that stands for the robot, about that of a mobile base."""
 MARKS = (0.8, 0.98)
-"""Where the marks of the directions begin and end, from the centre of the spectrum's picture to its rim."""
+"""Where the marks of the directions begin and end, from the center of the spectrum's picture to its rim."""
 DIRECTION_NAME = "walls at {angle:.1f}°"
 NAMED_SHARE = 0.004
 """Rooms with less of the area of a square view get a number only: number and area are about 65 of the usual
@@ -46,7 +46,7 @@ SEGMENTS, LINES, FACES, VORONOI = "/world/segments", "/world/lines", "/world/fac
 SPECTRUM = "/spectrum"
 HEIGHTS = (MAP, CLEAN, SCORE, FILLS, PREDICTED, ROOMS, FACES, LINES, SEGMENTS, VORONOI, DOORWAYS, PATH, ROBOT)
 """From the lowest layer to the highest; labels stand above them all."""
-Colour = tuple[int, int, int]
+Color = tuple[int, int, int]
 
 
 class World:
@@ -71,40 +71,38 @@ class World:
         self._named: set[int] = set()
         self._pose: FloatArray | None = None
         recording.log("/world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-        for path, width, colour in (
-            (DOORWAYS, DOOR_POINTS, DOOR_COLOUR),
-            (PATH, PATH_POINTS, PATH_COLOUR),
-            (ROBOT, OUTLINE_POINTS, ROBOT_COLOUR),
+        for path, width, color in (
+            (DOORWAYS, DOOR_POINTS, DOOR_COLOR),
+            (PATH, PATH_POINTS, PATH_COLOR),
+            (ROBOT, OUTLINE_POINTS, ROBOT_COLOR),
             (PREDICTED, THIN_POINTS, None),
             (SEGMENTS, OUTLINE_POINTS, None),
-            (LINES, THIN_POINTS, LINE_COLOUR),
+            (LINES, THIN_POINTS, LINE_COLOR),
             (FACES, LINE_POINTS, None),
-            (VORONOI, LINE_POINTS, VORONOI_COLOUR),
-            (f"{SPECTRUM}/directions", LINE_POINTS, DIRECTION_COLOUR),
+            (VORONOI, LINE_POINTS, VORONOI_COLOR),
+            (f"{SPECTRUM}/directions", LINE_POINTS, DIRECTION_COLOR),
         ):
-            self._style_lines(path, width, colour)
+            self._style_lines(path, width, color)
 
-    def log(self, frame: TrackedSnapshot, view_side_m: float) -> None:
+    def log(self, step: TrackedSnapshot, view_side_m: float) -> None:
         """Log one map, after the layers have begun its snapshot; the view is so high, at first."""
-        self._log_pictures(frame)
-        self._log_rooms(frame, view_side_m)
-        doors = np.array([door.ends_m for door in frame.analysis.rooms.doorways]).reshape(-1, 4)
+        self._log_pictures(step)
+        self._log_rooms(step, view_side_m)
+        doors = np.array([door.ends_m for door in step.analysis.rooms.doorways]).reshape(-1, 4)
         self._log_lines(DOORWAYS, doors)
         if "predicted" in self._wanted:
-            lines, room = hatch_unseen(frame)
-            colours = np.array([track_colour(track) for track in frame.track_ids], float).reshape(-1, 3)
-            self._log_lines(PREDICTED, lines, (OUTLINE_SHADE * colours[room]).astype(np.uint8))
-        self._log_structure(frame)
-        if frame.path is not None:
-            self._log_path(frame.path)
+            lines, room = hatch_unseen(step)
+            colors = np.array([track_color(track) for track in step.track_ids], float).reshape(-1, 3)
+            self._log_lines(PREDICTED, lines, (OUTLINE_SHADE * colors[room]).astype(np.uint8))
+        self._log_structure(step)
+        if step.path is not None:
+            self._log_path(step.path)
 
-    def _log_pictures(self, frame: TrackedSnapshot) -> None:
-        pictures = MapPictures(frame.snapshot)
+    def _log_pictures(self, step: TrackedSnapshot) -> None:
+        pictures = MapPictures(step.snapshot)
         self._layers.show(MAP, pictures.map(_height_m(MAP)))
-        self._layers.show(
-            FILLS, pictures.rooms(frame.analysis.rooms.labels, frame.track_ids, _height_m(FILLS))
-        )
-        structure = frame.analysis.structure
+        self._layers.show(FILLS, pictures.rooms(step.analysis.rooms.labels, step.track_ids, _height_m(FILLS)))
+        structure = step.analysis.structure
         if structure is None:
             return
         if "clean_map" in self._wanted:
@@ -112,12 +110,12 @@ class World:
         if "score" in self._wanted:
             self._layers.show(SCORE, pictures.score(structure.score, _height_m(SCORE)))
         if "spectrum" in self._wanted:
-            yaw = frame.analysis.geometry.yaw_rad
+            yaw = step.analysis.geometry.yaw_rad
             self._layers.show(f"{SPECTRUM}/magnitude", spectrum_picture(structure.spectrum, yaw))
             self._log_directions(structure.directions_rad)
 
     def _log_directions(self, directions_rad: FloatArray) -> None:
-        """Mark, through the spectrum's centre, where walls of the dominant directions have their ridge."""
+        """Mark, through the spectrum's center, where walls of the dominant directions have their ridge."""
         across = directions_rad + np.pi / 2
         # At the rim of the picture only, so that the ridge itself can be seen.
         begins, ends = (reach * np.column_stack([np.cos(across), np.sin(across)]) for reach in MARKS)
@@ -135,41 +133,41 @@ class World:
         for number in range(len(directions_rad), self._layers.count_below(f"{SPECTRUM}/names")):
             self._layers.clear(f"{SPECTRUM}/names/{number}")
 
-    def _log_rooms(self, frame: TrackedSnapshot, view_side_m: float) -> None:
-        rooms = frame.analysis.rooms
-        for track in sorted(self._shown - set(frame.track_ids)):
+    def _log_rooms(self, step: TrackedSnapshot, view_side_m: float) -> None:
+        rooms = step.analysis.rooms
+        for track in sorted(self._shown - set(step.track_ids)):
             self._layers.clear(f"{ROOMS}/{track}")
-        self._shown = set(frame.track_ids)
+        self._shown = set(step.track_ids)
         points = lifted(np.nan_to_num(rooms.label_points_m), len(HEIGHTS)).tolist()
-        for number, track in enumerate(frame.track_ids):
+        for number, track in enumerate(step.track_ids):
             if track not in self._known:
                 self._known.add(track)
                 self._begin_track(track)
             self._layers.show(f"{ROOMS}/{track}", _rings(rooms.outer_rings_m[number]))
             x, y, z = points[number]
-            wall_share, _ = evidence_of(frame, number)
+            wall_share, _ = quality_of(step, number)
             area_m2 = float(rooms.areas_m2[number])
             text = room_label(track, area_m2, view_side_m, unsure=is_unsure(wall_share))
             self._layers.show(f"{ROOMS}/{track}/label", Label((x, y, z), text))
 
     def _begin_track(self, track: int) -> None:
         """Log what stays the same for a track."""
-        red, green, blue = (int(OUTLINE_SHADE * value) for value in track_colour(track))
+        red, green, blue = (int(OUTLINE_SHADE * value) for value in track_color(track))
         self._style_lines(f"{ROOMS}/{track}", OUTLINE_POINTS, (red, green, blue))
         self._style_label(f"{ROOMS}/{track}/label")
 
-    def _log_structure(self, frame: TrackedSnapshot) -> None:
-        analysis = frame.analysis
+    def _log_structure(self, step: TrackedSnapshot) -> None:
+        analysis = step.analysis
         if analysis.walls is not None and "segments" in self._wanted:
             self._log_lines(
-                SEGMENTS, analysis.walls.segments_m, _cluster_colours(analysis.walls.segment_cluster)
+                SEGMENTS, analysis.walls.segments_m, _cluster_colors(analysis.walls.segment_cluster)
             )
         if analysis.walls is not None and "lines" in self._wanted:
             self._log_lines(LINES, analysis.walls.lines_m)
         if analysis.floor_plan is not None and "faces" in self._wanted:
             weight = analysis.floor_plan.edge_weight[:, None]
-            colours = weight * np.array(STRONG_EDGE) + (1 - weight) * np.array(WEAK_EDGE)
-            self._log_lines(FACES, analysis.floor_plan.edges_m, colours.astype(np.uint8))
+            colors = weight * np.array(STRONG_EDGE) + (1 - weight) * np.array(WEAK_EDGE)
+            self._log_lines(FACES, analysis.floor_plan.edges_m, colors.astype(np.uint8))
         if analysis.voronoi_m is not None:
             self._log_lines(VORONOI, analysis.voronoi_m)
 
@@ -188,21 +186,21 @@ class World:
         there = head @ np.array([[cosine, sine], [-sine, cosine]]) + self._pose[:2]
         self._layers.show(ROBOT, Strips(lifted(there, HEIGHTS.index(ROBOT)), np.array([5], np.int32)))
 
-    def _log_lines(self, path: str, ends_m: FloatArray, colours: NDArray[np.uint8] | None = None) -> None:
+    def _log_lines(self, path: str, ends_m: FloatArray, colors: NDArray[np.uint8] | None = None) -> None:
         points = lifted(ends_m.reshape(-1, 2), HEIGHTS.index(path))
-        self._layers.show(path, Strips(points, np.full(len(ends_m), 2, np.int32), colours))
+        self._layers.show(path, Strips(points, np.full(len(ends_m), 2, np.int32), colors))
 
-    def _style_lines(self, path: str, width: float, colour: Colour | None) -> None:
-        self._recording.log(path, line_style(width, colour), static=True)
+    def _style_lines(self, path: str, width: float, color: Color | None) -> None:
+        self._recording.log(path, line_style(width, color), static=True)
 
     def _style_label(self, path: str) -> None:
         self._recording.log(path, label_style(), static=True)
 
 
-def line_style(width: float, colour: Colour | None) -> rr.LineStrips3D:
-    """Width in points of the screen that all lines of a path have, and their colour if it is one."""
+def line_style(width: float, color: Color | None) -> rr.LineStrips3D:
+    """Width in points of the screen that all lines of a path have, and their color if it is one."""
     return rr.LineStrips3D.from_fields(
-        radii=rr.components.Radius.ui_points(width), colors=None if colour is None else [colour]
+        radii=rr.components.Radius.ui_points(width), colors=None if color is None else [color]
     )
 
 
@@ -216,7 +214,7 @@ def label_style() -> rr.Points3D:
 def room_label(
     track: int, area_m2: float, view_side_m: float, *, unsure: bool = False, told: str | None = None
 ) -> str:
-    """Name a room: number and area in one line, the number alone if these would cover its neighbours.
+    """Name a room: number and area in one line, the number alone if these would cover its neighbors.
 
     The viewer cuts labels of several lines down to the first one where there are many. `told` stands in place
     of the area where that is not what matters.
@@ -231,12 +229,12 @@ def _height_m(path: str) -> float:
     return HEIGHTS.index(path) * LAYER_STEP_M
 
 
-def _cluster_colours(cluster: NDArray[np.int32]) -> NDArray[np.uint8]:
-    """Colour (N, 3) of each segment by its wall."""
+def _cluster_colors(cluster: NDArray[np.int32]) -> NDArray[np.uint8]:
+    """Color (N, 3) of each segment by its wall."""
     count = int(cluster.max(initial=-1)) + 1
-    colours = [np.array(track_colour(number + 1)) * SEGMENT_SHADE for number in range(count)]
-    # A segment of no wall has the number -1: the last colour.
-    return np.array([*colours, UNCLUSTERED_COLOUR])[cluster].astype(np.uint8)
+    colors = [np.array(track_color(number + 1)) * SEGMENT_SHADE for number in range(count)]
+    # A segment of no wall has the number -1: the last color.
+    return np.array([*colors, UNCLUSTERED_COLOR])[cluster].astype(np.uint8)
 
 
 def lifted(points_m: FloatArray, layer: float) -> NDArray[np.float32]:

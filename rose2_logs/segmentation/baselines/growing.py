@@ -13,7 +13,7 @@ from rose2_logs.segmentation.baselines.regions import SQUARE, ranks_by_size
 def grow(seeds: NDArray[np.int32], free: BoolArray) -> NDArray[np.int32]:
     """Let every free cell take the label of the seed from which the fewest steps lead to it.
 
-    A step leads to any of the eight neighbours. Of several seeds that are as near, the one with more cells
+    A step leads to any of the eight neighbors. Of several seeds that are as near, the one with more cells
     takes the cell, and then the one nearer to the middle of all: `ranks_by_size`. Free cells that no seed
     reaches stay without a label.
 
@@ -47,7 +47,7 @@ def grow(seeds: NDArray[np.int32], free: BoolArray) -> NDArray[np.int32]:
         fresh = is_open[reached]
         reached, by = reached[fresh], by[fresh]
         np.minimum.at(rank, reached, by)
-        # Each cell goes on once, however many neighbours reached it.
+        # Each cell goes on once, however many neighbors reached it.
         turn[reached] = np.arange(len(reached))
         front = reached[turn[reached] == np.arange(len(reached))]
         is_open[front] = False

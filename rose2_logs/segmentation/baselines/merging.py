@@ -17,7 +17,7 @@ WALL = 0
 def merge_rooms(
     labels: NDArray[np.int32], resolution_m: float, parameters: VoronoiMergeParameters
 ) -> NDArray[np.int32]:
-    """Join rooms to the neighbour with which they share the longest border, the smallest room first.
+    """Join rooms to the neighbor with which they share the longest border, the smallest room first.
 
     Whenever two rooms were joined, the search starts anew with the smallest room.
 
@@ -42,7 +42,7 @@ def merge_rooms(
         area, _, room = heapq.heappop(pending)
         if rooms.joined_to[room] != room or rooms.area_m2[room] != area:
             continue
-        target = rooms.widest_neighbour(room)
+        target = rooms.widest_neighbor(room)
         if target is None or not _is_joined(rooms, room, target, parameters):
             continue
         rooms.join(room, target)
@@ -57,15 +57,15 @@ def merge_rooms(
 
 
 def _is_joined(rooms: _Rooms, room: int, target: int, p: VoronoiMergeParameters) -> bool:
-    """Tell whether a room is part of the neighbour with which it shares the longest border."""
+    """Tell whether a room is part of the neighbor with which it shares the longest border."""
     border, wall = rooms.share(room, target), rooms.share(room, WALL)
     border_back, target_wall = rooms.share(target, room), rooms.share(target, WALL)
-    has_one_neighbour = rooms.neighbour_count(room) == 1
-    dead_end = has_one_neighbour and rooms.area_m2[room] < p.dead_end_max_area_m2
+    has_one_neighbor = rooms.neighbor_count(room) == 1
+    dead_end = has_one_neighbor and rooms.area_m2[room] < p.dead_end_max_area_m2
     small = rooms.area_m2[room] < p.small_max_area_m2
-    niche = has_one_neighbour or wall + border > p.niche_min_cover
+    niche = has_one_neighbor or wall + border > p.niche_min_cover
     target_is_hub = (
-        rooms.neighbour_count(target) > 2
+        rooms.neighbor_count(target) > 2
         and target_wall + rooms.two_longest(target) < p.niche_target_min_cover
     )
     corridor = border > p.half_open_min_border and p.half_open_wall - 2 * border < wall < 1 - border
@@ -108,11 +108,11 @@ class _Rooms:
         """Share of a room's perimeter along another room, or along walls."""
         return self._border[room].get(other, 0) / self._perimeter[room]
 
-    def neighbour_count(self, room: int) -> int:
+    def neighbor_count(self, room: int) -> int:
         """Number of rooms that touch a room."""
         return len(self._border[room].keys() - {WALL})
 
-    def widest_neighbour(self, room: int) -> int | None:
+    def widest_neighbor(self, room: int) -> int | None:
         """Return the room with the longest common border; of several the largest."""
         borders = self._border[room]
         return min(
@@ -127,7 +127,7 @@ class _Rooms:
         return sum(heapq.nlargest(2, borders)) / self._perimeter[room]
 
     def within_two(self, room: int) -> set[int]:
-        """Return a room, its neighbours and theirs."""
+        """Return a room, its neighbors and theirs."""
         near = {room, *self._border[room]} - {WALL}
         return near.union(*(self._border[other] for other in near)) - {WALL}
 

@@ -15,7 +15,7 @@ CROSS = np.array(((0, 1, 0), (1, 1, 1), (0, 1, 0)), np.uint8)
 
 
 def eroded(mask: BoolArray, kernel: NDArray[np.uint8] = SQUARE, rounds: int = 1) -> BoolArray:
-    """Cells (H, W) whose neighbourhood lies in the mask altogether, `rounds` times over."""
+    """Cells (H, W) whose neighborhood lies in the mask altogether, `rounds` times over."""
     result = cv2.erode(
         mask.astype(np.uint8), kernel, iterations=rounds, borderType=cv2.BORDER_CONSTANT, borderValue=0
     )
@@ -71,7 +71,7 @@ def ranks_by_size(labels: NDArray[np.int32]) -> NDArray[np.int32]:
     -------
     rank : (N,) int32
         Rank of each label, the largest first; of several as large the one that lies nearer to the middle of
-        all labelled cells, and then the lower label. The last rank is that of 0.
+        all labeled cells, and then the lower label. The last rank is that of 0.
     """
     row, column = np.nonzero(labels)
     present = labels[row, column]

@@ -48,7 +48,7 @@ def cut_rooms(
     distance = obstacle_distance(free)
     graph = voronoi_cells(free, parameters.clear_rounds, parameters.prune_passes)
     narrow = narrowest_cells(
-        graph, distance, parameters.neighbourhood_cells2, parameters.neighbourhood_max_rounds
+        graph, distance, parameters.neighborhood_cells2, parameters.neighborhood_max_rounds
     )
     uncut = free.copy()
     if len(narrow):

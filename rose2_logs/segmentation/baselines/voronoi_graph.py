@@ -18,7 +18,7 @@ from rose2_logs.segmentation.baselines.regions import (
 )
 
 AROUND = np.array([(-1, -1), (-1, 0), (-1, 1), (0, -1), (0, 1), (1, -1), (1, 0), (1, 1)])
-"""Row and column of the eight neighbours of a cell."""
+"""Row and column of the eight neighbors of a cell."""
 
 
 def boundary_cells(free: BoolArray) -> NDArray[np.intp]:
@@ -36,7 +36,7 @@ def voronoi_cells(free: BoolArray, clear_rounds: int, prune_passes: int) -> Bool
         The graph keeps this many cells away from obstacles, and out of what is narrower than three cells.
     prune_passes : int
         Each takes one cell off every end of the graph that is no node; nodes are cells of the graph with
-        three neighbours or more.
+        three neighbors or more.
 
     Returns
     -------
@@ -64,38 +64,38 @@ def voronoi_cells(free: BoolArray, clear_rounds: int, prune_passes: int) -> Bool
 
 
 def _pruned(graph: BoolArray, passes: int) -> BoolArray:
-    nodes = graph & (_neighbour_count(graph) >= 3)
+    nodes = graph & (_neighbor_count(graph) >= 3)
     for _ in range(passes):
-        ends = graph & ~nodes & (_neighbour_count(graph) <= 1)
+        ends = graph & ~nodes & (_neighbor_count(graph) <= 1)
         if not ends.any():
             break
         graph = graph & ~ends
     return graph
 
 
-def _neighbour_count(graph: BoolArray) -> NDArray[np.uint8]:
+def _neighbor_count(graph: BoolArray) -> NDArray[np.uint8]:
     kernel = np.ones((3, 3), np.float32)
     kernel[1, 1] = 0
     return np.asarray(cv2.filter2D(graph.astype(np.uint8), -1, kernel, borderType=cv2.BORDER_CONSTANT))
 
 
 def narrowest_cells(
-    graph: BoolArray, distance: NDArray[np.float32], neighbourhood: float, max_rounds: int
+    graph: BoolArray, distance: NDArray[np.float32], neighborhood: float, max_rounds: int
 ) -> NDArray[np.intp]:
-    """Find the cell that is nearest to obstacles in the neighbourhood of each cell of the graph.
+    """Find the cell that is nearest to obstacles in the neighborhood of each cell of the graph.
 
-    A cell's neighbourhood is what lies within a number of steps along the graph: the least with which there
-    are more than ``neighbourhood / distance`` cells in it, so that it is long where the passage is narrow.
+    A cell's neighborhood is what lies within a number of steps along the graph: the least with which there
+    are more than ``neighborhood / distance`` cells in it, so that it is long where the passage is narrow.
 
     Parameters
     ----------
     graph : (H, W) bool
     distance : (H, W) float32
         Distance from obstacles in cells.
-    neighbourhood : float
-        Cells of a neighbourhood times its centre's distance from obstacles.
+    neighborhood : float
+        Cells of a neighborhood times its center's distance from obstacles.
     max_rounds : int
-        Most steps from the centre.
+        Most steps from the center.
 
     Returns
     -------
@@ -107,8 +107,8 @@ def narrowest_cells(
     if len(cells) == 0:
         return cells
     value = distance[graph]
-    wanted = np.floor(neighbourhood / value).astype(np.int64)
-    neighbours, start = _adjacency(graph, cells)
+    wanted = np.floor(neighborhood / value).astype(np.int64)
+    neighbors, start = _adjacency(graph, cells)
     count = np.diff(start)
 
     total = len(cells)
@@ -126,7 +126,7 @@ def narrowest_cells(
             break
         owner = np.repeat(np.arange(len(cell)), count[cell])
         first = np.concatenate([[0], np.cumsum(count[cell])[:-1]])
-        reached = neighbours[start[cell][owner] + np.arange(len(owner)) - first[owner]]
+        reached = neighbors[start[cell][owner] + np.arange(len(owner)) - first[owner]]
         pairs = np.unique(source[owner] * total + reached)
         # One step from the front lie only the front, the one before it, and what is new.
         pairs = pairs[~_is_in(pairs, front) & ~_is_in(pairs, before)]
@@ -136,7 +136,7 @@ def narrowest_cells(
         narrower = value[cell] < least[source]
         found.append((source[narrower], cell[narrower], value[cell[narrower]]))
         np.minimum.at(least, source, value[cell])
-    # The last round in which a neighbourhood became narrower is the first that reached its least distance.
+    # The last round in which a neighborhood became narrower is the first that reached its least distance.
     source, cell, at = (np.concatenate(parts) for parts in zip(*found, strict=True))
     narrowest = np.unique(cell[at == least[source]])
     return np.asarray(cells[narrowest], np.intp)
@@ -152,7 +152,7 @@ def _is_in(sorted_values: NDArray[np.int64], others: NDArray[np.int64]) -> BoolA
 
 
 def _adjacency(graph: BoolArray, cells: NDArray[np.intp]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Neighbours (E,) of the graph's cells, one cell after the other, and where each one's start (K + 1,)."""
+    """Neighbors (E,) of the graph's cells, one cell after the other, and where each one's start (K + 1,)."""
     number = np.full((graph.shape[0] + 2, graph.shape[1] + 2), -1, np.int64)
     number[cells[:, 0] + 1, cells[:, 1] + 1] = np.arange(len(cells))
     around = cells[:, None] + 1 + AROUND

@@ -31,7 +31,7 @@ def find_doorways(
     Returns
     -------
     doorways : list of ((int, int), (2, 2) float)
-        The two rooms, smaller first, and the ends of the passage in the grid frame, metres; sorted.
+        The two rooms, smaller first, and the ends of the passage in the grid frame, meters; sorted.
     """
     points, low, high = _contacts(labels)
     if len(points) == 0:
@@ -53,7 +53,7 @@ def find_doorways(
 
 
 def _contacts(labels: NDArray[np.int32]) -> tuple[FloatArray, NDArray[np.int64], NDArray[np.int64]]:
-    """Middles (K, 2) as x, y in cells between neighbouring cells of two rooms, and the two rooms."""
+    """Middles (K, 2) as x, y in cells between neighboring cells of two rooms, and the two rooms."""
     points, pairs = [], []
     for first, second, shift in (
         (labels[:, :-1], labels[:, 1:], (1.0, 0.5)),
@@ -68,8 +68,8 @@ def _contacts(labels: NDArray[np.int32]) -> tuple[FloatArray, NDArray[np.int64],
 
 def _extremes(points: FloatArray) -> FloatArray:
     """Two points (2, 2) farthest apart along the main axis of a few points."""
-    centred = points - points.mean(0)
-    axis = np.linalg.svd(centred, full_matrices=False)[2][0]
-    along = centred @ axis
+    centered = points - points.mean(0)
+    axis = np.linalg.svd(centered, full_matrices=False)[2][0]
+    along = centered @ axis
     ends: FloatArray = np.array([points[along.argmin()], points[along.argmax()]])
     return ends[np.lexsort((ends[:, 1], ends[:, 0]))]

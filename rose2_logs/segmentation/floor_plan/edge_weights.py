@@ -23,7 +23,7 @@ Number = TypeVar("Number", bound=np.generic)
 
 @dataclass(frozen=True, eq=False)
 class EdgeEvidence:
-    """Lengths (E,) in metres of each edge; what is neither was not seen or is clutter.
+    """Lengths (E,) in meters of each edge; what is neither was not seen or is clutter.
 
     Attributes
     ----------
@@ -68,7 +68,7 @@ def edge_evidence(
     Parameters
     ----------
     edges_m : (E, 4) float
-        Edges in the grid frame, metres; those that lie on no line get zeros.
+        Edges in the grid frame, meters; those that lie on no line get zeros.
     lines_m : (L, 4) float
         Representative lines.
     walls, free : (H, W) bool
@@ -202,23 +202,23 @@ def _read_lines(
     count = np.maximum(np.ceil(length / resolution_m).astype(np.int64), 1)
     line = np.repeat(np.arange(len(lines_m)), count)
     position = np.arange(len(line)) - np.repeat(np.cumsum(count) - count, count)
-    centre = lines_m[line, :2] + vector[line] * ((position + 0.5) / count[line])[:, None]
+    center = lines_m[line, :2] + vector[line] * ((position + 0.5) / count[line])[:, None]
     normal = (np.column_stack([-vector[:, 1], vector[:, 0]]) / np.maximum(length, 1e-12)[:, None])[line]
     is_wall = np.zeros(len(line), bool)
     reach = round(parameters.wall_tolerance_m / resolution_m)
     for step in range(-reach, reach + 1):
-        is_wall |= _sample(walls, centre + normal * (step * resolution_m), resolution_m)
+        is_wall |= _sample(walls, center + normal * (step * resolution_m), resolution_m)
     is_blind = np.zeros(len(line), bool)
-    centre_of_wall, normal_of_wall = centre[is_wall], normal[is_wall]
+    center_of_wall, normal_of_wall = center[is_wall], normal[is_wall]
     steps = np.arange(1, round(parameters.blind_look_m / resolution_m) + 1) * resolution_m
     for side in (1, -1):
-        is_empty, is_through = np.ones((2, len(centre_of_wall)), bool)
+        is_empty, is_through = np.ones((2, len(center_of_wall)), bool)
         for at_m in side * steps:
-            points = centre_of_wall + normal_of_wall * at_m
+            points = center_of_wall + normal_of_wall * at_m
             is_empty &= ~_sample(free, points, resolution_m)
             is_through &= _sample(walls, points, resolution_m)
         is_blind[is_wall] |= is_empty & ~is_through
-    return line, length / count, is_wall, is_blind, _sample(free, centre, resolution_m)
+    return line, length / count, is_wall, is_blind, _sample(free, center, resolution_m)
 
 
 def _sample(mask: NDArray[Number], points_m: FloatArray, resolution_m: float) -> NDArray[Number]:
@@ -231,7 +231,7 @@ def _sample(mask: NDArray[Number], points_m: FloatArray, resolution_m: float) ->
 
 
 def _place_edges(edges_m: FloatArray, lines_m: FloatArray) -> tuple[NDArray[np.intp], FloatArray, FloatArray]:
-    """Line of each edge (-1 for none) and where along it the edge starts and ends, in metres."""
+    """Line of each edge (-1 for none) and where along it the edge starts and ends, in meters."""
     owner = np.full(len(edges_m), -1, np.intp)
     tree = shapely.STRtree(shapely.linestrings(lines_m.reshape(-1, 2, 2)))
     middle = shapely.points((edges_m[:, :2] + edges_m[:, 2:]) / 2)

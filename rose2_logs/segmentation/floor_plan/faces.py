@@ -14,12 +14,12 @@ from rose2_logs.model.occupancy import FloatArray
 SNAP_M = 1e-3
 """Vertices are snapped to this lattice (1 mm), far below a cell and far above rounding."""
 SUBCELL_BITS = 8
-"""Polygons are rasterised with vertices in 1/256 of a cell, the finest that OpenCV needs here."""
+"""Polygons are rasterized with vertices in 1/256 of a cell, the finest that OpenCV needs here."""
 
 
 @dataclass(frozen=True, eq=False)
 class FaceGraph:
-    """A planar graph. Metres, grid frame.
+    """A planar graph. Meters, grid frame.
 
     Attributes
     ----------
@@ -43,7 +43,7 @@ def build_faces(lines_m: FloatArray, frame: shapely.Polygon) -> FaceGraph:
     lines_m : (L, 4) float
         Lines x0, y0, x1, y1; ends that cut nothing are left out.
     frame : shapely Polygon
-        The part, metres.
+        The part, meters.
     """
     lines = shapely.linestrings(lines_m.reshape(-1, 2, 2))
     lines = shapely.intersection(lines, frame)
@@ -71,7 +71,7 @@ def build_faces(lines_m: FloatArray, frame: shapely.Polygon) -> FaceGraph:
     return FaceGraph(polygons, edges, edge_faces)
 
 
-def rasterise(
+def rasterize(
     polygons: NDArray[np.object_], values: NDArray[np.int32], shape: tuple[int, int], resolution_m: float
 ) -> NDArray[np.int32]:
     """Paint polygons into cells: (H, W) int32 with `values`, 0 where there is none."""

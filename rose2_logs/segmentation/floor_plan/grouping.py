@@ -14,7 +14,7 @@ from rose2_logs.model.occupancy import FloatArray
 from rose2_logs.segmentation.floor_plan.edge_weights import EdgeEvidence
 
 Border = tuple[float, float, float]
-"""Open and closed length of a border in metres, and its best passage (see `EdgeEvidence.passage_share`)."""
+"""Open and closed length of a border in meters, and its best passage (see `EdgeEvidence.passage_share`)."""
 
 
 def group_faces(
@@ -33,7 +33,7 @@ def group_faces(
     The openness of a border is its open length over its known length, wall or open, taken over the whole
     border between two groups, so that a door in a long wall never joins what the wall divides. The best
     passage through it is held against the room on both sides: what narrows like a door does not join.
-    What is too small for a room at the end joins the neighbour that it opens to most.
+    What is too small for a room at the end joins the neighbor that it opens to most.
 
     A wall with nothing to be seen behind it closes a border as far as the faces are not known: a half seen
     room may go on there. Of faces seen to the full it is furniture, or a wall within.
@@ -63,19 +63,19 @@ def group_faces(
 
 def _join_by_dbscan(groups: _Groups, parameters: FloorPlanParameters) -> None:
     """Join faces by DBSCAN with the weight of the edges between them as their distance (paper, III-C)."""
-    # Takes longer to import than a map to analyse, and this is not the usual way of joining.
+    # Takes longer to import than a map to analyze, and this is not the usual way of joining.
     from scipy.sparse import csr_matrix
     from sklearn.cluster import DBSCAN
 
     count = len(groups.alive)
     pairs = [
         (a, b, border[1] / (border[0] + border[1]))
-        for a, neighbours in groups.borders.items()
-        for b, border in neighbours.items()
+        for a, neighbors in groups.borders.items()
+        for b, border in neighbors.items()
         if border[0] >= parameters.join_min_open_m
     ]
     first, second, weight = np.array(pairs or np.zeros((0, 3))).reshape(-1, 3).T
-    # A distance of nothing would be read as no neighbour by the sparse matrix.
+    # A distance of nothing would be read as no neighbor by the sparse matrix.
     distance = csr_matrix((weight + 1e-9, (first.astype(int), second.astype(int))), shape=(count, count))
     model = DBSCAN(eps=parameters.dbscan_max_weight, min_samples=1, metric="precomputed")
     cluster = model.fit_predict(distance)
@@ -97,8 +97,8 @@ def _join_by_whole_borders(groups: _Groups, parameters: FloorPlanParameters) -> 
         if openness >= parameters.join_min_openness and passage >= parameters.join_min_passage:
             heapq.heappush(heap, (-openness * min(passage, 2.0), -border[0], min(a, b), max(a, b), border))
 
-    for a, neighbours in groups.borders.items():
-        for b in neighbours:
+    for a, neighbors in groups.borders.items():
+        for b in neighbors:
             if a < b:
                 push(a, b)
     while heap:
@@ -111,7 +111,7 @@ def _join_by_whole_borders(groups: _Groups, parameters: FloorPlanParameters) -> 
 
 
 def _absorb_small(groups: _Groups, parameters: FloorPlanParameters) -> None:
-    """Join what is too small or too narrow for a room to the neighbour that it opens to most."""
+    """Join what is too small or too narrow for a room to the neighbor that it opens to most."""
     heap = [(groups.free_m2[a], a) for a in np.flatnonzero(groups.alive).tolist()]
     heapq.heapify(heap)
     while heap:
@@ -120,11 +120,11 @@ def _absorb_small(groups: _Groups, parameters: FloorPlanParameters) -> None:
             continue
         small = area < parameters.room_min_area_m2
         narrow = groups.clearance_m[a] < parameters.room_min_clearance_m
-        neighbours = groups.borders.get(a, {})
-        if not (small or narrow) or not neighbours:
+        neighbors = groups.borders.get(a, {})
+        if not (small or narrow) or not neighbors:
             continue
-        best = max(neighbours, key=lambda b: (neighbours[b][0], -b))
-        if neighbours[best][0] < parameters.join_min_open_m:
+        best = max(neighbors, key=lambda b: (neighbors[b][0], -b))
+        if neighbors[best][0] < parameters.join_min_open_m:
             continue
         groups.join(best, a)
         heapq.heappush(heap, (groups.free_m2[best], best))
@@ -144,7 +144,7 @@ class _Groups:
         self._parent = np.arange(len(free_m2))
 
     def join(self, a: int, b: int) -> list[int]:
-        """Make `b` part of `a`; return the neighbours that `a` now has from it."""
+        """Make `b` part of `a`; return the neighbors that `a` now has from it."""
         self.alive[b] = False
         self._parent[b] = a
         self.free_m2[a] += self.free_m2[b]

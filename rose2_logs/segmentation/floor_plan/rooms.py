@@ -11,12 +11,12 @@ from shapely.geometry.base import BaseGeometry
 from rose2_logs.config.parameters import FloorPlanParameters
 from rose2_logs.model.labels import distinct_labels, label_sizes
 from rose2_logs.model.occupancy import BoolArray, FloatArray
-from rose2_logs.segmentation.floor_plan.faces import FaceGraph, rasterise
+from rose2_logs.segmentation.floor_plan.faces import FaceGraph, rasterize
 
 
 def label_faces(graph: FaceGraph, shape: tuple[int, int], resolution_m: float) -> NDArray[np.int32]:
     """Paint the faces: (H, W) int32 with 1 + index of the face that holds each cell, 0 for none."""
-    return rasterise(
+    return rasterize(
         graph.polygons, np.arange(1, len(graph.polygons) + 1, dtype=np.int32), shape, resolution_m
     )
 
@@ -24,7 +24,7 @@ def label_faces(graph: FaceGraph, shape: tuple[int, int], resolution_m: float) -
 def free_area(
     face_of_cell: NDArray[np.int32], free: BoolArray, count: int, resolution_m: float
 ) -> FloatArray:
-    """Free area (F,) of each face in square metres."""
+    """Free area (F,) of each face in square meters."""
     cells = np.bincount(face_of_cell[free], minlength=count + 1)[1:]
     return cells.astype(float) * resolution_m**2
 
@@ -32,7 +32,7 @@ def free_area(
 def clearance(
     face_of_cell: NDArray[np.int32], free: BoolArray, walls: BoolArray, count: int, resolution_m: float
 ) -> FloatArray:
-    """Greatest distance (F,) in metres of a free cell of each face from a wall."""
+    """Greatest distance (F,) in meters of a free cell of each face from a wall."""
     distance = cv2.distanceTransform((~walls).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
     greatest = np.zeros(count + 1, np.float32)
     np.maximum.at(greatest, face_of_cell[free], distance[free])
@@ -47,7 +47,7 @@ def number_rooms(
     Returns
     -------
     number : (N,) int32
-        Number of each label: ``number[labels]`` is the renumbered image.
+        Number of each label: ``number[labels]`` is the renumber_in_place image.
     """
     size = label_sizes(labels, highest)
     keep = size * resolution_m**2 >= minimum_m2
@@ -135,7 +135,7 @@ def predicted_shapes(
     Returns
     -------
     shapes : tuple of `count` shapely geometries
-        Grid frame, metres; empty where a room has no face.
+        Grid frame, meters; empty where a room has no face.
     """
     shapes = [shapely.union_all(graph.polygons[room_of_face == room]) for room in range(1, count + 1)]
     inner = graph.polygons[room_of_face > 0]

@@ -22,7 +22,7 @@ FRAME_MARGIN_M = 1.0
 
 @dataclass(frozen=True, eq=False)
 class FloorPlanResult:
-    """Stage C in the grid frame, metres.
+    """Stage C in the grid frame, meters.
 
     Attributes
     ----------

@@ -23,7 +23,7 @@ def structure_score(
 
     Of the spectrum only the ridge of one direction is kept (a Gaussian band, whose width is the reciprocal of
     `structure_length_m`), the rest set to zero, and what remains transformed back. The score is the share
-    of the cell's neighbourhood along the wall that is occupied, so that a straight wall without an end
+    of the cell's neighborhood along the wall that is occupied, so that a straight wall without an end
     scores 1, whatever its thickness, the size of the map, and the number of walls in it.
 
     Parameters
@@ -100,7 +100,7 @@ def clean_threshold(
 ) -> float:
     """Find the lowest threshold whose clean map has few enough walls for its free space.
 
-    A building has about so many walls per square metre; a map with more than that still holds clutter. The
+    A building has about so many walls per square meter; a map with more than that still holds clutter. The
     paper asks for the line segments per free cell to lie in an interval; area makes it independent of the
     resolution, and wall clusters of the walls' thickness. The number falls as the threshold rises, so the
     search halves the range.
@@ -137,7 +137,7 @@ def clean_threshold(
 def attached_cells(clean: BoolArray, candidates: BoolArray) -> BoolArray:
     """Add to the clean map (H, W) the candidates (H, W) connected with it: a threshold with hysteresis.
 
-    Jambs and ends of walls have a low score, for half of their neighbourhood is open.
+    Jambs and ends of walls have a low score, for half of their neighborhood is open.
     """
     _, part = cv2.connectedComponents((clean | candidates).astype(np.uint8), connectivity=8)
     touched = np.zeros(int(part.max()) + 1, bool)

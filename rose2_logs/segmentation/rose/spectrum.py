@@ -26,7 +26,7 @@ class Spectrum:
     values : (h, w // 2 + 1) complex64
         The transform, zero padded to a size (h, w) that is good for it.
     frequency_x, frequency_y : (1, w // 2 + 1) and (h, 1) float32
-        Frequencies in cycles per metre.
+        Frequencies in cycles per meter.
     shape : (int, int)
         The padded size (h, w).
     """
@@ -103,7 +103,7 @@ def angular_energy(spectrum: Spectrum, parameters: SpectrumParameters) -> FloatA
     Returns
     -------
     energy : (B,) float
-        Bin b is centred on the wall direction b * pi / B.
+        Bin b is centered on the wall direction b * pi / B.
     """
     bins = round(np.pi / parameters.angle_step_rad)
     step_x, step_y = float(spectrum.frequency_x[0, 1]), float(spectrum.frequency_y[1, 0])
@@ -146,9 +146,9 @@ def dominant_directions(energy: FloatArray, parameters: SpectrumParameters) -> t
     heights = (energy - energy.min()) / span
     gap = round(parameters.direction_min_gap_rad / np.pi * bins)
     peaks = circular_peaks(heights, gap, parameters.peak_min_prominence)
-    left, centre, right = heights[peaks - 1], heights[peaks], heights[(peaks + 1) % bins]
-    curvature = left - 2 * centre + right
+    left, center, right = heights[peaks - 1], heights[peaks], heights[(peaks + 1) % bins]
+    curvature = left - 2 * center + right
     shift = np.divide(left - right, 2 * curvature, out=np.zeros(len(peaks)), where=curvature < 0)
     directions = np.mod((peaks + shift) * np.pi / bins, np.pi)
-    order = np.lexsort((directions, -centre))
-    return directions[order], centre[order]
+    order = np.lexsort((directions, -center))
+    return directions[order], center[order]

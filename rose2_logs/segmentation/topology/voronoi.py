@@ -37,7 +37,7 @@ def parts_of_room(
     inside : (H, W) bool
         The cells of the room.
     clear : (H, W) float32
-        Distance from walls in metres, see `clearance_m`; clutter makes no passage.
+        Distance from walls in meters, see `clearance_m`; clutter makes no passage.
 
     Returns
     -------
@@ -102,7 +102,7 @@ def voronoi_lines(
     Returns
     -------
     (N, 4) float
-        x0, y0, x1, y1 in metres, in the frame of the cells.
+        x0, y0, x1, y1 in meters, in the frame of the cells.
     """
     clear = inside & (clearance_m(walls, resolution_m) >= min_clearance_m)
     skeleton = np.pad(skeletonize(clear[::DRAWN_BLOCK, ::DRAWN_BLOCK]), 1)  # type: ignore[no-untyped-call]
@@ -121,7 +121,7 @@ def voronoi_lines(
 
 
 def clearance_m(walls: BoolArray, resolution_m: float) -> NDArray[np.float32]:
-    """Distance (H, W) from the nearest wall cell in metres, slightly blurred."""
+    """Distance (H, W) from the nearest wall cell in meters, slightly blurred."""
     distance = cv2.distanceTransform((~walls).view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
     clear: NDArray[np.float32] = np.asarray(cv2.GaussianBlur(distance, (0, 0), SMOOTH_CELLS), np.float32)
     clear *= np.float32(resolution_m)
@@ -153,7 +153,7 @@ def _summits(
 def _passages(
     basin: NDArray[np.int32], count: int, clear: NDArray[np.float32]
 ) -> dict[int, dict[int, float]]:
-    """Clearance in metres of the widest passage between neighbouring ones of some basins."""
+    """Clearance in meters of the widest passage between neighboring ones of some basins."""
     keys, widths = [], []
     for first, second in (
         ((slice(None), slice(None, -1)), (slice(None), slice(1, None))),

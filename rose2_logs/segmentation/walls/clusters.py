@@ -16,7 +16,7 @@ from rose2_logs.segmentation.walls.segments import Segments
 
 @dataclass(frozen=True, eq=False)
 class WallClusters:
-    """Walls as intervals along a direction. Metres, grid frame.
+    """Walls as intervals along a direction. Meters, grid frame.
 
     Attributes
     ----------

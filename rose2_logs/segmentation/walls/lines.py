@@ -16,7 +16,7 @@ from rose2_logs.segmentation.walls.segments import line_ends
 
 @dataclass(frozen=True, eq=False)
 class RepresentativeLines:
-    """Lines that divide the plane. Metres, grid frame.
+    """Lines that divide the plane. Meters, grid frame.
 
     Attributes
     ----------
@@ -95,7 +95,7 @@ def _shared_offsets(clusters: WallClusters, lateral_m: float) -> FloatArray:
     for index in np.unique(clusters.direction):
         members = np.flatnonzero(clusters.direction == index)
         members = members[np.lexsort((clusters.offset[members], -clusters.covered[members]))]
-        taken: list[float] = []  # ascending: the nearest is one of two neighbours
+        taken: list[float] = []  # ascending: the nearest is one of two neighbors
         for member, value in zip(members.tolist(), clusters.offset[members].tolist(), strict=True):
             at = bisect(taken, value)
             nearest = min(

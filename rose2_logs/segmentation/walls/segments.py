@@ -23,7 +23,7 @@ COVER_CELLS = 1.5
 
 @dataclass(frozen=True, eq=False)
 class Segments:
-    """Line segments, each along one of some directions. Metres, grid frame.
+    """Line segments, each along one of some directions. Meters, grid frame.
 
     Attributes
     ----------
@@ -122,7 +122,7 @@ def detect_segments(
 
 @dataclass(frozen=True, eq=False)
 class _Runs:
-    """Runs of points in the strips along one direction: values (R,), lengths in metres.
+    """Runs of points in the strips along one direction: values (R,), lengths in meters.
 
     `point` (P,) are the points' indices, run after run, and `run` (P,) the run of each.
     """
@@ -139,7 +139,7 @@ class _Runs:
 def _straight_runs(
     points: FloatArray, angle: float, resolution_m: float, parameters: WallParameters
 ) -> Iterator[_Runs]:
-    """Cut the points (P, 2), metres, sorted into strips along a direction, where the gaps are too long.
+    """Cut the points (P, 2), meters, sorted into strips along a direction, where the gaps are too long.
 
     The strips are two cells wide. They come in two sets, the second of which lies a cell further across, so
     that no wall falls between two strips; each point is once in each set.

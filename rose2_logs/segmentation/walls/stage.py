@@ -21,7 +21,7 @@ from rose2_logs.segmentation.walls.segments import (
 
 @dataclass(frozen=True, eq=False)
 class WallResult:
-    """Stage B in the grid frame, metres.
+    """Stage B in the grid frame, meters.
 
     Attributes
     ----------
