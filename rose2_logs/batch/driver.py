@@ -15,9 +15,10 @@ from pathlib import Path
 from typing import Protocol
 
 from rose2_logs.batch import dataset
+from rose2_logs.batch.finding import find_logs
 from rose2_logs.batch.folders import LOGS_FOLDER, locked, put_in_place, work_folder
 from rose2_logs.batch.local_workers import LocalWorkers
-from rose2_logs.batch.location import Location, find_logs
+from rose2_logs.batch.location import Location
 from rose2_logs.batch.names import assign_names
 from rose2_logs.batch.record import BatchSettings, Record, Signature, local_signature, read_record
 from rose2_logs.batch.task import LogOutcome, LogTask, Progress

@@ -12,8 +12,9 @@ import numpy as np
 from rose2_logs.config.parameters import ReadingParameters
 from rose2_logs.config.selection import Times
 from rose2_logs.errors import LogError
+from rose2_logs.io.grids import Decoder, Grid, Patch
 from rose2_logs.io.log_file import LogFile, Place
-from rose2_logs.io.messages import Decoder, Grid, Patch, decoder
+from rose2_logs.io.messages import decoder
 from rose2_logs.io.source import LoggedBytes, LoggedMap, LogInfo, MessageSource, TopicInfo
 from rose2_logs.system.warnings import log_warning
 

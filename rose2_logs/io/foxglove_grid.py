@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rose2_logs.errors import InvalidMapError
-from rose2_logs.io.messages import (
+from rose2_logs.io.grids import (
     FOXGLOVE_GRID_TYPE,
     LONGEST_NAME_BYTES,
     MOST_CELLS,

@@ -13,8 +13,9 @@ import numpy as np
 
 from rose2_logs.config.selection import Selection, Times
 from rose2_logs.errors import InvalidMapError, LogError, NoMapTopicError
+from rose2_logs.io.grids import MapWarning, Patch
 from rose2_logs.io.map_stream import MapChecks, MapStream, ReadCounts
-from rose2_logs.io.messages import MapWarning, Patch, is_patch_type
+from rose2_logs.io.messages import is_patch_type
 from rose2_logs.io.poses import RobotPath
 from rose2_logs.io.source import DamagedMessageError, LoggedMap, LogInfo, MessageSource, TopicInfo
 from rose2_logs.model.occupancy import OccupancySnapshot

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rose2_logs.errors import InvalidMapError
-from rose2_logs.io.messages import Cells, Grid, MapWarning, Patch
+from rose2_logs.io.grids import Cells, Grid, MapWarning, Patch
 from rose2_logs.model.occupancy import UNKNOWN, BoolArray, OccupancySnapshot
 
 

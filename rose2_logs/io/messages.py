@@ -6,66 +6,32 @@ the few fields before the cells are unpacked by hand and the cells stay a view o
 
 from __future__ import annotations
 
-import math
 import struct
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rose2_logs.config.parameters import ReadingParameters
 from rose2_logs.errors import InvalidMapError
-from rose2_logs.model.occupancy import UNKNOWN, GridGeometry
-
-Cells = NDArray[np.int8]
+from rose2_logs.io.grids import (
+    FOXGLOVE_GRID_TYPE,
+    LONGEST_NAME_BYTES,
+    MOST_CELLS,
+    Cells,
+    Decoder,
+    Grid,
+    MapWarning,
+    Patch,
+    check_cells,
+    exact_resolution,
+    make_grid,
+    percent,
+)
+from rose2_logs.model.occupancy import UNKNOWN
 
 GRID_TYPES = ("nav_msgs/OccupancyGrid", "nav2_msgs/Costmap")
 PATCH_TYPES = ("map_msgs/OccupancyGridUpdate", "nav2_msgs/CostmapUpdate")
-FOXGLOVE_GRID_TYPE = "foxglove.Grid"
-
-
-MOST_CELLS = ReadingParameters().map_max_cells
-MOST_TILT_RAD = math.radians(5.0)
-"""A map that is tilted less out of the plane has its lengths right to half a percent."""
-UNIT_TOLERANCE = 0.01
-"""Quaternions whose length differs by less from 1 were rounded."""
-LONGEST_NAME_BYTES = 1024
-"""Of frames; more is damage."""
 PADDING_BYTES = 8
 """Less than this may follow the last field: some writers fill up to the largest alignment."""
-
-
-class MapWarning(NamedTuple):
-    """What is odd about a map that can be read all the same: kind and text."""
-
-    kind: str
-    text: str
-
-
-@dataclass(frozen=True, eq=False)
-class Grid:
-    """A whole map: stamp in nanoseconds, geometry, cells (H, W) int8 in {-1, 0..100}, what is odd."""
-
-    stamp_ns: int
-    geometry: GridGeometry
-    cells: Cells
-    map_warnings: tuple[MapWarning, ...] = ()
-
-
-@dataclass(frozen=True, eq=False)
-class Patch:
-    """New values of a rectangle of the map before: stamp, first row and column, cells (h, w) int8."""
-
-    stamp_ns: int
-    row: int
-    column: int
-    cells: Cells
-    map_warnings: tuple[MapWarning, ...] = ()
-
-
-Decoder = Callable[[memoryview], Grid | Patch | None]
 
 
 def ros_type(name: str) -> str:
@@ -233,33 +199,6 @@ class Ros1Fields(Fields):
         return super().header()
 
 
-def check_cells(rows: int, columns: int, most_cells: int) -> None:
-    """Refuse a map of more cells than may be.
-
-    Raises
-    ------
-    InvalidMapError
-        With the remedy.
-    """
-    if rows * columns > most_cells:
-        raise InvalidMapError(
-            f"it has {columns} x {rows} cells, the most that are read is {most_cells}; if it is real, "
-            "raise --set reading.map_max_cells"
-        )
-
-
-def percent(values: Cells, map_warnings: list[MapWarning]) -> Cells:
-    """Occupancy as -1, 0..100; any other value counts as unknown, as map savers take it, with a remark."""
-    if values.size == 0 or (values.min() >= UNKNOWN and values.max() <= 100):
-        return values
-    odd = (values < UNKNOWN) | (values > 100)
-    count = np.count_nonzero(odd)
-    map_warnings.append(
-        MapWarning("odd_values", f"{count} cells hold values outside -1..100 and count as unknown")
-    )
-    return np.where(odd, np.int8(UNKNOWN), values)
-
-
 def _cost_table() -> Cells:
     """Occupancy per cost: 0 free, 1..252 to 1..98, 253 (inscribed) 99, 254 (lethal) 100, 255 unknown.
 
@@ -274,65 +213,6 @@ def _cost_table() -> Cells:
 _OCCUPANCY_OF_COST = _cost_table()
 
 
-def flat_yaw_of(quaternion: tuple[float, float, float, float], map_warnings: list[MapWarning]) -> float:
-    """Rotation about z, in radians, of a quaternion x, y, z, w; one of another length than 1 gets a remark.
-
-    Raises
-    ------
-    InvalidMapError
-        If it is not made of finite numbers, or tilts the map out of the plane.
-    """
-    x, y, z, w = quaternion
-    if not all(math.isfinite(part) for part in quaternion):
-        raise InvalidMapError(
-            f"the orientation of its origin ({x}, {y}, {z}, {w}) is not made of finite numbers"
-        )
-    length = math.hypot(*quaternion)
-    if abs(length - 1) > UNIT_TOLERANCE:
-        map_warnings.append(
-            MapWarning("quaternion", f"the orientation of its origin has the length {length:g}, not 1")
-        )
-    if length == 0 or math.isinf(length):
-        return 0.0
-    x, y, z, w = x / length, y / length, z / length, w / length
-    tilt = math.acos(min(max(w * w + z * z - x * x - y * y, -1.0), 1.0))
-    if tilt > MOST_TILT_RAD:
-        raise InvalidMapError(
-            f"its origin is tilted by {math.degrees(tilt):.0f} degrees out of the plane; only flat maps can "
-            "be read"
-        )
-    return yaw_of(x, y, z, w)
-
-
-def yaw_of(x: float, y: float, z: float, w: float) -> float:
-    """Rotation about z, in radians, of a quaternion of any length; all zeros, as left unset, mean none."""
-    # No division by the length: it drops out of the two arguments.
-    return math.atan2(2 * (w * z + x * y), w * w + x * x - y * y - z * z)
-
-
-def _resolution(single: float) -> float:
-    """Undo the writer's rounding to single precision: 0.05, not 0.0500000007."""
-    return float(str(np.float32(single)))
-
-
-def make_grid(
-    stamp_ns: int,
-    frame_id: str,
-    resolution_m: float,
-    pose: tuple[float, ...],
-    cells: Cells,
-    map_warnings: list[MapWarning],
-) -> Grid | None:
-    """Put a grid together; `pose` is x, y, z and the quaternion x, y, z, w. None if there are no cells."""
-    if cells.size == 0:
-        return None
-    x, y, _, *quaternion = pose
-    height, width = cells.shape
-    yaw_rad = flat_yaw_of((quaternion[0], quaternion[1], quaternion[2], quaternion[3]), map_warnings)
-    geometry = GridGeometry(resolution_m, (x, y), yaw_rad, frame_id, (height, width))
-    return Grid(stamp_ns, geometry, cells, tuple(map_warnings))
-
-
 def _occupancy_grid(fields: Fields) -> Grid | None:
     stamp_ns, frame_id = fields.header()
     fields.time_ns()  # map_load_time
@@ -340,7 +220,7 @@ def _occupancy_grid(fields: Fields) -> Grid | None:
     width, height = fields.integers("I", 2)
     pose = fields.numbers("d", 7)
     cells = fields.occupancy(height, width)
-    return make_grid(stamp_ns, frame_id, _resolution(resolution), pose, cells, fields.map_warnings)
+    return make_grid(stamp_ns, frame_id, exact_resolution(resolution), pose, cells, fields.map_warnings)
 
 
 def _occupancy_grid_update(fields: Fields) -> Patch:
@@ -359,7 +239,7 @@ def _costmap(fields: Fields) -> Grid | None:
     width, height = fields.integers("I", 2)
     pose = fields.numbers("d", 7)
     cells = _OCCUPANCY_OF_COST[fields.cells(height, width)]
-    return make_grid(stamp_ns, frame_id, _resolution(resolution), pose, cells, fields.map_warnings)
+    return make_grid(stamp_ns, frame_id, exact_resolution(resolution), pose, cells, fields.map_warnings)
 
 
 def _costmap_update(fields: Fields) -> Patch:

@@ -10,7 +10,8 @@ from itertools import islice
 import numpy as np
 
 from rose2_logs.errors import InvalidMapError
-from rose2_logs.io.messages import CdrFields, Fields, Ros1Fields, ros_type, yaw_of
+from rose2_logs.io.grids import yaw_of
+from rose2_logs.io.messages import CdrFields, Fields, Ros1Fields, ros_type
 from rose2_logs.io.source import DamagedMessageError, LoggedBytes, LogInfo, MessageSource
 from rose2_logs.model.occupancy import FloatArray
 

@@ -19,7 +19,7 @@ from rose2_logs.config.parameters import ReadingParameters
 from rose2_logs.config.selection import Times
 from rose2_logs.errors import InvalidMapError, LogError
 from rose2_logs.io.discovery import load_yaml
-from rose2_logs.io.messages import MOST_CELLS, Cells, Grid, check_cells, make_grid
+from rose2_logs.io.grids import MOST_CELLS, Cells, Grid, check_cells, make_grid
 from rose2_logs.io.source import LoggedMap, LogInfo, MessageSource, TopicInfo
 from rose2_logs.model.occupancy import UNKNOWN
 from rose2_logs.system.warnings import log_warning

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from rose2_logs.config.selection import Times
 from rose2_logs.errors import LogError
-from rose2_logs.io.messages import Grid, Patch
+from rose2_logs.io.grids import Grid, Patch
 
 
 @dataclass(frozen=True)

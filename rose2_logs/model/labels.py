@@ -93,3 +93,24 @@ def straight_runs(
     is_first[1:] = (np.diff(line[order]) != 0) | (np.diff(place[order]) != 1)
     is_last = np.append(is_first[1:], True)[: len(cells)]
     return cells[is_first], cells[is_last]
+
+
+def number_rooms(
+    labels: NDArray[np.int32], highest: int, minimum_m2: float, resolution_m: float
+) -> NDArray[np.int32]:
+    """Number the labels up to `highest` by their first cell; those of less area than `minimum_m2` get 0.
+
+    Returns
+    -------
+    number : (N,) int32
+        Number of each label: ``number[labels]`` is the renumber_in_place image.
+    """
+    size = label_sizes(labels, highest)
+    keep = size * resolution_m**2 >= minimum_m2
+    keep[0] = False
+    present, first = distinct_labels(labels)
+    order = present[np.argsort(first)]
+    order = order[keep[order]]
+    number = np.zeros(len(size), np.int32)
+    number[order] = np.arange(1, len(order) + 1)
+    return number

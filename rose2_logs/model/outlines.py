@@ -9,7 +9,7 @@ from scipy.ndimage import find_objects
 from shapely.affinity import translate
 from shapely.geometry.base import BaseGeometry
 
-from rose2_logs.model.occupancy import BoolArray
+from rose2_logs.model.occupancy import BoolArray, FloatArray
 
 
 def outline(mask: BoolArray, resolution_m: float) -> BaseGeometry:
@@ -33,3 +33,11 @@ def room_outlines(labels: NDArray[np.int32], resolution_m: float) -> list[BaseGe
         corner = window[1].start * resolution_m, window[0].start * resolution_m
         shapes.append(translate(shape, *corner))
     return shapes
+
+
+def outer_rings(shape: BaseGeometry) -> list[FloatArray]:
+    """Closed outer rings (K, 2) of the polygons of a shape, world meters."""
+    parts = shapely.get_parts(shape)
+    rings = shapely.get_exterior_ring(parts[shapely.get_type_id(parts) == shapely.GeometryType.POLYGON])
+    points, ring = shapely.get_coordinates(rings, return_index=True)
+    return np.split(points, np.flatnonzero(np.diff(ring)) + 1) if len(points) else []

@@ -14,18 +14,13 @@ from rose2_logs.config.parameters import Parameters
 from rose2_logs.errors import ParameterError
 from rose2_logs.model.analysis import FloorPlan, SnapshotAnalysis, Structure, Walls
 from rose2_logs.model.explored import ExploredPart
-from rose2_logs.model.labels import distinct_labels, label_sizes, renumber_in_place
+from rose2_logs.model.labels import distinct_labels, label_sizes, number_rooms, renumber_in_place
 from rose2_logs.model.occupancy import BoolArray, OccupancySnapshot
 from rose2_logs.model.outlines import room_outlines
 from rose2_logs.model.rooms import Doorway, RoomMap
 from rose2_logs.segmentation.baselines.stage import BASELINES, segment_by_baseline
 from rose2_logs.segmentation.floor_plan.doorways import find_doorways
-from rose2_logs.segmentation.floor_plan.rooms import (
-    adopt_left_out,
-    number_rooms,
-    predicted_shapes,
-    settle_borders,
-)
+from rose2_logs.segmentation.floor_plan.rooms import adopt_left_out, predicted_shapes, settle_borders
 from rose2_logs.segmentation.floor_plan.stage import FloorPlanResult, make_floor_plan
 from rose2_logs.segmentation.rose.stage import RoseResult, find_structure
 from rose2_logs.segmentation.topology.splitting import split_rooms

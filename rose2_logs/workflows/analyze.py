@@ -20,9 +20,9 @@ from rose2_logs.io.discovery import stem_of
 from rose2_logs.io.log import LogReader
 from rose2_logs.io.log_file import LATEST_NS
 from rose2_logs.outputs.mcap.viewer_layouts import bag_metadata_path, foxglove_path, rviz_path
+from rose2_logs.runs.back_projected_table import BackProjectedTable
 from rose2_logs.runs.journal import JournaledWorkers
 from rose2_logs.runs.output_folder import OutputFolder
-from rose2_logs.runs.projected_table import BackProjectedTable
 from rose2_logs.runs.provenance import fingerprint, log_location, software_versions
 from rose2_logs.runs.sink import BackProjectedSink, CopyingSink, RunInfo, Sink
 from rose2_logs.runs.stream import SnapshotWorkers, start_workers, tracked_snapshots

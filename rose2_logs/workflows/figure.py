@@ -11,8 +11,8 @@ from rose2_logs.drawing.plan import draw_plan
 from rose2_logs.drawing.svg import as_svg
 from rose2_logs.errors import ParameterError
 from rose2_logs.outputs.exports.formats import planned_files, write_plan
+from rose2_logs.runs.back_projected_plan import back_projected_plan
 from rose2_logs.runs.folder import RunResults
-from rose2_logs.runs.projected_plan import back_projected_plan
 from rose2_logs.system.files import refuse_existing, replacing
 
 FIGURE_WIDTH_PX = 1800

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from rose2_logs.batch.location import Location, find_logs
+from rose2_logs.batch.finding import find_logs
+from rose2_logs.batch.location import Location
 from rose2_logs.errors import LogError
 
 

@@ -16,7 +16,8 @@ from saved_maps import save_run
 
 from rose2_logs.batch import driver, remote, task
 from rose2_logs.batch.driver import BatchOptions, run_batch
-from rose2_logs.batch.location import Location, find_logs
+from rose2_logs.batch.finding import find_logs
+from rose2_logs.batch.location import Location
 from rose2_logs.batch.record import BatchSettings, signature_of
 from rose2_logs.errors import LogError
 

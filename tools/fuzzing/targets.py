@@ -13,10 +13,11 @@ from rose2_logs.config.selection import Selection
 from rose2_logs.errors import LogError
 from rose2_logs.io.file_log import FileLog, OpenFile
 from rose2_logs.io.foxglove_grid import grid_decoder
+from rose2_logs.io.grids import Decoder, Grid
 from rose2_logs.io.log import LogReader
 from rose2_logs.io.map_stream import MapStream, ReadCounts
 from rose2_logs.io.mcap.index import DAMAGE, McapFile
-from rose2_logs.io.messages import Decoder, Grid, decoder
+from rose2_logs.io.messages import decoder
 from rose2_logs.io.rosbag1.index import BagFile
 from rose2_logs.io.rosbag2.index import SqliteFile
 from rose2_logs.io.saved_maps import read_map

@@ -352,14 +352,6 @@ def _triangulated(parts: NDArray[np.object_]) -> list[FloatArray]:
     return [each.reshape(-1, 2) for each in np.split(corners, ends[:-1])] if len(parts) else []
 
 
-def outer_rings(shape: BaseGeometry) -> list[FloatArray]:
-    """Closed outer rings (K, 2) of the polygons of a shape, world meters."""
-    parts = shapely.get_parts(shape)
-    rings = shapely.get_exterior_ring(parts[shapely.get_type_id(parts) == shapely.GeometryType.POLYGON])
-    points, ring = shapely.get_coordinates(rings, return_index=True)
-    return np.split(points, np.flatnonzero(np.diff(ring)) + 1) if len(points) else []
-
-
 def ring_segments(rings: Sequence[FloatArray]) -> FloatArray:
     """Ends (2 N, 2) of the segments that closed rings are made of, world meters."""
     ends = [np.repeat(ring, 2, axis=0)[1:-1] for ring in rings]

@@ -10,8 +10,8 @@ import rerun.blueprint as rrb
 
 from rose2_logs.config.run_options import RECORDING_LAYERS
 from rose2_logs.model.occupancy import FloatArray
+from rose2_logs.outputs.rerun.back_projected import BACK_PROJECTED, SEEN_SHARE
 from rose2_logs.outputs.rerun.lanes import FINAL_IOU, FINAL_SHARE, LIVES, SHIFTS
-from rose2_logs.outputs.rerun.projected import BACK_PROJECTED, SEEN_SHARE
 from rose2_logs.outputs.rerun.world import (
     CLEAN,
     DOORWAYS,

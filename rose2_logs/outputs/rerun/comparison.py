@@ -19,7 +19,7 @@ from rose2_logs.drawing.layout_picture import ROOM_COLORS, WALL_COLORS
 from rose2_logs.drawing.palette import track_color
 from rose2_logs.model.labels import known_window
 from rose2_logs.model.occupancy import UNKNOWN, FloatArray
-from rose2_logs.outputs.mcap.ros_messages import outer_rings
+from rose2_logs.model.outlines import outer_rings
 from rose2_logs.outputs.rerun.blueprint import PAPER, eye_above
 from rose2_logs.outputs.rerun.world import OUTLINE_POINTS, OUTLINE_SHADE, lifted
 from rose2_logs.system.files import replacing

@@ -16,12 +16,12 @@ from rose2_logs.drawing.extent import Extent
 from rose2_logs.drawing.palette import track_color
 from rose2_logs.errors import OutputError
 from rose2_logs.outputs.rerun import viewer as rerun_viewer
+from rose2_logs.outputs.rerun.back_projected import SmoothedWorld
 from rose2_logs.outputs.rerun.blueprint import COVERAGE_UNIT, make_blueprint, view_side_m
 from rose2_logs.outputs.rerun.columns import Entry, Scalar
 from rose2_logs.outputs.rerun.disk import abandon, require_space
 from rose2_logs.outputs.rerun.lanes import FINAL_IOU, FINAL_SHARE, SHIFTS, Lives
 from rose2_logs.outputs.rerun.layers import CHUNK_BYTES, Layers
-from rose2_logs.outputs.rerun.projected import SmoothedWorld
 from rose2_logs.outputs.rerun.summary import summary_text
 from rose2_logs.outputs.rerun.world import World
 from rose2_logs.runs.sink import RunInfo

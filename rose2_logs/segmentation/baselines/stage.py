@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rose2_logs.config.parameters import Parameters
+from rose2_logs.model.labels import number_rooms
 from rose2_logs.model.occupancy import BoolArray
-from rose2_logs.segmentation.floor_plan.rooms import number_rooms
 
 Labels = NDArray[np.int32]
 

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from rose2_logs.config.parameters import FloorPlanParameters
-from rose2_logs.model.labels import distinct_labels, label_sizes
 from rose2_logs.model.occupancy import BoolArray, FloatArray
 from rose2_logs.segmentation.floor_plan.faces import FaceGraph, rasterize
 
@@ -37,27 +36,6 @@ def clearance(
     greatest = np.zeros(count + 1, np.float32)
     np.maximum.at(greatest, face_of_cell[free], distance[free])
     return greatest[1:].astype(float) * resolution_m
-
-
-def number_rooms(
-    labels: NDArray[np.int32], highest: int, minimum_m2: float, resolution_m: float
-) -> NDArray[np.int32]:
-    """Number the labels up to `highest` by their first cell; those of less area than `minimum_m2` get 0.
-
-    Returns
-    -------
-    number : (N,) int32
-        Number of each label: ``number[labels]`` is the renumber_in_place image.
-    """
-    size = label_sizes(labels, highest)
-    keep = size * resolution_m**2 >= minimum_m2
-    keep[0] = False
-    present, first = distinct_labels(labels)
-    order = present[np.argsort(first)]
-    order = order[keep[order]]
-    number = np.zeros(len(size), np.int32)
-    number[order] = np.arange(1, len(order) + 1)
-    return number
 
 
 def adopt_left_out(

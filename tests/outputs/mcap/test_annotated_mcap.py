@@ -28,7 +28,7 @@ from rose2_logs.runs.stream import start_workers, tracked_snapshots
 from rose2_logs.runs.summary import RunTotals
 from rose2_logs.workflows.analyze import RunOptions, analyze_log
 
-PROJECT = Path(__file__).parents[2]
+PROJECT = Path(__file__).parents[3]
 SHARED = PROJECT.parent / "shared" / "bags"
 LOGS = {
     "sample mcap": PROJECT / "sample_logs" / "office.mcap",

@@ -11,8 +11,8 @@ from reader_logs import START_NS, Map, Update, growing_maps, write_bag, write_mc
 from rose2_logs.config.selection import Selection
 from rose2_logs.errors import LogError, ParameterError
 from rose2_logs.io import open_log
+from rose2_logs.io.grids import Grid
 from rose2_logs.io.map_stream import known_area_change_m2
-from rose2_logs.io.messages import Grid
 from rose2_logs.model.occupancy import GridGeometry
 from rose2_logs.system.warnings import collect_warnings
 

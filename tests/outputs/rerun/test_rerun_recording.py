@@ -21,7 +21,7 @@ from rose2_logs.tracking.registration import RigidMotion
 from rose2_logs.tracking.tracked_snapshot import MAP_TRACK, RoomEvent
 from rose2_logs.workflows.analyze import RunOptions, analyze_log
 
-PROJECT = Path(__file__).parents[2]
+PROJECT = Path(__file__).parents[3]
 BIN = Path(sys.executable).parent
 
 

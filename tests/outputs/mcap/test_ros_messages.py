@@ -11,13 +11,12 @@ from drawn_maps import office, snapshot
 
 from rose2_logs.config.parameters import Parameters, TrackingParameters
 from rose2_logs.model.occupancy import GridGeometry
-from rose2_logs.model.outlines import outline
+from rose2_logs.model.outlines import outer_rings, outline
 from rose2_logs.model.rooms import RoomMap
 from rose2_logs.outputs.mcap.ros_messages import (
     ROOMS_TYPE,
     MessageMaker,
     Triangles,
-    outer_rings,
     ring_segments,
     ros2_typestore,
 )

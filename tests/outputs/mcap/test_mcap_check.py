@@ -16,7 +16,7 @@ from rose2_logs.outputs.mcap import annotated as annotated_mcap
 from rose2_logs.outputs.mcap.check import Tallies, Tally, checked_copy
 from rose2_logs.workflows.analyze import RunOptions, analyze_log
 
-OFFICE = Path(__file__).parents[2] / "sample_logs" / "office.mcap"
+OFFICE = Path(__file__).parents[3] / "sample_logs" / "office.mcap"
 TOPICS = ("/a", "/b", "/silent")
 MESSAGES = [(k % 2, 10 * k, bytes([k]) * (k * 37)) for k in range(20)]
 

@@ -22,7 +22,7 @@ from PIL import Image
 from rose2_logs.config.selection import Selection
 from rose2_logs.workflows.analyze import RunOptions, analyze_log
 
-PROJECT = Path(__file__).parents[2]
+PROJECT = Path(__file__).parents[3]
 GOLDEN = Path(__file__).with_name("golden")
 BIN = Path(sys.executable).parent
 COVERAGES = (0.3, 0.6, 1.0)

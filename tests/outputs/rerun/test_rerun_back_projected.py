@@ -16,9 +16,9 @@ from rerun.chunk import RrdReader
 
 from rose2_logs.config.selection import Selection
 from rose2_logs.drawing.palette import track_color
+from rose2_logs.outputs.rerun.back_projected import SmoothedWorld
 from rose2_logs.outputs.rerun.layers import Layers
 from rose2_logs.outputs.rerun.pictures import FILL_OPACITY
-from rose2_logs.outputs.rerun.projected import SmoothedWorld
 from rose2_logs.system.text import percent
 from rose2_logs.tracking.back_projection import BackProjectedRooms, BackProjectedSnapshot
 from rose2_logs.tracking.registration import RigidMotion

@@ -20,7 +20,7 @@ from rose2_logs.runs.provenance import fingerprint, log_files
 from rose2_logs.runs.tables import TABLES
 from rose2_logs.workflows.analyze import RunOptions, analyze_log, log_stem, seconds_into_log
 
-SHARED_BAGS = Path(__file__).parents[2] / "shared" / "bags"
+SHARED_BAGS = Path(__file__).parents[3] / "shared" / "bags"
 TABLES_ONLY = RunOptions(recording=False, annotated_log=False)
 
 

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from reader_logs import START_NS, Map, Update, serialized, serialized_costmap, typestore
 
 from rose2_logs.errors import InvalidMapError
-from rose2_logs.io.messages import Grid, Patch, decoder, flat_yaw_of
+from rose2_logs.io.grids import Grid, Patch, flat_yaw_of
+from rose2_logs.io.messages import decoder
 
 GRID = "nav_msgs/msg/OccupancyGrid"
 ENCODINGS = {1: "ros1", 2: "cdr"}

@@ -25,7 +25,7 @@ from rose2_logs.outputs.mcap.annotated import ADDED
 from rose2_logs.outputs.mcap.viewer_layouts import offered
 from rose2_logs.workflows.analyze import RunOptions, analyze_log
 
-PROJECT = Path(__file__).parents[2]
+PROJECT = Path(__file__).parents[3]
 OFFICE, WING = PROJECT / "sample_logs" / "office.mcap", PROJECT / "sample_logs" / "wing.bag"
 PACKAGES = {
     "@mcap/core": "^2",

@@ -1,0 +1,150 @@
+"""Maps and patches as messages hold them, checked; whatever the message's format."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rose2_logs.config.parameters import ReadingParameters
+from rose2_logs.errors import InvalidMapError
+from rose2_logs.model.occupancy import UNKNOWN, GridGeometry
+
+Cells = NDArray[np.int8]
+
+
+FOXGLOVE_GRID_TYPE = "foxglove.Grid"
+MOST_CELLS = ReadingParameters().map_max_cells
+
+
+MOST_TILT_RAD = math.radians(5.0)
+"""A map that is tilted less out of the plane has its lengths right to half a percent."""
+
+
+UNIT_TOLERANCE = 0.01
+"""Quaternions whose length differs by less from 1 were rounded."""
+
+
+LONGEST_NAME_BYTES = 1024
+"""Of frames; more is damage."""
+
+
+class MapWarning(NamedTuple):
+    """What is odd about a map that can be read all the same: kind and text."""
+
+    kind: str
+    text: str
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """A whole map: stamp in nanoseconds, geometry, cells (H, W) int8 in {-1, 0..100}, what is odd."""
+
+    stamp_ns: int
+    geometry: GridGeometry
+    cells: Cells
+    map_warnings: tuple[MapWarning, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Patch:
+    """New values of a rectangle of the map before: stamp, first row and column, cells (h, w) int8."""
+
+    stamp_ns: int
+    row: int
+    column: int
+    cells: Cells
+    map_warnings: tuple[MapWarning, ...] = ()
+
+
+Decoder = Callable[[memoryview], Grid | Patch | None]
+
+
+def check_cells(rows: int, columns: int, most_cells: int) -> None:
+    """Refuse a map of more cells than may be.
+
+    Raises
+    ------
+    InvalidMapError
+        With the remedy.
+    """
+    if rows * columns > most_cells:
+        raise InvalidMapError(
+            f"it has {columns} x {rows} cells, the most that are read is {most_cells}; if it is real, "
+            "raise --set reading.map_max_cells"
+        )
+
+
+def percent(values: Cells, map_warnings: list[MapWarning]) -> Cells:
+    """Occupancy as -1, 0..100; any other value counts as unknown, as map savers take it, with a remark."""
+    if values.size == 0 or (values.min() >= UNKNOWN and values.max() <= 100):
+        return values
+    odd = (values < UNKNOWN) | (values > 100)
+    count = np.count_nonzero(odd)
+    map_warnings.append(
+        MapWarning("odd_values", f"{count} cells hold values outside -1..100 and count as unknown")
+    )
+    return np.where(odd, np.int8(UNKNOWN), values)
+
+
+def flat_yaw_of(quaternion: tuple[float, float, float, float], map_warnings: list[MapWarning]) -> float:
+    """Rotation about z, in radians, of a quaternion x, y, z, w; one of another length than 1 gets a remark.
+
+    Raises
+    ------
+    InvalidMapError
+        If it is not made of finite numbers, or tilts the map out of the plane.
+    """
+    x, y, z, w = quaternion
+    if not all(math.isfinite(part) for part in quaternion):
+        raise InvalidMapError(
+            f"the orientation of its origin ({x}, {y}, {z}, {w}) is not made of finite numbers"
+        )
+    length = math.hypot(*quaternion)
+    if abs(length - 1) > UNIT_TOLERANCE:
+        map_warnings.append(
+            MapWarning("quaternion", f"the orientation of its origin has the length {length:g}, not 1")
+        )
+    if length == 0 or math.isinf(length):
+        return 0.0
+    x, y, z, w = x / length, y / length, z / length, w / length
+    tilt = math.acos(min(max(w * w + z * z - x * x - y * y, -1.0), 1.0))
+    if tilt > MOST_TILT_RAD:
+        raise InvalidMapError(
+            f"its origin is tilted by {math.degrees(tilt):.0f} degrees out of the plane; only flat maps can "
+            "be read"
+        )
+    return yaw_of(x, y, z, w)
+
+
+def yaw_of(x: float, y: float, z: float, w: float) -> float:
+    """Rotation about z, in radians, of a quaternion of any length; all zeros, as left unset, mean none."""
+    # No division by the length: it drops out of the two arguments.
+    return math.atan2(2 * (w * z + x * y), w * w + x * x - y * y - z * z)
+
+
+def exact_resolution(single: float) -> float:
+    """Undo the writer's rounding to single precision: 0.05, not 0.0500000007."""
+    return float(str(np.float32(single)))
+
+
+def make_grid(
+    stamp_ns: int,
+    frame_id: str,
+    resolution_m: float,
+    pose: tuple[float, ...],
+    cells: Cells,
+    map_warnings: list[MapWarning],
+) -> Grid | None:
+    """Put a grid together; `pose` is x, y, z and the quaternion x, y, z, w. None if there are no cells."""
+    if cells.size == 0:
+        return None
+    x, y, _, *quaternion = pose
+    height, width = cells.shape
+    yaw_rad = flat_yaw_of((quaternion[0], quaternion[1], quaternion[2], quaternion[3]), map_warnings)
+    geometry = GridGeometry(resolution_m, (x, y), yaw_rad, frame_id, (height, width))
+    return Grid(stamp_ns, geometry, cells, tuple(map_warnings))
