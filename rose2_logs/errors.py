@@ -54,6 +54,14 @@ class CasesError(Rose2LogsError):
     """A file of evaluation cases, or a file that it names, cannot be used."""
 
 
+class ResultsError(LogError):
+    """A folder is not one that a run has written, or is damaged or of another version."""
+
+
+class MissingPackageError(Rose2LogsError):
+    """Something was asked for that needs a package that is not installed."""
+
+
 class OutputError(Rose2LogsError):
     """A result cannot be written."""
 

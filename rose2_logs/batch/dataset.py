@@ -14,7 +14,8 @@ from typing import Any
 import pyarrow as pa
 
 from rose2_logs.batch.folders import LOGS_FOLDER
-from rose2_logs.runs.tables import BACK_PROJECTED, SUMMARY, TABLES
+from rose2_logs.runs.summary import SUMMARY
+from rose2_logs.runs.tables import BACK_PROJECTED, TABLES
 from rose2_logs.system.files import part_of, replacing, writing
 
 TABLES_FOLDER = "tables"

@@ -24,7 +24,8 @@ from rose2_logs.batch.record import BatchSettings, Record, Signature, local_sign
 from rose2_logs.batch.task import LogOutcome, LogTask, Progress
 from rose2_logs.errors import LogError, OutputError, ParameterError
 from rose2_logs.io.discovery import BAG_DESCRIPTION
-from rose2_logs.runs.tables import BACK_PROJECTED, SUMMARY, TABLES
+from rose2_logs.runs.summary import SUMMARY
+from rose2_logs.runs.tables import BACK_PROJECTED, TABLES
 from rose2_logs.system.files import require_utf8
 
 logger = logging.getLogger(__name__)

@@ -224,7 +224,7 @@ def _analyze(task: LogTask, report: Report, warning_log: WarningLog) -> LogOutco
 def _analyze_local(task: LogTask, path: Path, signature: Signature, report: Report) -> LogOutcome:
     from rose2_logs.config.selection import Selection
     from rose2_logs.runs.provenance import fingerprint
-    from rose2_logs.runs.tables import SUMMARY
+    from rose2_logs.runs.summary import SUMMARY
     from rose2_logs.workflows.analyze import RunOptions, analyze_log, seconds_into_log
 
     if task.known is not None:

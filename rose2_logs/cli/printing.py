@@ -144,7 +144,7 @@ def print_run(result: RunResult) -> None:
     """Print where the results are and what a run found."""
     from rich.table import Table
 
-    totals = result.totals
+    totals = result.summary.totals
     events = totals.events
     table = Table(box=None, show_header=False, pad_edge=False)
     left_out = f" ({totals.invalid} could not be analyzed)" if totals.invalid else ""
@@ -155,8 +155,8 @@ def print_run(result: RunResult) -> None:
     table.add_row("changes", changes)
     if events["shifted"]:
         table.add_row("shifts of the map", f"{events['shifted']}; see shifted in events.parquet")
-    if result.layout_final is not None:
-        since = result.layout_final
+    if result.summary.layout_final is not None:
+        since = result.summary.layout_final
         in_the_end = f"from {since.coverage:.1%} coverage on, {_duration(since.time_s)}"
         span_ns = (totals.last_log_time_ns or 0) - (totals.first_log_time_ns or 0)
         if totals.snapshots > 1 and since.time_s == span_ns / 1e9:

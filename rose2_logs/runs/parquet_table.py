@@ -16,6 +16,8 @@ ROWS_PER_GROUP = 2000
 """Rows held back until they are written as one row group: some hundred kilobytes with polygons."""
 ROWS_PER_BATCH = 100
 """Rows held as Python objects, which take several times as much, until they become a batch of Arrow's."""
+BYTES_PER_GROUP = 1 << 24
+"""Shapes and images held back, in bytes, until they are written as a row group, however few rows they are."""
 COMPRESSION = "zstd"
 
 Row = dict[str, Any]
@@ -32,15 +34,19 @@ class ParquetTable:
         Its name.
     schema : pyarrow.Schema
         Its columns.
-    part : path, optional
-        Where it is written until then; by default hidden beside its name.
+
+    Attributes
+    ----------
+    part : path
+        Where it is written until then: hidden beside its name.
     """
 
-    def __init__(self, path: Path, schema: pa.Schema, part: Path | None = None) -> None:
-        self.part = part or part_of(path)
+    def __init__(self, path: Path, schema: pa.Schema) -> None:
+        self.part = part_of(path)
         self._path = path
         self._schema = schema
         self._rows: list[Row] = []
+        self._held_bytes = 0
         self._batches: list[pa.RecordBatch] = []
         self._writer: pq.ParquetWriter | None = None
 
@@ -61,9 +67,13 @@ class ParquetTable:
             If the file cannot be written.
         """
         self._rows += rows
+        self._held_bytes += sum(
+            len(value) for row in rows for value in row.values() if isinstance(value, bytes)
+        )
         if len(self._rows) >= ROWS_PER_BATCH:
             self._pack()
-        if sum(batch.num_rows for batch in self._batches) >= ROWS_PER_GROUP:
+        held = sum(batch.num_rows for batch in self._batches)
+        if held >= ROWS_PER_GROUP or self._held_bytes >= BYTES_PER_GROUP:
             self._flush()
 
     def _pack(self) -> None:
@@ -81,6 +91,7 @@ class ParquetTable:
             with writing(self._path):
                 self._writer.write_table(pa.Table.from_batches(self._batches).combine_chunks())
             self._batches = []
+        self._held_bytes = 0
 
     def close(self) -> None:
         """Write the last rows; the part can be read from now on.

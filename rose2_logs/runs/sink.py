@@ -1,20 +1,24 @@
-"""What every sink is: a context manager that receives finished snapshots in order and never feeds back."""
+"""What an output of a run is: it receives finished steps in order and never feeds back."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Protocol, Self, runtime_checkable
+from typing import TYPE_CHECKING, Any
 
 from rose2_logs.config.parameters import Parameters
 from rose2_logs.tracking.back_projection import BackProjectedSnapshot
 from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot
 
+if TYPE_CHECKING:
+    from rose2_logs.runs.history import RunSummary
+
 
 @dataclass(frozen=True)
 class RunInfo:
-    """What a sink knows of the run before the first snapshot.
+    """What is known of a run before its first map.
 
     Attributes
     ----------
@@ -32,7 +36,7 @@ class RunInfo:
         What is known of the input: format, size in bytes, SHA-256 fingerprint; JSON values only.
     origin : str, optional
         Where the log comes from if `log_path` is but a copy.
-    place : dict, optional
+    location : dict, optional
         Where the log lies on this machine, see `provenance.log_location`; none of a copy.
     """
 
@@ -43,44 +47,71 @@ class RunInfo:
     versions: dict[str, str]
     provenance: dict[str, Any]
     origin: str | None = None
-    place: dict[str, str | None] | None = None
+    location: dict[str, str | None] | None = None
 
 
-class Sink(Protocol):
-    """Receives every snapshot of a run in order.
+class Sink:
+    """An output of a run. Derive from it and override what is needed; `write` is the least.
 
-    Leaving the context without an exception makes the output whole: it is written beside its final name and
-    renamed; leaving it by an exception removes what was begun.
-    """
-
-    def __enter__(self) -> Self: ...
-
-    def write(self, step: TrackedSnapshot) -> None:
-        """Take one snapshot."""
-        ...
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None: ...
-
-
-@runtime_checkable
-class BackProjectedSink(Protocol):
-    """Also receives, after the last snapshot, all of them again by the layout of the last."""
-
-    def write_back_projected(self, found: BackProjectedSnapshot) -> None:
-        """Take one snapshot of the second pass."""
-        ...
-
-
-@runtime_checkable
-class CopyingSink(Protocol):
-    """A sink that copies the log too.
+    The calls come in this order: `begin`, `write` for each map, `write_back_projected` for each map once more
+    if the run projects its last layout back, `finish`. If the run fails, also within one of these calls,
+    `abandon` comes instead of what is left, and nothing half written may stay.
 
     Attributes
     ----------
-    copied : dict
-        What went in and what came out, for the summary, once the output is whole; JSON values.
+    facts : mapping
+        JSON values that ``summary.json`` is to hold, read after `finish`.
+
+    Examples
+    --------
+    >>> import rose2_logs as rl
+    >>> class RoomCounter(rl.Sink):
+    ...     def __init__(self):
+    ...         self.counts = []
+    ...
+    ...     def write(self, step):
+    ...         self.counts.append(len(step.rooms))
+    >>> counter = RoomCounter()
+    >>> run = rl.analyze("sample_logs/office.mcap", sinks=[counter], max_snapshots=3)
+    >>> len(counter.counts)
+    3
     """
 
-    copied: dict[str, Any]
+    facts: Mapping[str, Any] = {}
+
+    def begin(self, info: RunInfo) -> None:
+        """Get ready for the first map."""
+
+    def write(self, step: TrackedSnapshot) -> None:
+        """Take the next map with all that was found in it."""
+        raise NotImplementedError
+
+    def write_back_projected(self, found: BackProjectedSnapshot) -> None:
+        """Take what a map shows of the last map's rooms: all maps in order once more, after the last one."""
+
+    def finish(self, summary: RunSummary) -> None:
+        """Make the output whole: write it beside its final name first, then rename it."""
+
+    def abandon(self) -> None:
+        """Remove what was begun; the run has failed. Called once at most, and also if `begin` failed."""
+
+
+@contextmanager
+def abandoned_on_error(sinks: Sequence[Sink]) -> Iterator[None]:
+    """Let sinks remove what they have begun if anything fails within, the last one first.
+
+    A sink that fails to do so does not keep the others from it.
+    """
+    try:
+        yield
+    except BaseException:
+        _abandon(list(sinks))
+        raise
+
+
+def _abandon(sinks: list[Sink]) -> None:
+    if sinks:
+        try:
+            sinks.pop().abandon()
+        finally:
+            _abandon(sinks)

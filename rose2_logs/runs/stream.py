@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import logging
 import traceback
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import partial
 from pathlib import Path
 
 from rose2_logs.config.parameters import Parameters
 from rose2_logs.config.run_options import RunOptions
 from rose2_logs.errors import InvalidMapError
-from rose2_logs.io.log import LogReader
 from rose2_logs.io.poses import RobotPath
+from rose2_logs.model.analysis import SnapshotAnalysis
 from rose2_logs.model.explored import coarser_for_its_size
-from rose2_logs.model.occupancy import OccupancySnapshot, free_area_m2, is_same_to_analysis
-from rose2_logs.model.room_quality import room_quality
+from rose2_logs.model.occupancy import OccupancySnapshot, is_same_to_analysis
+from rose2_logs.model.room_quality import RoomQuality, room_quality
 from rose2_logs.runs.journal import Found, JournaledWorkers
-from rose2_logs.runs.summary import RunTotals
 from rose2_logs.segmentation.pipeline import analyze
 from rose2_logs.system.warnings import log_warning
 from rose2_logs.system.workers import Workers, give_back_freed_memory
@@ -43,57 +42,86 @@ def start_workers(options: RunOptions) -> SnapshotWorkers:
     return Workers(work, options.workers)
 
 
-def tracked_snapshots(
-    reader: LogReader,
-    last: OccupancySnapshot,
-    workers: SnapshotWorkers | JournaledWorkers,
-    parameters: Parameters,
-    totals: RunTotals,
-    path: RobotPath | None = None,
-) -> Iterator[TrackedSnapshot]:
-    """Yield every map of a log with its rooms and their identity.
+class TrackedStream:
+    """The maps of a log with their rooms and the rooms' identity, one after the other; to be read once.
 
     Parameters
     ----------
-    reader : LogReader
-        The log.
-    last : OccupancySnapshot
-        The last map of the run, which coverage refers to.
+    snapshots : iterable of OccupancySnapshot
+        The maps.
+    final_free_m2 : float
+        Known free area of the last map of the run in square meters, which coverage refers to.
     workers : Workers
         What analyzes the maps, started.
     parameters : Parameters
         Those that it was started with.
-    totals : RunTotals
-        Maps that cannot be analyzed are left out and counted as invalid here.
+    source : str
+        What warnings call the log.
+    topic : str, optional
+        The map topic.
     path : RobotPath, optional
         Where the robot was, to be told with the maps.
+
+    Attributes
+    ----------
+    invalid : int
+        Maps so far that could not be analyzed and were left out.
+    unchanged : int
+        Maps so far with the free and occupied cells of the one before, whose analysis was taken over.
     """
-    final_free_m2 = free_area_m2(last, parameters.occupancy)
-    tracker = RoomTracker(parameters.tracking, parameters.occupancy)
-    layout = LayoutFollower()
-    said = False
-    is_same = partial(is_same_to_analysis, parameters=parameters.occupancy)
-    for number, (snapshot, found) in enumerate(workers.map(reader.snapshots(), is_same), start=1):
-        if number % GIVE_BACK_EVERY == 0:
-            give_back_freed_memory()
-        if isinstance(found, InvalidMapError):
-            totals.invalid += 1
-            text = f"{reader.info.path}: snapshot {snapshot.index} is left out: {found}"
-            log_warning(logger, "snapshot_left_out", text, file=reader.info.path, topic=reader.topic)
-            continue
-        analysis, evidence = found
-        note = coarser_for_its_size(snapshot.geometry, analysis.resolution_m, parameters.occupancy)
-        if note is not None and not said:
+
+    def __init__(
+        self,
+        snapshots: Iterable[OccupancySnapshot],
+        final_free_m2: float,
+        workers: SnapshotWorkers | JournaledWorkers,
+        parameters: Parameters,
+        *,
+        source: str = "the maps",
+        topic: str | None = None,
+        path: RobotPath | None = None,
+    ) -> None:
+        self.invalid = 0
+        self.unchanged = 0
+        self._snapshots = snapshots
+        self._final_free_m2 = final_free_m2
+        self._workers = workers
+        self._occupancy = parameters.occupancy
+        self._source, self._topic = source, topic
+        self._path = path
+        self._tracker = RoomTracker(parameters.tracking, parameters.occupancy)
+        self._layout = LayoutFollower()
+        self._has_told_coarser = False
+
+    def __iter__(self) -> Iterator[TrackedSnapshot]:
+        is_same = partial(is_same_to_analysis, parameters=self._occupancy)
+        analyzed = self._workers.map(self._snapshots, is_same)
+        for number, (snapshot, found) in enumerate(analyzed, start=1):
+            if number % GIVE_BACK_EVERY == 0:
+                give_back_freed_memory()
+            if isinstance(found, InvalidMapError):
+                self.invalid += 1
+                text = f"{self._source}: snapshot {snapshot.index} is left out: {found}"
+                log_warning(logger, "snapshot_left_out", text, file=self._source, topic=self._topic)
+            else:
+                yield self._step(snapshot, *found)
+
+    def _step(
+        self, snapshot: OccupancySnapshot, analysis: SnapshotAnalysis, quality: RoomQuality
+    ) -> TrackedSnapshot:
+        note = coarser_for_its_size(snapshot.geometry, analysis.resolution_m, self._occupancy)
+        if note is not None and not self._has_told_coarser:
             logger.warning("snapshot %d and those of its size: %s", snapshot.index, note)
-            said = True
+            self._has_told_coarser = True
         if analysis.index != snapshot.index:
             analysis = analysis.again_for(snapshot)
-            totals.unchanged += 1
-        track_ids, events = tracker.update(snapshot, analysis)
-        change = layout.update(analysis.rooms, track_ids, map_motion(events))
-        coverage = min(analysis.free_area_m2 / final_free_m2, 1.0) if final_free_m2 > 0 else 0.0
-        way = None if path is None else path.until(snapshot.log_time_ns)
-        yield TrackedSnapshot(snapshot, analysis, coverage, track_ids, events, evidence, change, way)
+            self.unchanged += 1
+        track_ids, events = self._tracker.update(snapshot, analysis)
+        change = self._layout.update(analysis.rooms, track_ids, map_motion(events))
+        final_m2 = self._final_free_m2
+        coverage = min(analysis.free_area_m2 / final_m2, 1.0) if final_m2 > 0 else 0.0
+        poses = None if self._path is None else self._path.until(snapshot.log_time_ns)
+        return TrackedSnapshot(snapshot, analysis, coverage, track_ids, events, quality, change, poses)
 
 
 def _analyze_or_refuse(

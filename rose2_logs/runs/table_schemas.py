@@ -227,6 +227,77 @@ TRACKS = _table(
     {"geo": json.dumps(GEOPARQUET, sort_keys=True)},
 )
 
+_ENDS: dict[str, tuple[pa.DataType, str]] = {
+    "x0_m": (pa.float64(), "world x of one end, meters"),
+    "y0_m": (pa.float64(), "world y of one end, meters"),
+    "x1_m": (pa.float64(), "world x of the other end, meters"),
+    "y1_m": (pa.float64(), "world y of the other end, meters"),
+}
+
+WALLS = _table(
+    {
+        **_SNAPSHOT,
+        **_ENDS,
+        "direction": (
+            pa.int32(),
+            "the segment's direction: index into directions_rad of the map; greater for a local direction",
+        ),
+        "line": (
+            pa.int32(),
+            "number of the wall cluster's representative line among the map's lines, from 0; -1 for none",
+        ),
+    }
+)
+"""Wall segments of every map."""
+
+LINES = _table(
+    {
+        **_SNAPSHOT,
+        **_ENDS,
+        "direction": (
+            pa.int32(),
+            "its direction: index into directions_rad of the map; greater for a local one",
+        ),
+        "weight": (pa.float64(), "share of the line that wall segments cover, in [0, 1]"),
+    }
+)
+"""Representative lines of every map."""
+
+MAPS = _table(
+    {
+        **_SNAPSHOT,
+        "first_row": (pa.int32(), "first row of the explored window in the grid"),
+        "first_column": (pa.int32(), "first column of the explored window in the grid"),
+        "rows": (pa.int32(), "number of rows of the window"),
+        "columns": (pa.int32(), "number of columns of the window"),
+        "cells_zstd": (
+            pa.binary(),
+            "Zstandard frame of int8 for each cell of the window, row by row from the origin: -1 unknown, "
+            "0 free, 50 between the thresholds, 100 occupied",
+        ),
+        "labels_zstd": (
+            pa.binary(),
+            "label image: Zstandard frame of little-endian int32 for each cell of the window, row by row "
+            "from the origin: track of its room, 0 for none",
+        ),
+    }
+)
+"""The map and the label image of every snapshot."""
+
+SCHEMAS = {
+    "snapshots_along": SNAPSHOTS_ALONG,
+    "snapshots": SNAPSHOTS,
+    "rooms": ROOMS,
+    "tracks": TRACKS,
+    "events": EVENTS,
+    "doorways": DOORWAYS,
+    "walls": WALLS,
+    "lines": LINES,
+    "maps": MAPS,
+    "back_projected": BACK_PROJECTED,
+}
+"""The schema of each table of a run."""
+
 ROOM_CHANGES = _table(
     {
         "status": (

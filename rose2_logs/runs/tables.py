@@ -1,118 +1,51 @@
-"""The run as Parquet tables: snapshots, rooms, tracks, events, doorways."""
+"""Rows of a run's tables, made of steps and of what the run came to."""
 
 from __future__ import annotations
 
-from contextlib import ExitStack
-from pathlib import Path
-from types import TracebackType
-from typing import Self
+from collections.abc import Callable
+from typing import Any
 
-from rose2_logs.runs.convergence_tables import write_convergence
-from rose2_logs.runs.parquet_table import ParquetTable, Row
+import numpy as np
+import zstandard
+from numpy.typing import NDArray
+
+from rose2_logs.config.parameters import OccupancyParameters
+from rose2_logs.model.labels import known_window
+from rose2_logs.model.occupancy import UNKNOWN, classify
+from rose2_logs.tracking.back_projection import BackProjectedSnapshot
 from rose2_logs.tracking.convergence import Convergence
-from rose2_logs.tracking.track_history import SnapshotRef, TrackHistories, quality_of
+from rose2_logs.tracking.track_history import SnapshotRef, TrackHistory, quality_of
 from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot
 
+TABLES = ("snapshots", "rooms", "tracks", "events", "doorways", "walls", "lines", "maps")
+"""The tables of every run, each a file ``<name>.parquet``."""
+BACK_PROJECTED = "back_projected"
+"""The table that only a run has that projects its last layout back."""
+FREE, BETWEEN, OCCUPIED = 0, 50, 100
+"""Classes of known cells in the stored maps, as map_server would publish them: free, between the thresholds,
+occupied. Unknown cells are -1."""
+COMPRESSION_LEVEL = 3
+"""Of zstd, its default: what is gained above it takes longer than it is worth."""
+CELLS_AT_ONCE = 2**20
+"""Cells of an image that are converted and compressed at once."""
 
-class Tables:
-    """Sink that writes ``snapshots``, ``rooms``, ``tracks``, ``events``, ``doorways``, each ``.parquet``.
-
-    The tables hold nothing but what the log and the parameters determine: the same run gives the same bytes.
-    What only the last map tells is added at the end, by reading the rooms once more from the disk.
-
-    Parameters
-    ----------
-    folder : path
-        Where to; it is made.
-
-    Attributes
-    ----------
-    histories : TrackHistories
-        What is known of every room over the run.
-    convergence : Convergence or None
-        What the last map tells of the ones before, after `measure_convergence`.
-    """
-
-    def __init__(self, folder: Path) -> None:
-        self.histories = TrackHistories()
-        self.convergence: Convergence | None = None
-        self._folder = folder
-        self._stack = ExitStack()
-        self._tables: dict[str, ParquetTable] = {}
-
-    def __enter__(self) -> Self:
-        from rose2_logs.runs import table_schemas
-
-        # Snapshots get two columns more in the end, and are written anew.
-        along = self._folder / ".snapshots.along.parquet.part"
-        with ExitStack() as opening:
-            for name, schema, part in (
-                ("along", table_schemas.SNAPSHOTS_ALONG, along),
-                ("snapshots", table_schemas.SNAPSHOTS, None),
-                ("rooms", table_schemas.ROOMS, None),
-                ("tracks", table_schemas.TRACKS, None),
-                ("events", table_schemas.EVENTS, None),
-                ("doorways", table_schemas.DOORWAYS, None),
-            ):
-                path = self._folder / f"{'snapshots' if name == 'along' else name}.parquet"
-                self._tables[name] = opening.enter_context(ParquetTable(path, schema, part))
-            self._stack = opening.pop_all()
-        return self
-
-    def write(self, step: TrackedSnapshot) -> None:
-        """Take one snapshot.
-
-        Raises
-        ------
-        OutputError
-            If a file cannot be written.
-        """
-        self.histories.add(step)
-        about = {"snapshot": step.snapshot.index, "log_time_ns": step.snapshot.log_time_ns}
-        self._tables["along"].add([about | _snapshot_row(step, self.histories.snapshot_ref(step))])
-        self._tables["rooms"].add([about | row for row in _room_rows(step)])
-        self._tables["events"].add([about | row for row in _event_rows(step)])
-        self._tables["doorways"].add([about | row for row in _doorway_rows(step)])
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        with self._stack:
-            if kind is None:
-                self.measure_convergence()
-                _, *tables = self._tables.values()
-                for table in tables:
-                    table.publish()
-
-    def measure_convergence(self) -> None:
-        """Find what the last map tells of the ones before: after the last snapshot; the end does it else.
-
-        Raises
-        ------
-        OutputError
-            If a file cannot be written or read back.
-        """
-        if self.convergence is not None:
-            return
-        for name in ("along", "rooms", "events", "doorways"):
-            self._tables[name].close()
-        self.convergence = write_convergence(
-            self.histories,
-            rooms_path=self._tables["rooms"].part,
-            along_path=self._tables["along"].part,
-            snapshots=self._tables["snapshots"],
-            tracks=self._tables["tracks"],
-        )
+Row = dict[str, Any]
 
 
-def _snapshot_row(step: TrackedSnapshot, snapshot_ref: SnapshotRef) -> Row:
+def snapshot_key(step: TrackedSnapshot | BackProjectedSnapshot) -> Row:
+    """Return what all tables with rows per map begin with."""
+    return {"snapshot": step.snapshot.index, "log_time_ns": step.snapshot.log_time_ns}
+
+
+def snapshot_row(step: TrackedSnapshot, ref: SnapshotRef) -> Row:
+    """Give the row of a map, as far as it is known along the run."""
     snapshot, analysis, geometry = step.snapshot, step.analysis, step.analysis.geometry
     structure, walls, plan = analysis.structure, analysis.walls, analysis.floor_plan
     change = step.change
     x, y, yaw = (0.0, 0.0, 0.0) if change is None else change.drift.pose
     return {
         "stamp_ns": snapshot.stamp_ns,
-        "time_s": snapshot_ref.time_s,
+        "time_s": ref.time_s,
         "coverage": step.coverage,
         "free_area_m2": analysis.free_area_m2,
         "rooms": len(analysis.rooms),
@@ -142,7 +75,8 @@ def _snapshot_row(step: TrackedSnapshot, snapshot_ref: SnapshotRef) -> Row:
     }
 
 
-def _room_rows(step: TrackedSnapshot) -> list[Row]:
+def room_rows(step: TrackedSnapshot) -> list[Row]:
+    """Give a row per room, by track."""
     rooms, tracks = step.analysis.rooms, step.track_ids
     rows = []
     points = rooms.label_points_m.tolist()
@@ -166,7 +100,8 @@ def _room_rows(step: TrackedSnapshot) -> list[Row]:
     return sorted(rows, key=lambda row: row["track"])
 
 
-def _event_rows(step: TrackedSnapshot) -> list[Row]:
+def event_rows(step: TrackedSnapshot) -> list[Row]:
+    """Give a row per event."""
     rows = []
     for event in step.events:
         motion = event.motion
@@ -185,7 +120,8 @@ def _event_rows(step: TrackedSnapshot) -> list[Row]:
     return rows
 
 
-def _doorway_rows(step: TrackedSnapshot) -> list[Row]:
+def doorway_rows(step: TrackedSnapshot) -> list[Row]:
+    """Give a row per doorway."""
     rows = []
     for doorway in step.analysis.rooms.doorways:
         track_a, track_b = sorted(step.track_ids[room - 1] for room in doorway.rooms)
@@ -204,11 +140,119 @@ def _doorway_rows(step: TrackedSnapshot) -> list[Row]:
     return rows
 
 
-TABLES = ("snapshots", "rooms", "tracks", "events", "doorways")
+def wall_rows(step: TrackedSnapshot) -> list[Row]:
+    """Give a row per wall segment."""
+    walls = step.analysis.walls
+    if walls is None:
+        return []
+    rows = zip(
+        walls.segments_m.tolist(),
+        walls.segment_direction.tolist(),
+        walls.segment_cluster.tolist(),
+        strict=True,
+    )
+    return [ends_of(ends) | {"direction": direction, "line": line} for ends, direction, line in rows]
 
 
-BACK_PROJECTED = "back_projected"
-"""Name of the table that a run has only where it was asked to back_project."""
+def line_rows(step: TrackedSnapshot) -> list[Row]:
+    """Give a row per representative line."""
+    walls = step.analysis.walls
+    if walls is None:
+        return []
+    rows = zip(walls.lines_m.tolist(), walls.line_direction.tolist(), walls.line_weight.tolist(), strict=True)
+    return [ends_of(ends) | {"direction": direction, "weight": weight} for ends, direction, weight in rows]
 
 
-SUMMARY = "summary.json"
+def ends_of(ends_m: list[float]) -> Row:
+    """Columns for the ends x0, y0, x1, y1 of a line."""
+    return dict(zip(("x0_m", "y0_m", "x1_m", "y1_m"), ends_m, strict=True))
+
+
+def map_row(step: TrackedSnapshot, parameters: OccupancyParameters) -> Row:
+    """Give the explored window of a map: the classes of its cells, and the track of each cell."""
+    rows, columns = known_window(step.snapshot.cells != UNKNOWN)
+    cells, labels = step.snapshot.cells[rows, columns], step.analysis.rooms.labels[rows, columns]
+    track_of_room = np.array([0, *step.track_ids], "<i4")
+    return {
+        "first_row": rows.start,
+        "first_column": columns.start,
+        "rows": rows.stop - rows.start,
+        "columns": columns.stop - columns.start,
+        "cells_zstd": pack_image(cells, lambda part: cell_classes(part, parameters)),
+        "labels_zstd": pack_image(labels, lambda part: track_of_room[part]),
+    }
+
+
+def cell_classes(cells: NDArray[np.int8], parameters: OccupancyParameters) -> NDArray[np.int8]:
+    """Classes of cells: -1 unknown, `FREE`, `BETWEEN` the thresholds, `OCCUPIED`."""
+    free, occupied = classify(cells, parameters)
+    classes = np.where(cells == UNKNOWN, np.int8(UNKNOWN), np.int8(BETWEEN))
+    classes[free], classes[occupied] = FREE, OCCUPIED
+    return classes
+
+
+def pack_image(image: NDArray[Any], convert: Callable[[NDArray[Any]], NDArray[Any]] = np.asarray) -> bytes:
+    """Compress an image (H, W), converted some rows at a time, row by row as one Zstandard frame."""
+    packer = zstandard.ZstdCompressor(COMPRESSION_LEVEL).compressobj()
+    parts = np.array_split(image, max(1, image.size // CELLS_AT_ONCE))
+    packed = [packer.compress(np.ascontiguousarray(convert(part)).data.cast("B")) for part in parts]
+    return b"".join([*packed, packer.flush()])
+
+
+def unpack_image(packed: bytes, shape: tuple[int, int], dtype: str) -> NDArray[Any]:
+    """Undo `pack_image`.
+
+    Raises
+    ------
+    ValueError
+        If the bytes are not such an image of that shape.
+    """
+    size = shape[0] * shape[1] * np.dtype(dtype).itemsize
+    try:
+        # One byte more than wanted, so that what is longer is told from what is right.
+        data = zstandard.ZstdDecompressor().stream_reader(packed).read(size + 1)
+    except zstandard.ZstdError as error:
+        raise ValueError(str(error)) from error
+    if len(data) != size:
+        raise ValueError(f"it does not hold {shape[0]} x {shape[1]} cells")
+    return np.frombuffer(data, dtype).reshape(shape)
+
+
+def back_projected_rows(found: BackProjectedSnapshot) -> list[Row]:
+    """Give a row per room of the last map of which the map shows something."""
+    areas_m2, last_m2 = found.rooms.areas_m2, found.last_rooms.areas_m2
+    return [
+        {"track": track, "area_m2": areas_m2[room], "last_area_share": areas_m2[room] / last_m2[room]}
+        for room, track in enumerate(found.track_ids)
+        if areas_m2[room] > 0
+    ]
+
+
+def track_row(track: int, history: TrackHistory, convergence: Convergence, *, in_last_map: bool) -> Row:
+    """Give the row of a track."""
+    return {
+        "track": track,
+        **_moment("first", history.first),
+        **_moment("last", history.last),
+        "maps": history.maps,
+        "area_m2": history.area_m2,
+        "predicted_area_m2": history.polygon.area,
+        **_moment("area_settled", convergence.area_settled[track]),
+        **_moment("shape_right", convergence.shape_right.get(track)),
+        "shape_right_seen_share": convergence.shape_right_seen.get(track),
+        "in_last_map": in_last_map,
+        "wall_support": history.wall_support,
+        "frontier_m": history.frontier_m,
+        "splits": history.splits,
+        "merges": history.merges,
+        "losses": history.losses,
+        "polygon_wkb": history.polygon.wkb,
+    }
+
+
+def _moment(name: str, snapshot_ref: SnapshotRef | None) -> dict[str, Any]:
+    return {
+        f"{name}_snapshot": snapshot_ref and snapshot_ref.snapshot,
+        f"{name}_time_s": snapshot_ref and snapshot_ref.time_s,
+        f"{name}_coverage": snapshot_ref and snapshot_ref.coverage,
+    }

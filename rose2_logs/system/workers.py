@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import multiprocessing
 import os
 import shutil
@@ -15,7 +16,7 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack, contextmanager, suppress
 from functools import lru_cache
 from multiprocessing.context import BaseContext
-from types import TracebackType
+from types import ModuleType, TracebackType
 from typing import TYPE_CHECKING, Any, Generic, Self, TypeVar
 
 from rose2_logs.errors import Rose2LogsError
@@ -31,6 +32,9 @@ LOOK_AHEAD_PER_WORKER = 2
 """Items handed out and not yet taken back, for each worker: one in work and one waiting."""
 MOST_ON_WINDOWS = 61
 """Processes that one can wait for at once on Windows: 64 objects, less those of the pool itself."""
+START_METHOD = "forkserver" if sys.platform == "linux" else "spawn"
+"""How processes start. On Linux they are copies of a fresh process that has imported what the function needs,
+once for all; on other systems libraries do not bear to be copied after their import."""
 THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "RAYON_NUM_THREADS")
 """Where OpenMP, the linear algebra libraries and Rerun look for the number of threads when loaded."""
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3
@@ -127,7 +131,7 @@ class Workers(Generic[Item, Result]):
         except BrokenProcessPool as error:
             raise WorkerError(
                 f"one of {self._count} worker processes was killed, likely for lack of memory; "
-                "use fewer --workers"
+                "use fewer workers"
             ) from error
 
     def _map_here(
@@ -162,17 +166,34 @@ def ordered_map(
         yield from processes.map(items)
 
 
-def _context(function: Callable[..., Any]) -> BaseContext:
-    """Choose how processes start: never by a copy of this one, whose threads (Rerun, Arrow) might lock up.
+_OwnProcess: Any = multiprocessing.get_context(START_METHOD).Process
 
-    On Linux they are copies of a fresh process that has imported what the function needs, once for all. On
-    other systems libraries do not bear to be copied after their import, so that each process imports anew.
+
+class WorkerProcess(_OwnProcess):  # type: ignore[misc]
+    """A process that starts without the user's script, which nothing that it calls needs.
+
+    Python's own way imports it once more in each process, so that a script without a ``__main__`` guard would
+    start all its work again.
     """
-    if sys.platform != "linux":
-        return multiprocessing.get_context("spawn")
-    context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload([getattr(function, "func", function).__module__])
-    return context
+
+    @staticmethod
+    def _Popen(process: Any) -> Any:  # noqa: N802 (the name that multiprocessing calls)
+        script = sys.modules["__main__"]
+        sys.modules["__main__"] = ModuleType("__main__")
+        try:
+            return _OwnProcess._Popen(process)
+        finally:
+            sys.modules["__main__"] = script
+
+
+def _context(function: Callable[..., Any]) -> BaseContext:
+    """Choose how processes start: never by a copy of this one, whose threads (Rerun, Arrow) might lock up."""
+    context: Any = copy.copy(multiprocessing.get_context(START_METHOD))
+    if START_METHOD == "forkserver":
+        context.set_forkserver_preload([getattr(function, "func", function).__module__])
+    context.Process = WorkerProcess
+    chosen: BaseContext = context
+    return chosen
 
 
 class _Task:

@@ -6,8 +6,7 @@ import dataclasses
 import glob
 import logging
 import time
-from collections.abc import Callable
-from contextlib import ExitStack
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -19,19 +18,19 @@ from rose2_logs.io import inspect_log, open_log
 from rose2_logs.io.discovery import stem_of
 from rose2_logs.io.log import LogReader
 from rose2_logs.io.log_file import LATEST_NS
+from rose2_logs.model.occupancy import OccupancySnapshot, free_area_m2
 from rose2_logs.outputs.mcap.viewer_layouts import bag_metadata_path, foxglove_path, rviz_path
-from rose2_logs.runs.back_projected_table import BackProjectedTable
+from rose2_logs.runs.history import RunHistory, RunSummary
 from rose2_logs.runs.journal import JournaledWorkers
 from rose2_logs.runs.output_folder import OutputFolder
 from rose2_logs.runs.provenance import fingerprint, log_location, software_versions
-from rose2_logs.runs.sink import BackProjectedSink, CopyingSink, RunInfo, Sink
-from rose2_logs.runs.stream import SnapshotWorkers, start_workers, tracked_snapshots
-from rose2_logs.runs.summary import RunTotals, write_summary
-from rose2_logs.runs.tables import BACK_PROJECTED, SUMMARY, TABLES, Tables
+from rose2_logs.runs.sink import RunInfo, Sink, abandoned_on_error
+from rose2_logs.runs.store import RunStore, table_path
+from rose2_logs.runs.stream import SnapshotWorkers, TrackedStream, start_workers
+from rose2_logs.runs.summary import SUMMARY, write_summary
+from rose2_logs.runs.tables import BACK_PROJECTED, TABLES
 from rose2_logs.system.files import refuse_existing, require_short, require_utf8
 from rose2_logs.system.warnings import WarningLog, collect_warnings, muted
-from rose2_logs.tracking.back_projection import RunBackProjection
-from rose2_logs.tracking.track_history import SnapshotRef
 from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot
 
 __all__ = [
@@ -51,13 +50,12 @@ NAMELESS = "log"
 
 @dataclass(frozen=True)
 class RunResult:
-    """What a run has written, its totals, since when the layout was as in the end, what was odd."""
+    """What a run has written, what it came to, and what was odd about the log."""
 
     folder: Path
     files: tuple[Path, ...]
-    totals: RunTotals
+    summary: RunSummary
     seconds: float
-    layout_final: SnapshotRef | None
     warnings: WarningLog = field(default_factory=WarningLog)
 
 
@@ -100,7 +98,11 @@ def seconds_into_log(
 
 
 def analyze_log(
-    path: Path, folder: Path, options: RunOptions, on_snapshot: OnSnapshot | None = None
+    path: Path,
+    folder: Path,
+    options: RunOptions | None = None,
+    on_snapshot: OnSnapshot | None = None,
+    sinks: Sequence[Sink] = (),
 ) -> RunResult:
     """Analyze a log and write all results to a folder.
 
@@ -110,10 +112,12 @@ def analyze_log(
         The log.
     folder : path
         Where to; it is made. All results appear in it at the end, the summary last.
-    options : RunOptions
-        What to take, do and write.
+    options : RunOptions, optional
+        What to take, do and write; by default everything of the only map topic.
     on_snapshot : callable, optional
         To show progress.
+    sinks : sequence of Sink
+        Further outputs, which receive each step before those of this package.
 
     Raises
     ------
@@ -125,14 +129,20 @@ def analyze_log(
     StrictError
         If something is odd, where that is an error.
     AlreadyWholeError
-        If a run is to go on that is over.
+        If a run is to be resumed that is over.
     """
+    options = options or RunOptions()
     with collect_warnings(options.strict) as warnings:
-        return _analyze_log(path, folder, options, on_snapshot, warnings)
+        return _analyze_log(path, folder, options, on_snapshot, sinks, warnings)
 
 
 def _analyze_log(
-    path: Path, folder: Path, options: RunOptions, on_snapshot: OnSnapshot | None, warnings: WarningLog
+    path: Path,
+    folder: Path,
+    options: RunOptions,
+    on_snapshot: OnSnapshot | None,
+    sinks: Sequence[Sink],
+    warnings: WarningLog,
 ) -> RunResult:
     start = time.perf_counter()
     for named in (path, folder):
@@ -157,83 +167,93 @@ def _analyze_log(
         info = _run_info(path, folder, reader, options)
         made = output.made(_facts(info, options), overwrite=options.overwrite, resume=options.resume)
         with made as (work, journal):
+            planned = _planned_files(work, path, options)
+            outputs = [*sinks, *_make_sinks(planned, options, reader)]
             workers = JournaledWorkers(processes, journal) if options.journal else processes
-            result = _analyze(reader, workers, work, info, options, on_snapshot, warnings, start)
-    return dataclasses.replace(result, folder=folder, files=output.files)
+            summary = _follow(reader, workers, work, info, options, outputs, on_snapshot)
+            if options.origin is not None:
+                warnings.rename(str(path), options.origin)
+            seconds = time.perf_counter() - start
+            write_summary(
+                planned["summary"],
+                info,
+                summary,
+                selection=dataclasses.asdict(options.selection),
+                messages=dataclasses.asdict(reader.counts),
+                files=[file.name for name, file in planned.items() if name != "summary"],
+                warnings=warnings.as_json(),
+                facts={name: value for sink in outputs for name, value in sink.facts.items()},
+                seconds=seconds,
+                workers=options.workers,
+            )
+    return RunResult(folder, output.files, summary, seconds, warnings)
 
 
-def _analyze(
+def _follow(
     reader: LogReader,
     workers: SnapshotWorkers | JournaledWorkers,
     folder: Path,
     info: RunInfo,
     options: RunOptions,
+    sinks: Sequence[Sink],
     on_snapshot: OnSnapshot | None,
-    warnings: WarningLog,
-    start: float,
-) -> RunResult:
-    """Write all results of an open log to a folder that is there; the run began at `start`."""
-    path = info.log_path
-    planned = _planned_files(folder, path, options)
-    totals = RunTotals()
+) -> RunSummary:
+    """Take the log's maps one by one to the history, the store and the sinks, and finish these."""
+    parameters = options.parameters
     last = reader.last()
-    projector = RunBackProjection(options.parameters) if options.back_project else None
-    step: TrackedSnapshot | None = None
-    first_ns: int | None = None
-    way = reader.robot_path(last.geometry.frame_id) if "path" in options.shown_layers else None
-    with ExitStack() as stack:
-        tables = Tables(folder)
-        others = _make_sinks(planned, info, options, tables, reader)
-        sinks = [stack.enter_context(sink) for sink in (tables, *others)]
-        for step in tracked_snapshots(reader, last, workers, options.parameters, totals, way):
+    history = RunHistory(parameters, back_project=options.back_project)
+    stream = TrackedStream(
+        reader.snapshots(),
+        free_area_m2(last, parameters.occupancy),
+        workers,
+        parameters,
+        source=str(info.log_path),
+        topic=info.topic,
+        path=reader.robot_path(last.geometry.frame_id) if "path" in options.shown_layers else None,
+    )
+    store = RunStore(folder, parameters.occupancy, back_project=options.back_project)
+    with store, abandoned_on_error(sinks):
+        for sink in sinks:
+            sink.begin(info)
+        for step in stream:
+            history.add(step)
+            store.write(step, history)
             for sink in sinks:
                 sink.write(step)
-            totals.add(step)
-            if projector is not None:
-                projector.add(step)
-            logger.info(
-                "snapshot %d: coverage %.1f %%, %d rooms",
-                step.snapshot.index,
-                100 * step.coverage,
-                len(step.track_ids),
-            )
-            if on_snapshot is not None:
-                now_ns = step.snapshot.log_time_ns
-                first_ns = now_ns if first_ns is None else first_ns
-                on_snapshot(step, (now_ns - first_ns) / max(last.log_time_ns - first_ns, 1))
-        messages = dataclasses.asdict(reader.counts)
-        if step is None:
-            raise InvalidMapError(f"{path}: none of its {totals.invalid} maps can be analyzed")
-        if projector is not None:
-            logger.info("the maps are read once more, to be back_projected")
-            receiving = [sink for sink in sinks if isinstance(sink, BackProjectedSink)]
-            # What is odd was told the first time.
-            with muted(), BackProjectedTable(planned[BACK_PROJECTED]) as table:
-                for found in projector.back_projected(reader.snapshots()):
-                    for receiver in (table, *receiving):
-                        receiver.write_back_projected(found)
-        tables.measure_convergence()
-    if options.origin is not None:
-        warnings.rename(str(path), options.origin)
-    seconds = time.perf_counter() - start
-    files = {name: file for name, file in planned.items() if name != "summary"}
-    write_summary(
-        planned["summary"],
-        info,
-        totals,
-        tables.histories,
-        tables.convergence,
-        selection=dataclasses.asdict(options.selection),
-        messages=messages,
-        files=[file.name for file in files.values()],
-        warnings=warnings.as_json(),
-        copied=next((sink.copied for sink in sinks if isinstance(sink, CopyingSink)), None),
-        seconds=seconds,
-        workers=options.workers,
-    )
-    layout_final = None if tables.convergence is None else tables.convergence.layout_final
-    written = (*files.values(), planned["summary"])
-    return RunResult(folder, written, totals, seconds, layout_final, warnings)
+            _tell_progress(step, history, last, on_snapshot)
+        if not history.totals.snapshots:
+            raise InvalidMapError(f"{info.log_path}: none of its {stream.invalid} maps can be analyzed")
+        history.totals.invalid, history.totals.unchanged = stream.invalid, stream.unchanged
+        _project_back(reader, history, store, sinks)
+        summary = store.finish(history)
+        for sink in sinks:
+            sink.finish(summary)
+    return summary
+
+
+def _project_back(reader: LogReader, history: RunHistory, store: RunStore, sinks: Sequence[Sink]) -> None:
+    """Read the maps once more to tell how much of the last map's rooms each shows, if that is wanted."""
+    if not history.projects_back:
+        return
+    logger.info("the maps are read once more, to project the last layout back")
+    counts = reader.counts
+    with muted():  # what is odd was told the first time
+        for found in history.back_projected(reader.snapshots()):
+            store.write_back_projected(found)
+            for sink in sinks:
+                sink.write_back_projected(found)
+    reader.counts = counts
+
+
+def _tell_progress(
+    step: TrackedSnapshot, history: RunHistory, last: OccupancySnapshot, on_snapshot: OnSnapshot | None
+) -> None:
+    rooms = len(step.track_ids)
+    logger.info("snapshot %d: coverage %.1f %%, %d rooms", step.snapshot.index, 100 * step.coverage, rooms)
+    if on_snapshot is not None:
+        first_ns = history.totals.first_log_time_ns or 0
+        done = step.snapshot.log_time_ns - first_ns
+        on_snapshot(step, done / max(last.log_time_ns - first_ns, 1))
 
 
 def _run_info(path: Path, folder: Path, reader: LogReader, options: RunOptions) -> RunInfo:
@@ -274,23 +294,19 @@ def _planned_files(folder: Path, log: Path, options: RunOptions) -> dict[str, Pa
         if options.bag:
             files["bag"] = bag_metadata_path(log)
     tables = (*TABLES, BACK_PROJECTED) if options.back_project else TABLES
-    files |= {name: folder / f"{name}.parquet" for name in tables}
+    files |= {name: table_path(folder, name) for name in tables}
     return files | {"summary": folder / SUMMARY}
 
 
-def _make_sinks(
-    planned: dict[str, Path], info: RunInfo, options: RunOptions, tables: Tables, reader: LogReader
-) -> list[Sink]:
+def _make_sinks(planned: dict[str, Path], options: RunOptions, reader: LogReader) -> list[Sink]:
     # Imported here: each brings a large library that the others do not need.
     sinks: list[Sink] = []
     if options.recording or options.live:
         from rose2_logs.outputs.rerun.recording import RerunRecording
 
-        recording = planned.get("recording")
-        sinks.append(RerunRecording(recording, info, live=options.live, layers=options.layers, tables=tables))
+        sinks.append(RerunRecording(planned.get("recording"), live=options.live, layers=options.layers))
     if options.annotated_log:
         from rose2_logs.outputs.mcap.annotated import AnnotatedMcap
 
-        log = planned["annotated_log"]
-        sinks.append(AnnotatedMcap(log, info, reader.source, is_bag=options.bag))
+        sinks.append(AnnotatedMcap(planned["annotated_log"], reader.source, is_bag=options.bag))
     return sinks

@@ -11,14 +11,9 @@ import shapely
 from rose2_logs.comparison.final_layout import FinalLayout
 from rose2_logs.comparison.layouts import LayoutComparison, compare_layouts
 from rose2_logs.comparison.placement import PlacedMap
-from rose2_logs.config.parameters import Parameters, ReadingParameters
-from rose2_logs.config.selection import Selection
-from rose2_logs.errors import LogError, ParameterError
-from rose2_logs.io import open_log
+from rose2_logs.errors import ResultsError
 from rose2_logs.model.occupancy import OccupancySnapshot
-from rose2_logs.runs.folder import RunResults
-from rose2_logs.runs.tables import SUMMARY
-from rose2_logs.segmentation.pipeline import analyze
+from rose2_logs.runs.run import Run
 from rose2_logs.system.files import refuse_existing, writing
 
 FILES = (
@@ -57,9 +52,8 @@ def compare_runs(
 
     Raises
     ------
-    LogError
-        If a folder holds no results, or the last map of a run is neither there nor at its log's place, or has
-        too few walls to tell how it lies.
+    ResultsError
+        If a folder holds no results, or the last map of a run has too few walls to tell how it lies.
     OutputError
         If there is a comparison already and it may not be replaced, or a file cannot be written.
     """
@@ -70,11 +64,7 @@ def compare_runs(
     files = tuple(folder / name for name in FILES)
     refuse_existing(files, overwrite=overwrite)
     name_a, name_b = _names(folder_a, folder_b)
-    a, b = read_final_layout(folder_a, name_a), read_final_layout(folder_b, name_b)
-    comparison = compare_layouts(a, b)
-    if comparison is None:
-        few = folder_a if not a.map.can_be_placed else folder_b
-        raise LogError(f"{few}: the last map has too few walls to be laid over another")
+    comparison = compare_stored(Run(folder_a), Run(folder_b), name_a, name_b)
     write_comparison_tables(files[0], files[1], comparison)
     write_comparison_summary(files[2], comparison, folder_a, folder_b)
     write_image(files[3], draw_layout_comparison(comparison))
@@ -88,6 +78,24 @@ def compare_runs(
     return ComparisonResult(comparison, folder, files[:-1])
 
 
+def compare_stored(
+    run_a: Run, run_b: Run, name_a: str | None = None, name_b: str | None = None
+) -> LayoutComparison:
+    """Compare the last layouts of two stored runs; B is laid over A.
+
+    Raises
+    ------
+    ResultsError
+        If results cannot be read, or a last map has too few walls to tell how it lies.
+    """
+    a, b = read_final_layout(run_a, name_a), read_final_layout(run_b, name_b)
+    comparison = compare_layouts(a, b)
+    if comparison is None:
+        few = run_a if not a.map.can_be_placed else run_b
+        raise ResultsError(f"{few.folder}: the last map has too few walls to be laid over another")
+    return comparison
+
+
 def _names(folder_a: Path, folder_b: Path) -> tuple[str, str]:
     """Name two folders by as much of their ends as tells them apart."""
     parts_a, parts_b = folder_a.resolve().parts, folder_b.resolve().parts
@@ -97,56 +105,22 @@ def _names(folder_a: Path, folder_b: Path) -> tuple[str, str]:
     return folder_a.resolve().name, folder_b.resolve().name
 
 
-def read_final_layout(folder: Path, name: str | None = None) -> FinalLayout:
-    """Read the last layout of a run from its results.
-
-    The run is called by the folder's name unless told otherwise. The rooms come from the tables, the map from
-    the annotated MCAP or else from the log itself; the walls, which no table holds, are found in it once more
-    by the run's parameters.
+def read_final_layout(run: Run, name: str | None = None) -> FinalLayout:
+    """Take the last layout of a stored run, called by the run's name unless told otherwise.
 
     Raises
     ------
-    LogError
-        If there are no results, or the map is not to be found or is another one.
+    ResultsError
+        If a file of the results cannot be read.
     """
-    results = RunResults(folder)
-    summary = results.summary
-    try:
-        parameters = Parameters().replaced(summary["parameters"])
-        last_ns, method = int(summary["results"]["last_log_time_ns"]), str(summary["method"])
-    except (KeyError, TypeError, ValueError, ParameterError) as error:
-        raise LogError(
-            f"{folder / SUMMARY}: is of another version ({error}); analyze the log again"
-        ) from error
-    last = results.choose()
-    rooms = results.table("rooms", ["track", "area_m2", "polygon_wkb"], last).to_pylist()
-    snapshot = _last_map(results, last_ns, parameters.reading)
-    analysis = analyze(snapshot, parameters, method)
-    if not np.isclose(analysis.free_area_m2, results.row(last)["free_area_m2"]):
-        log = summary["log"]
-        raise LogError(f"{folder}: {log} does not hold the map that the results are of; analyze it again")
+    last = run.choose()
+    below, _ = run.map(last)
+    rooms = run.table("rooms", ["track", "area_m2", "polygon_wkb"], last).to_pylist()
     return FinalLayout(
-        name=name or results.name,
-        map=PlacedMap(snapshot, parameters.occupancy),
+        name=name or run.name,
+        map=PlacedMap(OccupancySnapshot(last, 0, 0, "", below.cells, below.geometry), below.occupancy),
         tracks=tuple(row["track"] for row in rooms),
         shapes=tuple(shapely.from_wkb([row["polygon_wkb"] for row in rooms])),
         areas_m2=np.array([row["area_m2"] for row in rooms], float),
-        walls=analysis.walls,
+        walls=run.found_walls(last),
     )
-
-
-def _last_map(results: RunResults, last_ns: int, limits: ReadingParameters) -> OccupancySnapshot:
-    topic, annotated = str(results.summary["topic"]), results.annotated_log
-    selection = Selection(last_ns, last_ns)
-    try:
-        with open_log(
-            annotated or results.find_log(), topic=topic, selection=selection, limits=limits
-        ) as reader:
-            return reader.last()
-    except LogError as error:
-        if annotated is not None:
-            raise
-        raise LogError(
-            f"{results.folder}: holds no annotated MCAP, and the last map cannot be read from the log "
-            f"({error}); put the log back, or analyze it again without --no-mcap"
-        ) from error

@@ -7,12 +7,10 @@ from pathlib import Path
 
 from rose2_logs.drawing.image_files import write_image
 from rose2_logs.drawing.pixels import as_pixels
-from rose2_logs.drawing.plan import draw_plan
 from rose2_logs.drawing.svg import as_svg
 from rose2_logs.errors import ParameterError
 from rose2_logs.outputs.exports.formats import planned_files, write_plan
-from rose2_logs.runs.back_projected_plan import back_projected_plan
-from rose2_logs.runs.folder import RunResults
+from rose2_logs.runs.run import Run
 from rose2_logs.system.files import refuse_existing, replacing
 
 FIGURE_WIDTH_PX = 1800
@@ -40,7 +38,7 @@ def write_figure(
         The picture, ``.png`` or ``.svg``; by default ``<name>.figure.png`` in the folder, with the number of
         the map in its name if it is not the last, and ``back_projected`` if it is.
     snapshot, coverage : int, float, optional
-        Which map, see `RunResults.choose`.
+        Which map, see `Run.choose`.
     back_projected : bool
         Draw the rooms of the last map as far as this one shows them, instead of its own.
     width_px : int
@@ -62,7 +60,7 @@ def write_figure(
     OutputError
         If the picture exists and may not be replaced, or cannot be written.
     """
-    results = RunResults(folder)
+    results = Run(folder)
     number = results.choose(snapshot, coverage)
     stem = f"{_stem(results, number)}.back_projected" if back_projected else _stem(results, number)
     out = folder / f"{stem}.figure.png" if out is None else out
@@ -70,9 +68,7 @@ def write_figure(
     if kind not in PICTURE_ENDINGS:
         raise ParameterError(f"{out}: a figure is {' or '.join(PICTURE_ENDINGS)}; let its name end so")
     refuse_existing([out], overwrite=overwrite)
-    with results.open_maps() as maps:
-        plan = back_projected_plan(results, number, maps) if back_projected else results.plan(number, maps)
-        drawing = draw_plan(plan)
+    drawing = results.figure(number, back_projected=back_projected)
     if kind == ".png":
         write_image(out, as_pixels(drawing, width_px))
     else:
@@ -101,7 +97,7 @@ def export_plan(
     out : path, optional
         Folder for the files; by default that of the results.
     snapshot, coverage : int, float, optional
-        Which map, see `RunResults.choose`; its number stands in the files' names if it is not the last.
+        Which map, see `Run.choose`; its number stands in the files' names if it is not the last.
     overwrite : bool
         Whether files may be replaced.
 
@@ -115,16 +111,14 @@ def export_plan(
     LogError, ParameterError, OutputError
         As `write_figure`, or if there is no such format.
     """
-    results = RunResults(folder)
+    results = Run(folder)
     number = results.choose(snapshot, coverage)
     out = folder if out is None else out
     stem = _stem(results, number)
     refuse_existing(planned_files(formats, out, stem), overwrite=overwrite)
-    with results.open_maps() as maps:
-        plan = results.plan(number, maps, with_walls=True)
-    return write_plan(plan, formats, out, stem)
+    return write_plan(results.plan(number, with_walls=True), formats, out, stem)
 
 
-def _stem(results: RunResults, number: int) -> str:
+def _stem(results: Run, number: int) -> str:
     """Beginning of the files' names: the log's, and the map's number unless it is the last."""
     return results.name if number == results.choose() else f"{results.name}.snapshot{number}"

@@ -8,8 +8,7 @@ from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from types import TracebackType
-from typing import IO, Any, Self
+from typing import IO, Any
 
 from mcap.exceptions import McapError
 
@@ -31,7 +30,8 @@ from rose2_logs.outputs.mcap.input import (
 from rose2_logs.outputs.mcap.ros_messages import ROOMS_TYPE, MessageMaker
 from rose2_logs.outputs.mcap.viewer_layouts import MapScene, bag_metadata_path, write_layouts
 from rose2_logs.outputs.mcap.writer import McapWriter
-from rose2_logs.runs.sink import RunInfo
+from rose2_logs.runs.history import RunSummary
+from rose2_logs.runs.sink import RunInfo, Sink
 from rose2_logs.system.files import part_of
 from rose2_logs.system.warnings import log_warning
 from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot
@@ -51,7 +51,7 @@ ATTACHMENT = "rose2_parameters.json"
 METADATA = "rose2_logs"
 
 
-class AnnotatedMcap:
+class AnnotatedMcap(Sink):
     """Sink that copies the input log and adds the topics of `ADDED` with the source map's stamp and frame.
 
     Messages, schemas, channels, attachments and metadata of an MCAP stay as they were, byte for byte; chunks
@@ -63,8 +63,6 @@ class AnnotatedMcap:
     ----------
     path : path
         Where to; written beside and renamed when whole.
-    info : RunInfo
-        The run.
     source : MessageSource, optional
         The log if it is open already, which it then stays.
     is_bag : bool
@@ -74,8 +72,9 @@ class AnnotatedMcap:
 
     Attributes
     ----------
-    copied : dict
-        For each channel the number and the hash of its messages in the input and in the output, once whole.
+    facts : dict
+        ``annotated_log``: for each channel the number and the hash of its messages in the input and in the
+        output, once whole.
 
     Raises
     ------
@@ -86,35 +85,29 @@ class AnnotatedMcap:
         If the input cannot be copied.
     """
 
-    def __init__(
-        self, path: Path, info: RunInfo, source: MessageSource | None = None, *, is_bag: bool = False
-    ) -> None:
+    def __init__(self, path: Path, source: MessageSource | None = None, *, is_bag: bool = False) -> None:
         self._path = path
         self._part = part_of(path)
-        self._info = info
         self._source = source
+        self._opened_source: MessageSource | None = None
         self._is_bag = is_bag
         self._extent = Extent()
         self._frame_id = ""
         self._file: IO[bytes] | None = None
-        self.copied: dict[str, Any] = {}
+        self.facts: dict[str, Any] = {}
 
-    def __enter__(self) -> Self:
-        self._opened_source: MessageSource | None = None
+    def begin(self, info: RunInfo) -> None:
+        """Open the log and the file, and take over what the log says of itself."""
+        self._info = info
         if self._source is None:
-            self._opened_source = self._source = open_source(self._info.log_path)
-        try:
-            self._log: CopiedLog = copied_log(self._source)
-            with self._writing():
-                self._path.parent.mkdir(parents=True, exist_ok=True)
-                self._file = self._part.open("wb")
-                self._begin(self._file)
-        except BaseException:
-            self._clean_up()
-            raise
-        return self
+            self._opened_source = self._source = open_source(info.log_path)
+        self._log: CopiedLog = copied_log(self._source)
+        with self._writing():
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            self._file = self._part.open("wb")
+            self._write_head(self._file)
 
-    def _begin(self, file: IO[bytes]) -> None:
+    def _write_head(self, file: IO[bytes]) -> None:
         log, info = self._log, self._info
         library = f"rose2_logs {info.versions.get('rose2-logs', '')}".strip()
         library = f"{log.library}; {library}" if log.library else library
@@ -179,25 +172,19 @@ class AnnotatedMcap:
                     self._add(self._added[topic], time_ns, data)
             self._sequence += 1
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        if kind is not None:
-            self._clean_up()
-            return
-        try:
-            with self._writing():
-                self._copy_until(None)
-                text = json.dumps(self._info.parameters.resolved(), indent=2)
-                self._writer.add_attachment(0, 0, ATTACHMENT, "application/json", text.encode())
-                self._writer.finish()
-                if self._file is not None:
-                    self._file.close()
-                self.copied = self._checked()
-                self._part.replace(self._path)
-                self._describe()
-        finally:
-            self._clean_up()
+    def finish(self, summary: RunSummary) -> None:
+        """Copy the rest of the log, hold the file against the log, and give it its name."""
+        with self._writing():
+            self._copy_until(None)
+            text = json.dumps(self._info.parameters.resolved(), indent=2)
+            self._writer.add_attachment(0, 0, ATTACHMENT, "application/json", text.encode())
+            self._writer.finish()
+            if self._file is not None:
+                self._file.close()
+            self.facts["annotated_log"] = self._checked()
+            self._part.replace(self._path)
+            self._describe()
+        self.abandon()
 
     def _describe(self) -> None:
         """Write what opens the file: layouts of viewers, and the bag's description."""
@@ -297,7 +284,7 @@ class AnnotatedMcap:
         self._own[channel].add(time_ns, time_ns, self._sequence, data)
         self._writer.add_message(channel, time_ns, data, time_ns, self._sequence)
 
-    def _clean_up(self) -> None:
+    def abandon(self) -> None:
         """Close both files; what has not been renamed by now is removed."""
         if self._opened_source is not None:
             self._opened_source.close()

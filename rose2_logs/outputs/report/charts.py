@@ -13,7 +13,7 @@ from rose2_logs.drawing.palette import state_colors
 from rose2_logs.model.occupancy import BoolArray, FloatArray, IntArray
 from rose2_logs.model.room_quality import UNSURE_SIGN, unsure_sign
 from rose2_logs.outputs.report.words import css, css_color, duration
-from rose2_logs.runs.folder import RunResults
+from rose2_logs.runs.run import Run
 
 BLUE, ORANGE, GREEN, VIOLET = "#2f7ed8", "#e07b1a", "#2a9d5c", "#8a5fd0"
 AREAS_MOST = 8
@@ -56,9 +56,9 @@ class RunAxis:
     marks: list[Mark]
 
 
-def run_charts(results: RunResults) -> list[Chart]:
+def run_charts(results: Run) -> list[Chart]:
     """Draw everything that changes along a run."""
-    snapshots = results.snapshots
+    snapshots = results.columns
     axes = run_axes(results)
     numbers, present, areas = _rooms(results)
 
@@ -147,7 +147,7 @@ def _coverage_chart(axis: RunAxis, coverage: FloatArray) -> Chart:
     return Chart(title, "Known free area over that of the last map.", (), drawn, drawn)
 
 
-def run_marks(results: RunResults) -> list[tuple[int, str, str]]:
+def run_marks(results: Run) -> list[tuple[int, str, str]]:
     """What the curves mark: at which map, in words, and its kind, ``final`` or ``shifted``."""
     final = results.summary.get("layout", {}).get("final_since")
     marks: list[tuple[int, str, str]] = []
@@ -159,12 +159,12 @@ def run_marks(results: RunResults) -> list[tuple[int, str, str]]:
         for event in events
         if event["kind"] == "shifted"
     ]
-    return [mark for mark in marks if mark[0] in results.snapshots["snapshot"]]
+    return [mark for mark in marks if mark[0] in results.columns["snapshot"]]
 
 
-def run_axes(results: RunResults) -> tuple[RunAxis, RunAxis]:
+def run_axes(results: Run) -> tuple[RunAxis, RunAxis]:
     """Coverage in percent, and time in minutes or seconds."""
-    snapshots = results.snapshots
+    snapshots = results.columns
     time_s = snapshots["time_s"].astype(float)
     in_minutes = time_s[-1] >= 300
     time = time_s / 60 if in_minutes else time_s
@@ -184,20 +184,18 @@ def run_axes(results: RunResults) -> tuple[RunAxis, RunAxis]:
     )
 
 
-def _rooms(results: RunResults) -> tuple[np.ndarray, BoolArray, FloatArray]:
+def _rooms(results: Run) -> tuple[np.ndarray, BoolArray, FloatArray]:
     """Tracks (R,), which maps show them (R, N), and their areas (R, N), NaN where they are not."""
     table = results.table("rooms", ["snapshot", "track", "area_m2"])
     snapshot, track, area = (table[name].to_numpy() for name in ("snapshot", "track", "area_m2"))
     numbers, row = np.unique(track, return_inverse=True)
-    column = np.searchsorted(results.snapshots["snapshot"], snapshot)
-    areas = np.full((len(numbers), len(results.snapshots["snapshot"])), np.nan)
+    column = np.searchsorted(results.columns["snapshot"], snapshot)
+    areas = np.full((len(numbers), len(results.columns["snapshot"])), np.nan)
     areas[row, column] = area
     return numbers, np.isfinite(areas), areas
 
 
-def _lanes(
-    results: RunResults, axes: Sequence[RunAxis], numbers: np.ndarray, present: BoolArray
-) -> list[Chart]:
+def _lanes(results: Run, axes: Sequence[RunAxis], numbers: np.ndarray, present: BoolArray) -> list[Chart]:
     shown = np.sort(np.argsort(-present.sum(1), kind="stable")[:LANES_MOST])
     if not len(shown):
         return []
@@ -206,7 +204,7 @@ def _lanes(
     title = "When each room was there, and when it was right"
     names = [f"{row['track']}{unsure_sign(row['wall_support'])}" for row in rows]
     colors = [{state: css(color) for state, color in state_colors(row["track"]).items()} for row in rows]
-    states = _states(results.snapshots["snapshot"], rows, present[shown])
+    states = _states(results.columns["snapshot"], rows, present[shown])
     draw: Callable[[RunAxis], str] = lambda axis: lane_chart(  # noqa: E731
         axis.x,
         states,

@@ -9,7 +9,7 @@ import numpy as np
 
 from rose2_logs.model.room_plan import RoomPlan
 from rose2_logs.outputs.report.words import MISSING, date_of, duration, size
-from rose2_logs.runs.folder import RunResults
+from rose2_logs.runs.run import Run
 from rose2_logs.system.text import percent
 
 LATE_COVERAGE = 0.95
@@ -40,10 +40,10 @@ class Note:
     is_warning: bool = True
 
 
-def subtitle(results: RunResults) -> list[tuple[str, str]]:
+def subtitle(results: Run) -> list[tuple[str, str]]:
     """Log, time, topic and method, by name."""
     summary, found = results.summary, results.summary["results"]
-    span = results.snapshots["time_s"][-1]
+    span = results.columns["time_s"][-1]
     date = date_of(found.get("first_log_time_ns"))
     began = f"{date}, " if date else ""
     source = summary.get("input", {})
@@ -52,12 +52,12 @@ def subtitle(results: RunResults) -> list[tuple[str, str]]:
     return [
         ("Log", f"{summary['log']} ({about})" if about else str(summary["log"])),
         ("Recorded", f"{began}{duration(span)} from the first to the last map"),
-        ("Map topic", f"{summary['topic']} in frame {results.snapshots['frame_id'][-1]}"),
+        ("Map topic", f"{summary['topic']} in frame {results.columns['frame_id'][-1]}"),
         ("Method", f"{summary['method']}, rose2-logs {summary['versions'].get('rose2-logs', '')}".strip()),
     ]
 
 
-def tiles(results: RunResults, plan: RoomPlan) -> list[Tile]:
+def tiles(results: Run, plan: RoomPlan) -> list[Tile]:
     """Figures of the whole run."""
     found, layout = results.summary["results"], results.summary.get("layout", {})
     seen = sum(room.area_m2 for room in plan.rooms)
@@ -95,7 +95,7 @@ def _final(final: dict[str, Any] | None, last: int) -> tuple[str, str]:
     return f"{percent(final['coverage'])} coverage", snapshot_ref
 
 
-def notes(results: RunResults, plan: RoomPlan) -> list[Note]:
+def notes(results: Run, plan: RoomPlan) -> list[Note]:
     """Tell what is not as it should be, or not sure."""
     summary = results.summary
     found, messages = summary["results"], summary.get("messages", {})
@@ -118,13 +118,6 @@ def notes(results: RunResults, plan: RoomPlan) -> list[Note]:
         cells = f"{row['analyzed_resolution_m']:g} m instead of {row['resolution_m']:g} m"
         coarse = f"The maps were analyzed in cells of {cells}."
         told.append(Note(coarse, is_warning=False))
-    if results.annotated_log is None:
-        told.append(
-            Note(
-                "The pictures show shapes alone: the annotated MCAP, which holds the maps, is not there.",
-                False,
-            )
-        )
     return sorted(told, key=lambda note: not note.is_warning)
 
 
@@ -181,7 +174,7 @@ def _room_notes(plan: RoomPlan) -> list[Note]:
     return told
 
 
-def _shift_notes(results: RunResults) -> list[Note]:
+def _shift_notes(results: Run) -> list[Note]:
     events = results.table("events", ["snapshot", "kind", "shift_x_m", "shift_y_m"]).to_pylist()
     shifts = [event for event in events if event["kind"] == "shifted"]
     if not shifts:

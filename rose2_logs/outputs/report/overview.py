@@ -26,7 +26,8 @@ from rose2_logs.outputs.report.words import (
     number,
     share,
 )
-from rose2_logs.runs.folder import RunResults, find_results
+from rose2_logs.runs.run import Run
+from rose2_logs.runs.stored_run import find_results
 from rose2_logs.system.files import refuse_existing
 
 PICTURES_MOST = 100
@@ -96,7 +97,7 @@ def write_reports(
     for results_folder, name, page in zip(found, names, pages, strict=True):
         try:
             write_report(results_folder, page, panels=panels, overwrite=overwrite)
-            results, shown = RunResults(results_folder), name.removeprefix(BATCH_FOLDER)
+            results, shown = Run(results_folder), name.removeprefix(BATCH_FOLDER)
             picture = _picture(results) if len(written) < PICTURES_MOST else ""
             written.append(
                 _Listed(page, quote(page.relative_to(base).as_posix()), shown, picture, _row(results, shown))
@@ -125,10 +126,9 @@ def _failures(folder: Path) -> list[tuple[str, str]]:
         return []
 
 
-def _picture(results: RunResults) -> str:
+def _picture(results: Run) -> str:
     """Picture of the last layout as a data URI."""
-    with results.open_maps() as maps:
-        plan = results.plan(results.choose(), maps)
+    plan = results.plan(results.choose())
     return png_uri(as_pixels(draw_plan(plan, PICTURE), PICTURE_PX), few_colors=True)
 
 
@@ -153,7 +153,7 @@ def _table(rows: list[tuple[Cell, ...]]) -> Table:
     return Table("Logs", columns, tuple(rows))
 
 
-def _row(results: RunResults, name: str) -> tuple[Cell, ...]:
+def _row(results: Run, name: str) -> tuple[Cell, ...]:
     found, layout = results.summary["results"], results.summary.get("layout", {})
     events, final = found.get("events", {}), layout.get("final_since")
     first_ns, last_ns = found.get("first_log_time_ns"), found.get("last_log_time_ns")

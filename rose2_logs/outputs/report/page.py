@@ -17,8 +17,7 @@ from rose2_logs.outputs.report import PANELS, facts, tables
 from rose2_logs.outputs.report.charts import run_charts, run_marks
 from rose2_logs.outputs.report.seen import seen_rooms
 from rose2_logs.outputs.report.words import duration
-from rose2_logs.runs.folder import RunResults
-from rose2_logs.runs.maps import RunMaps
+from rose2_logs.runs.run import Run
 from rose2_logs.system.files import refuse_existing, replacing
 from rose2_logs.system.text import percent
 
@@ -65,7 +64,7 @@ def write_report(
     """
     out = folder / REPORT_NAME if out is None else out
     refuse_existing([out], overwrite=overwrite)
-    results = RunResults(folder)
+    results = Run(folder)
     text = render(
         "report.html.j2", **_content(results, panels, is_beside=out.parent.resolve() == folder.resolve())
     )
@@ -106,13 +105,10 @@ def _drawn(svg: str) -> str:
     return Markup(svg)  # noqa: S704
 
 
-def _content(results: RunResults, panels: int, *, is_beside: bool) -> dict[str, Any]:
-    with results.open_maps() as maps:
-        plan = results.plan(results.choose(), maps)
-        drawn_panels = [
-            Panel(_drawn(svg), *caption) for svg, *caption in _panels(results, maps, plan, panels)
-        ]
-    is_run = len(results.snapshots["snapshot"]) > 1
+def _content(results: Run, panels: int, *, is_beside: bool) -> dict[str, Any]:
+    plan = results.plan(results.choose())
+    drawn_panels = [Panel(_drawn(svg), *caption) for svg, *caption in _panels(results, plan, panels)]
+    is_run = len(results.columns["snapshot"]) > 1
     parameters = tables.parameter_table(results)
     seen = seen_rooms(results)
     return {
@@ -122,7 +118,7 @@ def _content(results: RunResults, panels: int, *, is_beside: bool) -> dict[str, 
         "notes": facts.notes(results, plan),
         "plan": _drawn(as_svg(draw_plan(plan, FIGURE), is_inline=True)),
         "panels": drawn_panels,
-        "maps": len(results.snapshots["snapshot"]),
+        "maps": len(results.columns["snapshot"]),
         "charts": [
             (chart, _drawn(chart.over_coverage), _drawn(chart.over_time))
             for chart in (run_charts(results) if is_run else ())
@@ -142,21 +138,19 @@ def _content(results: RunResults, panels: int, *, is_beside: bool) -> dict[str, 
     }
 
 
-def _panels(
-    results: RunResults, maps: RunMaps | None, last: RoomPlan, most: int
-) -> Iterator[tuple[str, str, str]]:
+def _panels(results: Run, last: RoomPlan, most: int) -> Iterator[tuple[str, str, str]]:
     """Yield the small pictures along the run, each with its two lines; one map at a time is held.
 
     All show the same part of the world: the last map, and the shapes of rooms that went beyond.
     """
-    places = along_coverage(results.snapshots["coverage"].astype(float), most)
-    numbers = [int(results.snapshots["snapshot"][place]) for place in places]
+    places = along_coverage(results.columns["coverage"].astype(float), most)
+    numbers = [int(results.columns["snapshot"][place]) for place in places]
     bounds = last.bounds_m
     for number in numbers:
-        shapes = results.plan(number, None)
+        shapes = results.plan(number, with_map=False)
         bounds = _around(bounds, shapes.bounds_m) if shapes.rooms else bounds
     for place, number in zip(places, numbers, strict=True):
-        plan = results.plan(number, maps)
+        plan = results.plan(number)
         yield as_svg(draw_plan(plan, PANEL, bounds), is_inline=True), *_caption(results, plan, place)
 
 
@@ -187,8 +181,8 @@ def along_coverage(coverage: np.ndarray[Any, Any], most: int) -> list[int]:
     return sorted(chosen)
 
 
-def _caption(results: RunResults, plan: RoomPlan, place: int) -> tuple[str, str]:
-    values = results.snapshots
+def _caption(results: Run, plan: RoomPlan, place: int) -> tuple[str, str]:
+    values = results.columns
     final = values["final_share"][place]
     right = "" if np.isnan(float(final)) else f", {percent(float(final))} as in the end"
     return (

@@ -11,7 +11,8 @@ from rose2_logs.drawing.chart import ShareLane, share_lanes
 from rose2_logs.model.occupancy import FloatArray
 from rose2_logs.outputs.report.charts import LANES_MOST, run_axes
 from rose2_logs.outputs.report.words import Cell, Column, Table, css_color, number, room, share, when
-from rose2_logs.runs.folder import RunResults
+from rose2_logs.runs.run import Run
+from rose2_logs.runs.tables import BACK_PROJECTED
 
 MOSTLY = 0.9
 """A room is told to be seen when this share of its floor is: what is left is mostly behind furniture."""
@@ -26,14 +27,14 @@ class SeenRooms:
     note: str
 
 
-def seen_rooms(results: RunResults) -> SeenRooms | None:
+def seen_rooms(results: Run) -> SeenRooms | None:
     """Find when each room of the last map was first, and mostly, seen; None without back projection."""
     tracks, shares, areas_m2 = _shares(results)
     if not len(tracks) or shares.shape[1] < 2:
         return None
     first, mostly = _first_at_least(shares, np.finfo(float).tiny), _first_at_least(shares, MOSTLY)
     order = np.lexsort((tracks, mostly, first)).tolist()
-    coverage, time_s = (results.snapshots[name].astype(float).tolist() for name in ("coverage", "time_s"))
+    coverage, time_s = (results.columns[name].astype(float).tolist() for name in ("coverage", "time_s"))
     rows = {
         each: (
             room(int(tracks[each])),
@@ -75,15 +76,15 @@ def seen_rooms(results: RunResults) -> SeenRooms | None:
     return SeenRooms(drawn, Table("When each room was seen", columns, tuple(rows.values())), note)
 
 
-def _shares(results: RunResults) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
+def _shares(results: Run) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
     """Tracks (R,) of the last map's rooms, the share (R, N) that each map shows, their areas (R,)."""
-    table = results.back_projected()
-    if table is None:
+    if not results.is_back_projected:
         return np.zeros(0, np.int64), np.zeros((0, 0)), np.zeros(0)
+    table = results.table(BACK_PROJECTED)
     snapshot, track, seen = (table[name].to_numpy() for name in ("snapshot", "track", "last_area_share"))
     tracks, row = np.unique(track, return_inverse=True)
-    shares = np.zeros((len(tracks), len(results.snapshots["snapshot"])))
-    shares[row, np.searchsorted(results.snapshots["snapshot"], snapshot)] = seen
+    shares = np.zeros((len(tracks), len(results.columns["snapshot"])))
+    shares[row, np.searchsorted(results.columns["snapshot"], snapshot)] = seen
     last = results.table("rooms", ["snapshot", "track", "area_m2"], snapshot=results.choose())
     areas = dict(zip(last["track"].to_pylist(), last["area_m2"].to_pylist(), strict=True))
     return tracks.astype(np.int64), shares, np.array([areas.get(each, 0.0) for each in tracks.tolist()])

@@ -21,7 +21,7 @@ from rose2_logs.outputs.report.words import (
     size,
     when,
 )
-from rose2_logs.runs.folder import RunResults
+from rose2_logs.runs.run import Run
 
 ROWS_MOST = 300
 """Rows of a table: more can be read by programs only, and they stand in the Parquet tables."""
@@ -36,7 +36,7 @@ EVENT_WORDS = {
 """Kinds of events in words, those first that are kept where there are too many."""
 
 
-def room_table(results: RunResults, plan: RoomPlan) -> Table:
+def room_table(results: Run, plan: RoomPlan) -> Table:
     """Every room of the run: where it is at the end, and since when it was right."""
     tracks = results.table("tracks").drop_columns(["polygon_wkb"]).to_pylist()
     neighbors = {each.number: each.neighbors for each in plan.rooms}
@@ -84,7 +84,7 @@ def room_table(results: RunResults, plan: RoomPlan) -> Table:
     return Table("Rooms", columns, tuple(rows), _cut(len(tracks), len(shown), "tracks.parquet"))
 
 
-def doorway_table(results: RunResults, plan: RoomPlan) -> Table:
+def doorway_table(results: Run, plan: RoomPlan) -> Table:
     """Doorways of the last map, and since when their rooms were known as neighbors."""
     known = results.table("doorways", ["snapshot", "track_a", "track_b"])
     first: dict[tuple[int, int], int] = {}
@@ -92,7 +92,7 @@ def doorway_table(results: RunResults, plan: RoomPlan) -> Table:
     for snapshot, *pair in zip(*columns, strict=True):
         first.setdefault((pair[0], pair[1]), snapshot)
     coverage = dict(
-        zip(results.snapshots["snapshot"].tolist(), results.snapshots["coverage"].tolist(), strict=True)
+        zip(results.columns["snapshot"].tolist(), results.columns["coverage"].tolist(), strict=True)
     )
     doors = sorted(plan.doorways, key=lambda door: (door.rooms, door.ends_m.tolist()))
     rows = [
@@ -117,7 +117,7 @@ def doorway_table(results: RunResults, plan: RoomPlan) -> Table:
     return Table("Doorways", headings, tuple(rows), _cut(len(doors), len(rows), "doorways.parquet"))
 
 
-def event_table(results: RunResults) -> Table:
+def event_table(results: Run) -> Table:
     """What happened to the rooms, without their mere going on."""
     import pyarrow.compute as pc
 
@@ -142,7 +142,7 @@ def event_table(results: RunResults) -> Table:
     return Table("Events", columns, tuple(rows), _cut(len(events), len(shown), "events.parquet"))
 
 
-def _event_row(results: RunResults, event: dict[str, Any]) -> tuple[Cell, ...]:
+def _event_row(results: Run, event: dict[str, Any]) -> tuple[Cell, ...]:
     row = results.row(event["snapshot"])
     kind, text = event["kind"], EVENT_WORDS.get(event["kind"], event["kind"])
     if kind == "shifted":
@@ -160,7 +160,7 @@ def _event_row(results: RunResults, event: dict[str, Any]) -> tuple[Cell, ...]:
     )
 
 
-def parameter_table(results: RunResults) -> Table:
+def parameter_table(results: Run) -> Table:
     """Every parameter with the value it had, and those that were changed first."""
     used = results.summary.get("parameters", {})
     rows: list[tuple[Cell, ...]] = []
@@ -194,7 +194,7 @@ def _value(value: object) -> Cell:
     return Cell(str(value))
 
 
-def software_table(results: RunResults) -> Table:
+def software_table(results: Run) -> Table:
     """Log, fingerprint, software and times of the run."""
     summary = results.summary
     about = {"SHA-256 of the log": summary.get("input", {}).get("sha256", MISSING)}
@@ -212,7 +212,7 @@ def software_table(results: RunResults) -> Table:
     )
 
 
-def files_of(results: RunResults) -> list[tuple[str, str]]:
+def files_of(results: Run) -> list[tuple[str, str]]:
     """Names and sizes of the other results that are there."""
     names = [str(name) for name in results.summary["files"]] + ["summary.json"]
     paths = [results.folder / Path(name).name for name in names]

@@ -31,7 +31,7 @@ LAYER = HEIGHTS.index(FILLS) + 0.5
 OUTLINE_LAYER, NAME_LAYER = LAYER + 1, len(HEIGHTS)
 
 
-class SmoothedWorld:
+class BackProjectedWorld:
     """Logs the back-projected rooms of one map after the other, in a second pass along the run.
 
     Parameters

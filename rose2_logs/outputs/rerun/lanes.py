@@ -44,7 +44,7 @@ class Lives:
         self._shown = now
         self._times.extend(instant)
 
-    def log(self, convergence: Convergence | None) -> None:
+    def log(self, convergence: Convergence) -> None:
         """Log everything, once, after the last map."""
         instants = [
             Instant(*each) for each in np.array(self._times).reshape(-1, len(Instant._fields)).tolist()
@@ -62,31 +62,30 @@ class Lives:
             times = time_columns([instants[index] for index in changes])
             states = rr.StateChange.columns(state=list(changes.values()))
             self._recording.send_columns(path, times, states)
-        if convergence is not None:
-            for path, figures in (
-                (FINAL_SHARE, convergence.final_share),
-                (FINAL_IOU, convergence.final_iou),
-            ):
-                known = [(at, figures.get(at.snapshot)) for at in instants]
-                points = [(at, value) for at, value in known if value is not None]
-                if points:
-                    values = rr.Scalars.columns(scalars=np.array([value for _, value in points]))
-                    self._recording.send_columns(path, time_columns([at for at, _ in points]), values)
+        for path, figures in (
+            (FINAL_SHARE, convergence.final_share),
+            (FINAL_IOU, convergence.final_iou),
+        ):
+            known = [(at, figures.get(at.snapshot)) for at in instants]
+            points = [(at, value) for at, value in known if value is not None]
+            if points:
+                values = rr.Scalars.columns(scalars=np.array([value for _, value in points]))
+                self._recording.send_columns(path, time_columns([at for at, _ in points]), values)
 
     @property
     def _maps(self) -> int:
         return len(self._times) // len(Instant._fields)
 
     def _changes(
-        self, track: int, turns: list[int], number: dict[int, int], convergence: Convergence | None
+        self, track: int, turns: list[int], number: dict[int, int], convergence: Convergence
     ) -> dict[int, str]:
         """State of a room from each index on where it changes, in order."""
 
         def index_of(snapshot_ref: SnapshotRef | None) -> int:
             return self._maps if snapshot_ref is None else number[snapshot_ref.snapshot]
 
-        shaped = index_of(None if convergence is None else convergence.shape_right.get(track))
-        settled = index_of(None if convergence is None else convergence.area_settled.get(track))
+        shaped = index_of(convergence.shape_right.get(track))
+        settled = index_of(convergence.area_settled.get(track))
         ends = [*turns, self._maps] if len(turns) % 2 else turns
         changes: dict[int, str] = {}
         for begin, end in zip(ends[::2], ends[1::2], strict=True):

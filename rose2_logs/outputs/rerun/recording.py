@@ -5,8 +5,6 @@ from __future__ import annotations
 import logging
 from collections.abc import Collection
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
 import rerun as rr
 
@@ -16,7 +14,7 @@ from rose2_logs.drawing.extent import Extent
 from rose2_logs.drawing.palette import track_color
 from rose2_logs.errors import OutputError
 from rose2_logs.outputs.rerun import viewer as rerun_viewer
-from rose2_logs.outputs.rerun.back_projected import SmoothedWorld
+from rose2_logs.outputs.rerun.back_projected import BackProjectedWorld
 from rose2_logs.outputs.rerun.blueprint import COVERAGE_UNIT, make_blueprint, view_side_m
 from rose2_logs.outputs.rerun.columns import Entry, Scalar
 from rose2_logs.outputs.rerun.disk import abandon, require_space
@@ -24,12 +22,11 @@ from rose2_logs.outputs.rerun.lanes import FINAL_IOU, FINAL_SHARE, SHIFTS, Lives
 from rose2_logs.outputs.rerun.layers import CHUNK_BYTES, Layers
 from rose2_logs.outputs.rerun.summary import summary_text
 from rose2_logs.outputs.rerun.world import World
-from rose2_logs.runs.sink import RunInfo
-from rose2_logs.runs.tables import Tables
+from rose2_logs.runs.history import RunSummary
+from rose2_logs.runs.sink import RunInfo, Sink
 from rose2_logs.system.files import part_of, writing
 from rose2_logs.system.text import percent
 from rose2_logs.tracking.back_projection import BackProjectedSnapshot
-from rose2_logs.tracking.track_history import TrackHistories
 from rose2_logs.tracking.tracked_snapshot import RoomEvent, TrackedSnapshot, map_motion
 
 logger = logging.getLogger(__name__)
@@ -46,7 +43,7 @@ CURVES = {
 SHIFT_COLOR = (255, 80, 80)
 
 
-class RerunRecording:
+class RerunRecording(Sink):
     """Sink that writes a ``.rrd`` with its layout, or shows the run in an open viewer, or both.
 
     Timelines are ``message_log_time`` and ``ros2_timestamp`` (as in Rerun's own MCAP importer), ``snapshot``,
@@ -59,14 +56,10 @@ class RerunRecording:
     ----------
     path : path, optional
         Where to; written beside and renamed when whole. Without it nothing is stored.
-    info : RunInfo
-        The run.
     live : bool
         Also show the run in a Rerun viewer, which is started where none is open.
     layers : collection of str
         Which of `RECORDING_LAYERS` to write.
-    tables : Tables, optional
-        The tables of the run, which know at the end what it came to.
 
     Raises
     ------
@@ -77,33 +70,31 @@ class RerunRecording:
     def __init__(
         self,
         path: Path | None,
-        info: RunInfo,
         *,
         live: bool = False,
         layers: Collection[str] = RECORDING_LAYERS,
-        tables: Tables | None = None,
     ) -> None:
         self._path = path
         self._part = part_of(path) if path else None
-        self._info = info
         self._live = live
         self._wanted = layers
-        self._tables = tables
+        self._recording: rr.RecordingStream | None = None
         self._viewer_answers = live
         self._is_lost = False
         self._shown: set[int] = set()
         self._known: set[int] = set()
-        self._back_projected: SmoothedWorld | None = None
+        self._back_projected: BackProjectedWorld | None = None
         self._extent = Extent()
-        self._frames = 0
-        self._lives = TrackHistories() if tables is None else tables.histories
+        self._maps = 0
 
-    def __enter__(self) -> Self:
+    def begin(self, info: RunInfo) -> None:
+        """Open the file, or a viewer, and log what stays the same."""
+        self._info = info
         # The same log gives the same recording id, so that a second run replaces the first in a viewer.
-        fingerprint = str(self._info.provenance.get("sha256", self._info.log_path.name))
-        self._recording = rr.RecordingStream(
+        fingerprint = str(info.provenance.get("sha256", info.log_path.name))
+        self._recording = self._stream = rr.RecordingStream(
             "rose2_logs",
-            recording_id=f"{self._info.log_path.stem}-{fingerprint[:16]}",
+            recording_id=f"{info.log_path.stem}-{fingerprint[:16]}",
             send_properties=True,
         )
         self._layers = self._new_layers()
@@ -114,18 +105,17 @@ class RerunRecording:
             sinks.append(rr.FileSink(str(self._part)))
         if self._live:
             sinks.append(rr.GrpcSink(rerun_viewer.open_viewer(rerun_viewer.VIEWER_PORT)))
-        self._recording.set_sinks(*sinks)
-        self._recording.set_log_time_enabled(False)
-        self._recording.set_log_tick_enabled(False)
-        self._world = World(self._layers, self._recording, self._wanted)
-        self._lanes = Lives(self._recording)
+        self._stream.set_sinks(*sinks)
+        self._stream.set_log_time_enabled(False)
+        self._stream.set_log_tick_enabled(False)
+        self._world = World(self._layers, self._stream, self._wanted)
+        self._lanes = Lives(self._stream)
         for path, (name, color) in CURVES.items():
-            self._recording.log(path, rr.SeriesLines(names=name, colors=[color], widths=2), static=True)
+            self._stream.log(path, rr.SeriesLines(names=name, colors=[color], widths=2), static=True)
         jumps = rr.SeriesPoints(
             names="the map shifted", colors=[SHIFT_COLOR], markers="cross", marker_sizes=8
         )
-        self._recording.log(SHIFTS, jumps, static=True)
-        return self
+        self._stream.log(SHIFTS, jumps, static=True)
 
     def write(self, step: TrackedSnapshot) -> None:
         """Log one snapshot at all its times."""
@@ -140,52 +130,47 @@ class RerunRecording:
             if event.kind != "continued":
                 text = f"{percent(step.coverage, ' %')}: {event_text(event)}"
                 self._layers.add("/events", Entry(text, _event_level(event)))
-        if self._tables is None:
-            self._lives.add(step)
-        if self._live and self._frames == 0:
+        if self._live and self._maps == 0:
             # A live viewer shows the layout from the beginning; a file alone gets the final one.
             self._send_blueprint()
-        self._frames += 1
+        self._maps += 1
         self._flush()
 
     def write_back_projected(self, found: BackProjectedSnapshot) -> None:
         """Log what one map shows of the last map's rooms, after all maps, in their order again."""
         if self._back_projected is None:
             self._layers.flush()
-            self._back_projected = SmoothedWorld(self._new_layers(), self._recording)
+            self._back_projected = BackProjectedWorld(self._new_layers(), self._stream)
         view_m = view_side_m(self._extent.low_m, self._extent.high_m)
         self._back_projected.log(found, _steps(found.coverage), view_m)
         self._flush()
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        try:
-            if kind is None:
-                self._layers.flush()
-                if self._back_projected is not None:
-                    self._back_projected.flush()
-                convergence = None if self._tables is None else self._tables.convergence
-                self._lanes.log(convergence)
-                text = summary_text(self._info, self._lives, convergence, self._frames)
-                self._recording.log(
-                    "/summary", rr.TextDocument(text, media_type="text/markdown"), static=True
-                )
-                if self._frames:
-                    self._send_blueprint()
-                self._flush()
-            if not self._is_lost:
-                self._recording.disconnect()
-            if kind is None and self._path is not None and self._part is not None:
-                with writing(self._path):
-                    self._part.replace(self._path)
-        finally:
-            if self._part is not None:
-                self._part.unlink(missing_ok=True)
+    def finish(self, summary: RunSummary) -> None:
+        """Log what the run came to, and give the file its name."""
+        self._layers.flush()
+        if self._back_projected is not None:
+            self._back_projected.flush()
+        self._lanes.log(summary.convergence)
+        text = rr.TextDocument(summary_text(self._info, summary), media_type="text/markdown")
+        self._stream.log("/summary", text, static=True)
+        if self._maps:
+            self._send_blueprint()
+        self._flush()
+        self._stream.disconnect()
+        if self._path is not None and self._part is not None:
+            with writing(self._path):
+                self._part.replace(self._path)
+
+    def abandon(self) -> None:
+        """Remove the file that was begun."""
+        if self._recording is not None and not self._is_lost:
+            self._recording.disconnect()
+        if self._part is not None:
+            self._part.unlink(missing_ok=True)
 
     def _new_layers(self) -> Layers:
         # A live viewer shows each snapshot at once.
-        return Layers(self._recording, 0 if self._live else CHUNK_BYTES)
+        return Layers(self._stream, 0 if self._live else CHUNK_BYTES)
 
     def _send_blueprint(self) -> None:
         blueprint = make_blueprint(
@@ -194,7 +179,7 @@ class RerunRecording:
             self._wanted,
             back_projected=self._back_projected is not None,
         )
-        self._recording.send_blueprint(blueprint)
+        self._stream.send_blueprint(blueprint)
 
     def _flush(self) -> None:
         """Write what was logged; a viewer that was closed along the way is not waited for again."""
@@ -203,11 +188,11 @@ class RerunRecording:
         if self._part is not None and self._path is not None:
             require_space(self._part, self._path)
         try:
-            self._recording.flush(timeout_sec=FLUSH_TIMEOUT_S)
+            self._stream.flush(timeout_sec=FLUSH_TIMEOUT_S)
         except RuntimeError as error:
             if not self._live:
                 self._is_lost = True
-                abandon(self._recording)
+                abandon(self._stream)
                 raise OutputError(f"{self._path}: cannot be written: {error}") from error
             self._viewer_answers = False
             logger.warning("the Rerun viewer does not answer any more; the run goes on without it")
@@ -226,7 +211,7 @@ class RerunRecording:
             if track not in self._known:
                 self._known.add(track)
                 name = rr.SeriesLines(colors=[track_color(track)], names=f"room {track}")
-                self._recording.log(f"/run/area/{track}", name, static=True)
+                self._stream.log(f"/run/area/{track}", name, static=True)
             self._layers.add(f"/run/area/{track}", Scalar(area))
 
 

@@ -7,9 +7,9 @@ import re
 
 from rose2_logs.model.room_quality import UNSURE_SIGN, is_unsure
 from rose2_logs.outputs.rerun.blueprint import COVERAGE_UNIT
+from rose2_logs.runs.history import RunSummary
 from rose2_logs.runs.sink import RunInfo
 from rose2_logs.system.text import percent
-from rose2_logs.tracking.convergence import Convergence
 from rose2_logs.tracking.track_history import SnapshotRef, TrackHistories
 
 NAMED_MOST = 6
@@ -18,20 +18,17 @@ _MARKUP = re.compile(r"[\\`*_{}\[\]<>()#!&~$]")
 """What has a meaning in Markdown; after a backslash it has none."""
 
 
-def summary_text(info: RunInfo, histories: TrackHistories, convergence: Convergence | None, maps: int) -> str:
+def summary_text(info: RunInfo, summary: RunSummary) -> str:
     """Write the summary of a run as Markdown.
 
     Parameters
     ----------
     info : RunInfo
         The run.
-    histories : TrackHistories
-        What is known of every room.
-    convergence : Convergence, optional
-        Since when what was right; without it that is left out.
-    maps : int
-        Number of maps.
+    summary : RunSummary
+        What it came to.
     """
+    histories, convergence, maps = summary.histories, summary.convergence, summary.totals.snapshots
     minutes = "" if histories.last is None else f", {_duration(histories.last.time_s)}"
     rooms = len(histories.in_last_map)
     text = [
@@ -39,15 +36,14 @@ def summary_text(info: RunInfo, histories: TrackHistories, convergence: Converge
         f"**{rooms} room{'' if rooms == 1 else 's'}** at the end, {len(histories.tracks)} over the run; "
         f"{maps} map{'' if maps == 1 else 's'}{minutes}.",
     ]
-    if convergence is not None:
-        final = convergence.layout_final
-        last = None if maps == 1 or histories.last is None else histories.last.snapshot
-        text.append(
-            "**The layout still changed up to the last map**: take the rooms as preliminary."
-            if final is None or final.snapshot == last
-            else f"The layout was as in the end **from {_percent(final.coverage)} coverage on** "
-            f"({_duration(final.time_s)})."
-        )
+    final = summary.layout_final
+    last = None if maps == 1 or histories.last is None else histories.last.snapshot
+    text.append(
+        "**The layout still changed up to the last map**: take the rooms as preliminary."
+        if final is None or final.snapshot == last
+        else f"The layout was as in the end **from {_percent(final.coverage)} coverage on** "
+        f"({_duration(final.time_s)})."
+    )
     text += _worth_a_look(histories)
     rows = [
         "| room | area, m² | first seen | shape right | area settled | walls |",
@@ -55,8 +51,8 @@ def summary_text(info: RunInfo, histories: TrackHistories, convergence: Converge
     ]
     for track in histories.in_last_map:
         history = histories.tracks[track]
-        right = None if convergence is None else convergence.shape_right.get(track)
-        settled = None if convergence is None else convergence.area_settled.get(track)
+        right = convergence.shape_right.get(track)
+        settled = convergence.area_settled.get(track)
         walls = "" if history.wall_support is None else _percent(history.wall_support)
         rows.append(
             f"| {track} | {history.area_m2:.1f} | {_percent(history.first.coverage)} | {_moment(right)} "

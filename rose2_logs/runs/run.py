@@ -1,0 +1,325 @@
+"""Run: a stored run as people use it: tables, maps, label images, figures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import cached_property
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rose2_logs.model.occupancy import UNKNOWN, GridGeometry
+from rose2_logs.model.room_plan import RoomPlan
+from rose2_logs.runs.stored_run import StoredRun
+from rose2_logs.runs.table import Table
+from rose2_logs.runs.tables import BACK_PROJECTED, Row
+from rose2_logs.system.text import percent
+
+if TYPE_CHECKING:
+    from rose2_logs.drawing.shapes import Drawing
+
+
+class Run(StoredRun, Sequence["RunSnapshot"]):
+    """A run over one log, as an analysis has stored it: a sequence of `RunSnapshot`.
+
+    Parameters
+    ----------
+    folder : str or path
+        The folder with ``summary.json``.
+    temporary : TemporaryDirectory, optional
+        What holds the folder, if it is to go with this object.
+
+    Attributes
+    ----------
+    folder : path
+    summary : dict
+        The content of ``summary.json``.
+
+    Raises
+    ------
+    ResultsError
+        If the folder is not one of results, its summary cannot be read, or it is of another version.
+    OutputError
+        If its name is not UTF-8.
+
+    Examples
+    --------
+    >>> import rose2_logs as rl
+    >>> run = rl.analyze("sample_logs/office.mcap", max_snapshots=3)
+    >>> run
+    <Run office: 3 maps, 19 rooms at the end>
+    >>> run[-1].labels.shape == run[-1].geometry.shape
+    True
+    """
+
+    def __init__(self, folder: str | Path, temporary: TemporaryDirectory[str] | None = None) -> None:
+        super().__init__(Path(folder))
+        self._temporary = temporary
+
+    @property
+    def snapshots(self) -> Table:
+        """One row per map."""
+        return self._public("snapshots")
+
+    @cached_property
+    def rooms(self) -> Table:
+        """One row per room and map; `in_last_map` tells whether the last map shows the room's track."""
+        import pyarrow as pa
+
+        rows, tracks = self.table("rooms"), self.table("tracks", ["track", "in_last_map"])
+        last = tracks["track"].to_numpy()[tracks["in_last_map"].to_numpy(zero_copy_only=False)]
+        column = pa.array(np.isin(rows["track"].to_numpy(), last))
+        meaning = {"description": "whether the run's last map shows the room's track"}
+        return Table("rooms", rows.append_column(pa.field("in_last_map", pa.bool_(), False, meaning), column))
+
+    @property
+    def tracks(self) -> Table:
+        """One row per room over the run."""
+        return self._public("tracks")
+
+    @property
+    def events(self) -> Table:
+        """One row per event: rooms born, split, merged, lost ..., shifts of the whole map."""
+        return self._public("events")
+
+    @property
+    def doorways(self) -> Table:
+        """One row per doorway and map."""
+        return self._public("doorways")
+
+    @property
+    def walls(self) -> Table:
+        """One row per wall segment and map."""
+        return self._public("walls")
+
+    @property
+    def lines(self) -> Table:
+        """One row per representative line and map."""
+        return self._public("lines")
+
+    @property
+    def back_projected(self) -> Table | None:
+        """One row per room of the last map and map that shows some of it; None if it was not asked for."""
+        return self._public(BACK_PROJECTED) if self.is_back_projected else None
+
+    def at(self, snapshot: int | None = None, coverage: float | None = None) -> RunSnapshot:
+        """Return a map: that of a number, or the first that covers so much, or the last.
+
+        Parameters
+        ----------
+        snapshot : int, optional
+            Its number, as in the tables.
+        coverage : float, optional
+            Share in [0, 1] of the last map's known free area.
+
+        Raises
+        ------
+        ParameterError
+            If there is no such map, or the coverage is no share.
+        """
+        return RunSnapshot(self, self.choose(snapshot, coverage))
+
+    def at_coverage(self, coverage: float) -> RunSnapshot:
+        """Return the first map that covers a share of what the last one does; see `at`."""
+        return self.at(coverage=coverage)
+
+    def figure(
+        self, snapshot: int | None = None, coverage: float | None = None, *, back_projected: bool = False
+    ) -> Drawing:
+        """Draw a map with its rooms; see `at` and `RunSnapshot.figure`."""
+        return self.at(snapshot, coverage).figure(back_projected=back_projected)
+
+    def plot(
+        self,
+        ax: Any = None,
+        snapshot: int | None = None,
+        coverage: float | None = None,
+        *,
+        back_projected: bool = False,
+    ) -> Any:
+        """Draw a map with its rooms with matplotlib; see `at` and `RunSnapshot.plot`."""
+        return self.at(snapshot, coverage).plot(ax, back_projected=back_projected)
+
+    def __len__(self) -> int:
+        return len(self.columns["snapshot"])
+
+    @overload
+    def __getitem__(self, index: int) -> RunSnapshot: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[RunSnapshot]: ...
+    def __getitem__(self, index: int | slice) -> RunSnapshot | list[RunSnapshot]:
+        numbers = self.columns["snapshot"][index]
+        if isinstance(index, slice):
+            return [RunSnapshot(self, int(number)) for number in numbers]
+        return RunSnapshot(self, int(numbers))
+
+    def __iter__(self) -> Iterator[RunSnapshot]:
+        return (RunSnapshot(self, int(number)) for number in self.columns["snapshot"])
+
+    def __repr__(self) -> str:
+        found = self.summary["results"]
+        return f"<Run {self.name}: {found['snapshots']} maps, {found['rooms_last']} rooms at the end>"
+
+    def _repr_html_(self) -> str:
+        from html import escape
+
+        found, final = self.summary["results"], self.summary["layout"].get("final_since")
+        facts = {
+            "log": self.summary["log"],
+            "maps": found["snapshots"],
+            "rooms at the end": f"{found['rooms_last']} of {found['tracks']} tracks",
+            "layout final from": "not reached" if final is None else f"{percent(final['coverage'])} coverage",
+            "warnings": self.summary["warnings"].get("count", 0),
+        }
+        rows = "".join(f"<tr><th>{escape(k)}</th><td>{escape(str(v))}</td></tr>" for k, v in facts.items())
+        return f"<h4>{escape(self.name)}</h4><table>{rows}</table>{self[-1]._repr_svg_()}"
+
+    def _public(self, name: str) -> Table:
+        if name not in self._tables:
+            self._tables[name] = Table(name, self.table(name))
+        return self._tables[name]
+
+    @cached_property
+    def _tables(self) -> dict[str, Table]:
+        return {}
+
+
+class RunSnapshot:
+    """One map of a stored run.
+
+    Attributes
+    ----------
+    run : Run
+    number : int
+        Its number in the tables.
+
+    Examples
+    --------
+    >>> import rose2_logs as rl
+    >>> run = rl.analyze("sample_logs/office.mcap", max_snapshots=3)
+    >>> run[0]
+    <RunSnapshot 0 of office: coverage 2%, 2 rooms>
+    """
+
+    def __init__(self, run: Run, number: int) -> None:
+        self.run = run
+        self.number = number
+
+    @cached_property
+    def _row(self) -> Row:
+        return self.run.row(self.number)
+
+    @property
+    def coverage(self) -> float:
+        """Known free area over that of the last map, in [0, 1]."""
+        return float(self._row["coverage"])
+
+    @property
+    def time_s(self) -> float:
+        """Log time since the first map, seconds."""
+        return float(self._row["time_s"])
+
+    @property
+    def log_time_ns(self) -> int:
+        """When the map was recorded, nanoseconds since the epoch."""
+        return int(self._row["log_time_ns"])
+
+    @property
+    def geometry(self) -> GridGeometry:
+        """Where the map's grid lies."""
+        return self.run.geometry(self.number)
+
+    @cached_property
+    def labels(self) -> NDArray[np.int32]:
+        """Label image (H, W) on the map's grid: track of each cell's room, 0 for none; row 0 at the origin."""
+        stored, window = self.run.map(self.number)
+        whole = np.zeros(self.geometry.shape, np.int32)
+        whole[window] = stored.labels
+        return whole
+
+    @cached_property
+    def cells(self) -> NDArray[np.int8]:
+        """Classes (H, W) of the map's cells: -1 unknown, 0 free, 50 between the thresholds, 100 occupied."""
+        stored, window = self.run.map(self.number)
+        whole = np.full(self.geometry.shape, UNKNOWN, np.int8)
+        whole[window] = stored.cells
+        return whole
+
+    @cached_property
+    def rooms(self) -> Table:
+        """One row per room."""
+        return Table("rooms", self.run.table("rooms", snapshot=self.number))
+
+    @cached_property
+    def doorways(self) -> Table:
+        """One row per doorway."""
+        return Table("doorways", self.run.table("doorways", snapshot=self.number))
+
+    @cached_property
+    def walls(self) -> Table:
+        """One row per wall segment."""
+        return Table("walls", self.run.table("walls", snapshot=self.number))
+
+    @cached_property
+    def lines(self) -> Table:
+        """One row per representative line."""
+        return Table("lines", self.run.table("lines", snapshot=self.number))
+
+    def plan(self, *, back_projected: bool = False) -> RoomPlan:
+        """Return the floor plan: rooms by their tracks, doorways, walls and the map.
+
+        Parameters
+        ----------
+        back_projected : bool
+            Take the rooms of the last map as far as this one shows them, instead of its own.
+        """
+        if back_projected:
+            from rose2_logs.runs.back_projected_plan import back_projected_plan
+
+            return back_projected_plan(self.run, self.number)
+        return self.run.plan(self.number, with_walls=True)
+
+    def figure(self, *, back_projected: bool = False) -> Drawing:
+        """Draw the map with its rooms, unseen parts, doorways and a scale bar.
+
+        Returns
+        -------
+        Drawing
+            Shown in notebooks; ``drawing.save("plan.svg")`` or ``.png`` writes it.
+        """
+        from rose2_logs.drawing.plan import draw_plan
+
+        return draw_plan(self.plan(back_projected=back_projected))
+
+    def plot(self, ax: Any = None, *, back_projected: bool = False) -> Any:
+        """Draw the map with its rooms with matplotlib.
+
+        Parameters
+        ----------
+        ax : matplotlib Axes, optional
+            Where to; by default new ones.
+        back_projected : bool
+            As for `plan`.
+
+        Returns
+        -------
+        matplotlib Axes
+
+        Raises
+        ------
+        MissingPackageError
+            If matplotlib is not installed.
+        """
+        from rose2_logs.drawing.plot import plot_plan
+
+        return plot_plan(self.plan(back_projected=back_projected), ax)
+
+    def __repr__(self) -> str:
+        rooms = int(self._row["rooms"])
+        return f"<RunSnapshot {self.number} of {self.run.name}: coverage {percent(self.coverage)}, {rooms} rooms>"
+
+    def _repr_svg_(self) -> str:
+        return self.figure()._repr_svg_()

@@ -1,0 +1,361 @@
+"""The folder of a run, read back: summary, tables, maps, walls and floor plans."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from rose2_logs.config.parameters import OccupancyParameters, Parameters
+from rose2_logs.errors import LogError, ParameterError, ResultsError
+from rose2_logs.io.discovery import ANNOTATED_ENDING
+from rose2_logs.model.analysis import Walls
+from rose2_logs.model.occupancy import GridGeometry
+from rose2_logs.model.room_plan import PlanMap, PlanRoom, RoomPlan
+from rose2_logs.model.rooms import Doorway
+from rose2_logs.runs.provenance import log_files
+from rose2_logs.runs.summary import RESULTS_FORMAT, SUMMARY
+from rose2_logs.runs.tables import BACK_PROJECTED, TABLES, Row, unpack_image
+from rose2_logs.system.files import require_utf8
+from rose2_logs.system.text import percent
+from rose2_logs.tracking.registration import RigidMotion
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+SUMMARY_KEYS: dict[str, type | tuple[type, ...]] = {
+    "log": str,
+    "topic": str,
+    "method": str,
+    "input": dict,
+    "versions": dict,
+    "parameters": dict,
+    "messages": dict,
+    "warnings": dict,
+    "results": dict,
+    "layout": dict,
+    "files": list,
+}
+"""What every summary holds."""
+MAKE_AGAIN = "analyze the log again"
+"""The remedy for results that cannot be used."""
+
+
+def find_results(folder: Path) -> list[Path]:
+    """Find the folders with results of a log: the folder itself, or all below it, sorted.
+
+    Raises
+    ------
+    ResultsError
+        If there are none.
+    """
+    if (folder / SUMMARY).is_file():
+        return [folder]
+    if not folder.is_dir():
+        raise ResultsError(f"{folder}: there is no such folder; give one that an analysis has written")
+    found = (path.parent for path in folder.rglob(SUMMARY))
+    shown = [
+        path for path in found if not any(part.startswith(".") for part in path.relative_to(folder).parts)
+    ]
+    if not shown:
+        raise ResultsError(f"{folder}: holds no {SUMMARY}; give a folder that an analysis has written")
+    return sorted(shown)
+
+
+class StoredRun:
+    """What a run has stored, as reports, exports and comparisons need it.
+
+    Parameters
+    ----------
+    folder : path
+        The folder with ``summary.json``.
+
+    Attributes
+    ----------
+    folder : path
+    summary : dict
+        The content of ``summary.json``.
+
+    Raises
+    ------
+    ResultsError
+        If the folder is not one of results, its summary cannot be read, or it is of another version.
+    OutputError
+        If its name is not UTF-8.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        require_utf8(folder)
+        self.summary: dict[str, Any] = _read_summary(folder)
+
+    @property
+    def name(self) -> str:
+        """Name of the run: that of its folder."""
+        return self.folder.resolve().name
+
+    @cached_property
+    def parameters(self) -> Parameters:
+        """The parameters that the run had.
+
+        Raises
+        ------
+        ResultsError
+            If they are not those of this version.
+        """
+        try:
+            return Parameters().replaced(self.summary["parameters"])
+        except ParameterError as error:
+            raise ResultsError(
+                f"{self.folder / SUMMARY}: is of another version ({error}); {MAKE_AGAIN}"
+            ) from error
+
+    @property
+    def annotated_log(self) -> Path | None:
+        """The annotated MCAP, None if the run wrote none or it is gone."""
+        names = [name for name in self.summary["files"] if str(name).endswith(ANNOTATED_ENDING)]
+        paths = [self.folder / Path(name).name for name in names]
+        return next((path for path in paths if path.is_file()), None)
+
+    @property
+    def is_back_projected(self) -> bool:
+        """Whether the run has a table of back-projected rooms."""
+        # One that the summary does not name is of an earlier run.
+        name = f"{BACK_PROJECTED}.parquet"
+        return name in self.summary["files"] and (self.folder / name).is_file()
+
+    def find_log(self) -> str:
+        """Find the log: where it was, or where it lay as seen from the results, or as it was given.
+
+        Raises
+        ------
+        LogError
+            If there is none of its size.
+        """
+        given, location = str(self.summary["log"]), self.summary.get("log_location") or {}
+        beside = location.get("from_results")
+        found = [location.get("absolute"), beside and os.path.normpath(self.folder.resolve() / beside), given]
+        candidates = list(dict.fromkeys(str(each) for each in found if each))
+        size = self.summary["input"].get("size_bytes")
+        held = {each: sum(file.stat().st_size for file in log_files(Path(each))) for each in candidates}
+        of_its_size = [each for each in candidates if held[each] and held[each] == size]
+        if of_its_size:
+            return of_its_size[0]
+        if others := [each for each in candidates if held[each]]:
+            raise LogError(
+                f"{others[0]} is not the log that the results are of: {held[others[0]]} bytes, not {size}"
+            )
+        raise LogError(f"there is no log at {' or '.join(candidates)}")
+
+    def table(self, name: str, columns: list[str] | None = None, snapshot: int | None = None) -> pa.Table:
+        """Read a table, or some of its columns, or its rows of one map.
+
+        Raises
+        ------
+        ResultsError
+            If it is not there, cannot be read or lacks a column.
+        """
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        from rose2_logs.runs.table_schemas import SCHEMAS
+
+        if name not in (*TABLES, BACK_PROJECTED):
+            raise ParameterError(f"no table {name!r}; there are {', '.join((*TABLES, BACK_PROJECTED))}")
+        path = self.folder / f"{name}.parquet"
+        rows = None if snapshot is None else [("snapshot", "=", snapshot)]
+        try:
+            found = pq.read_table(path, columns=columns, filters=rows, partitioning=None)
+        except (OSError, pa.ArrowException) as error:
+            raise ResultsError(f"{path}: cannot be read: {error}; {MAKE_AGAIN}", file=path) from error
+        for field in SCHEMAS[name]:
+            if columns is None or field.name in columns:
+                at = found.schema.get_field_index(field.name)
+                if at < 0 or found.schema.field(at).type != field.type:
+                    lack = "is missing" if at < 0 else f"is not of type {field.type}"
+                    raise ResultsError(f"{path}: its column {field.name} {lack}; {MAKE_AGAIN}", file=path)
+        return found
+
+    @cached_property
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """Columns of the table of snapshots as arrays; null is NaN."""
+        table = self.table("snapshots")
+        if not table.num_rows:
+            raise ResultsError(f"{self.folder / 'snapshots.parquet'}: holds no map; {MAKE_AGAIN}")
+        return {name: table[name].to_numpy(zero_copy_only=False) for name in table.column_names}
+
+    def choose(self, snapshot: int | None = None, coverage: float | None = None) -> int:
+        """Return the number of a map; see `at`."""
+        numbers = self.columns["snapshot"]
+        if snapshot is not None:
+            if snapshot not in numbers:
+                raise ParameterError(
+                    f"{self.folder}: no snapshot {snapshot}; they go from {numbers[0]} to {numbers[-1]}"
+                )
+            return snapshot
+        if coverage is None:
+            return int(numbers[-1])
+        if not 0 <= coverage <= 1:
+            raise ParameterError(f"the coverage is a share from 0 to 1, not {coverage:g}; half is 0.5")
+        covered = np.flatnonzero(self.columns["coverage"] >= coverage)
+        return int(numbers[covered[0]] if len(covered) else numbers[-1])
+
+    def row(self, snapshot: int) -> Row:
+        """Return what the table of snapshots tells of one."""
+        (place,) = np.flatnonzero(self.columns["snapshot"] == snapshot)
+        return {name: values[place] for name, values in self.columns.items()}
+
+    def geometry(self, snapshot: int) -> GridGeometry:
+        """Where the grid of a map lies."""
+        row = self.row(snapshot)
+        return GridGeometry(
+            float(row["resolution_m"]),
+            (float(row["origin_x_m"]), float(row["origin_y_m"])),
+            float(row["yaw_rad"]),
+            str(row["frame_id"]),
+            (int(row["height_cells"]), int(row["width_cells"])),
+        )
+
+    def drift(self, snapshot: int) -> RigidMotion:
+        """How the whole map moved from the run's first map to this one."""
+        row = self.row(snapshot)
+        return RigidMotion((0.0, 0.0), (row["drift_x_m"], row["drift_y_m"]), row["drift_yaw_rad"])
+
+    def map(self, snapshot: int) -> tuple[PlanMap, tuple[slice, slice]]:
+        """Read a map and the tracks of its cells, as its explored window, and where that lies in the grid.
+
+        Raises
+        ------
+        ResultsError
+            If the table of maps cannot be read.
+        """
+        path = self.folder / "maps.parquet"
+        (stored, *_) = self.table("maps", snapshot=snapshot).to_pylist() or [None]
+        if stored is None:
+            raise ResultsError(f"{path}: holds no map {snapshot}; {MAKE_AGAIN}", file=path)
+        shape = (stored["rows"], stored["columns"])
+        top, left = stored["first_row"], stored["first_column"]
+        window = slice(top, top + shape[0]), slice(left, left + shape[1])
+        geometry = self.geometry(snapshot)
+        if (
+            min(*shape, top, left) < 0
+            or window[0].stop > geometry.shape[0]
+            or window[1].stop > geometry.shape[1]
+        ):
+            raise ResultsError(f"{path}: map {snapshot} does not fit its grid; {MAKE_AGAIN}", file=path)
+        try:
+            cells = unpack_image(stored["cells_zstd"], shape, "i1")
+            labels = unpack_image(stored["labels_zstd"], shape, "<i4")
+        except ValueError as error:
+            text = f"{path}: map {snapshot} cannot be read: {error}; {MAKE_AGAIN}"
+            raise ResultsError(text, file=path) from error
+        return PlanMap(geometry.part(window), cells, labels.astype(np.int32), self.occupancy), window
+
+    @property
+    def occupancy(self) -> OccupancyParameters:
+        """The run's parameters, for stored maps: these hold classes, which the usual thresholds tell apart."""
+        usual = OccupancyParameters()
+        return replace(
+            self.parameters.occupancy,
+            occupied_min_percent=usual.occupied_min_percent,
+            free_max_percent=usual.free_max_percent,
+        )
+
+    def found_walls(self, snapshot: int) -> Walls | None:
+        """Read the walls of a map; None if the method finds none."""
+        if self.summary["method"] != "rose2":
+            return None
+        segments, lines = (self.table(name, snapshot=snapshot) for name in ("walls", "lines"))
+        return Walls(
+            segments_m=_ends(segments),
+            segment_direction=segments["direction"].to_numpy(),
+            segment_cluster=segments["line"].to_numpy(),
+            lines_m=_ends(lines),
+            line_direction=lines["direction"].to_numpy(),
+            line_weight=lines["weight"].to_numpy(),
+        )
+
+    def plan(self, snapshot: int, *, with_map: bool = True, with_walls: bool = False) -> RoomPlan:
+        """Return the floor plan of a map, whose rooms go by their tracks.
+
+        Parameters
+        ----------
+        snapshot : int
+            Its number.
+        with_map : bool
+            Whether to read the map too; without it there are shapes alone.
+        with_walls : bool
+            Whether to read the wall segments too.
+
+        Raises
+        ------
+        ResultsError
+            If a file cannot be read.
+        """
+        row = self.row(snapshot)
+        rooms = [_room(each) for each in self.table("rooms", snapshot=snapshot).to_pylist()]
+        doorways = [_doorway(each) for each in self.table("doorways", snapshot=snapshot).to_pylist()]
+        walls = self.found_walls(snapshot) if with_walls else None
+        return RoomPlan(
+            f"{self.name}, snapshot {snapshot}, coverage {percent(float(row['coverage']))}",
+            str(row["frame_id"]),
+            tuple(sorted(rooms, key=lambda room: room.number)),
+            tuple(doorways),
+            None if walls is None else walls.segments_m.reshape(-1, 2, 2),
+            self.map(snapshot)[0] if with_map else None,
+        )
+
+
+def _read_summary(folder: Path) -> dict[str, Any]:
+    path = folder / SUMMARY
+    if not path.is_file():
+        below = min((found.parent for found in folder.rglob(SUMMARY)), default=None)
+        hint = f"did you mean {below}?" if below else "an analysis writes such a folder for each log"
+        raise ResultsError(f"{folder}: holds no {SUMMARY}; {hint}", file=folder)
+    try:
+        summary = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise ResultsError(f"{path}: cannot be read: {error}; {MAKE_AGAIN}", file=path) from error
+    if not isinstance(summary, dict) or not {"log", "topic", "results", "files"} <= summary.keys():
+        raise ResultsError(f"{path}: is not the summary of a run; give a folder of results", file=path)
+    if summary.get("results_format") != RESULTS_FORMAT:
+        version = summary.get("versions", {}).get("rose2-logs", "another version")
+        raise ResultsError(
+            f"{folder}: was written by rose2-logs {version}, whose results this version cannot read; "
+            f"{MAKE_AGAIN} ({summary['log']}) to another folder, or overwrite this one",
+            file=path,
+        )
+    for key, kind in SUMMARY_KEYS.items():
+        if not isinstance(summary.get(key), kind):
+            raise ResultsError(f"{path}: its {key} is missing or damaged; {MAKE_AGAIN}", file=path)
+    return summary
+
+
+def _ends(table: pa.Table) -> NDArray[np.float64]:
+    """Ends (N, 4) of lines."""
+    return np.column_stack([table[name].to_numpy() for name in ("x0_m", "y0_m", "x1_m", "y1_m")])
+
+
+def _room(row: Row) -> PlanRoom:
+    point = (row["label_x_m"], row["label_y_m"])
+    return PlanRoom(
+        row["track"],
+        shapely.from_wkb(row["polygon_wkb"]),
+        row["area_m2"],
+        None if point[0] is None else point,
+        tuple(row["neighbors"]),
+        row["wall_support"],
+        row["frontier_m"],
+    )
+
+
+def _doorway(row: Row) -> Doorway:
+    ends = np.array([[row["x0_m"], row["y0_m"]], [row["x1_m"], row["y1_m"]]])
+    return Doorway((row["track_a"], row["track_b"]), ends)
