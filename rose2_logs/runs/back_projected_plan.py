@@ -39,7 +39,7 @@ def back_projected_plan(results: RunResults, snapshot: int, maps: RunMaps | None
     if last.map is None or then.map is None:
         raise LogError(
             f"{results.folder}: smoothing needs the maps, and the annotated MCAP with them is not there; "
-            "analyze the log again without --no-mcap"
+            "analyze the log again without annotated_log=False"
         )
     tracks = np.array([room.number for room in last.rooms], np.int32)
     # Rooms of the plan go by their tracks, ascending; the projector counts them.

@@ -127,7 +127,7 @@ class Workers(Generic[Item, Result]):
         except BrokenProcessPool as error:
             raise WorkerError(
                 f"one of {self._count} worker processes was killed, likely for lack of memory; "
-                "use fewer --workers"
+                "use fewer workers"
             ) from error
 
     def _map_here(

@@ -148,5 +148,5 @@ def _last_map(results: RunResults, last_ns: int, limits: ReadingParameters) -> O
             raise
         raise LogError(
             f"{results.folder}: holds no annotated MCAP, and the last map cannot be read from the log "
-            f"({error}); put the log back, or analyze it again without --no-mcap"
+            f"({error}); put the log back, or analyze it again without annotated_log=False"
         ) from error
