@@ -42,7 +42,7 @@ class DaskWorkers:
         try:
             import distributed
         except ImportError as error:
-            raise ParameterError(f"--scheduler needs Dask: {EXTRA}") from error
+            raise ParameterError(f"a scheduler needs Dask: {EXTRA}") from error
         # What its client logs about a lost scheduler, traceback and all, is told here in one line.
         for name in ("distributed", "distributed.client", "distributed.core"):
             logging.getLogger(name).setLevel(logging.CRITICAL)
@@ -61,7 +61,7 @@ class DaskWorkers:
             )
         except (OSError, ValueError) as error:
             raise ParameterError(
-                f"--scheduler {address}: no Dask scheduler answers; `dask scheduler` prints its address"
+                f"{address}: no Dask scheduler answers; `dask scheduler` prints its address"
             ) from error
         self._killed_worker = distributed.KilledWorker
         self._client.subscribe_topic(self._topic, lambda event: self._told.put(Progress(*event[1])))
@@ -119,7 +119,7 @@ class DaskWorkers:
                 "no worker has joined the scheduler yet: `dask worker %s` starts one", self._address
             )
         if any(count > 1 for count in threads.values()):
-            logger.warning("workers with several threads share one Python: start them with --nthreads 1")
+            logger.warning("workers with several threads share one Python: start them with one thread each")
 
     def _is_gone(self) -> WorkerError:
         return WorkerError(

@@ -160,10 +160,10 @@ def run_batch(arguments: Sequence[str], out: Path, options: BatchOptions, listen
     """
     # A path holds one of the two slashes of a URL.
     if re.match(r"[a-z][a-z0-9+.-]+:/", str(out)):
-        raise ParameterError(f"-o {out}: results go to a folder, not to a URL")
+        raise ParameterError(f"{out}: results go to a folder, not to a URL")
     if options.scheduler is not None and options.workers is not None:
         raise ParameterError(
-            "--workers is for this machine; a cluster has the workers that joined its scheduler"
+            "a number of workers is for this machine; a cluster has the workers that joined its scheduler"
         )
     out = Path(os.path.abspath(out))  # noqa: PTH100 (as in find_logs)
     require_utf8(out)
@@ -296,7 +296,8 @@ class _Batch:
             name, difference = next(iter(others.items()))
             raise OutputError(
                 f"{self._out}: holds results of other settings ({len(others)} logs; {name}: {difference}); "
-                "choose another folder, or pass --overwrite to analyze the logs given now again"
+                "choose another folder, or allow overwriting to analyze the logs given now again "
+                "(overwrite=True)"
             )
         if left := sorted(set(others) - names):
             logger.warning(

@@ -108,7 +108,7 @@ class _Worker:
         if code >= 0:
             return f"its worker process ended with exit code {code}"
         name = signal.Signals(-code).name
-        return f"its worker process was killed ({name}), likely for lack of memory; use fewer --workers"
+        return f"its worker process was killed ({name}), likely for lack of memory; use fewer workers"
 
 
 def _serve(connection: Connection) -> None:

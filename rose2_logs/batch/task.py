@@ -232,7 +232,9 @@ def _analyze_local(task: LogTask, path: Path, signature: Signature, report: Repo
         if is_same and task.is_whole:
             return LogOutcome(task.name, "unchanged", record=_confirmed(task, task.known, signature))
         if not is_same and task.known_name == task.name and not task.may_replace:
-            raise OutputError(f"{task.log.address}: has changed since its results; --overwrite replaces them")
+            raise OutputError(
+                f"{task.log.address}: has changed since its results; overwrite=True replaces them"
+            )
     asked = task.settings
     with _attempt_folder(task) as folder:
         start_ns, end_ns = seconds_into_log(path, asked.start_s, asked.end_s, asked.parameters.reading)

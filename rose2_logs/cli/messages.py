@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
+import re
 import traceback
 from collections import Counter
 from dataclasses import dataclass
@@ -18,7 +19,22 @@ from rose2_logs.system.warnings import FIELDS, PACKAGE
 
 SHOWN_OF_KIND = 3
 """Warnings of one kind that are shown; a log with a thousand damaged messages has a thousand more."""
+FLAGS = {
+    "overwrite=True": "--overwrite",
+    "resume=True": "--resume",
+    "strict=True": "--strict",
+    "bag=True": "--bag",
+    "live=True": "--live",
+    "web=True": "--web",
+    "annotated_log=False": "--no-mcap",
+    "topic=": "--topic ",
+    "resolution_m=": "--resolution ",
+    "the parameter reading.": "--set reading.",
+}
+"""The library's messages name options as they are written in Python; here they are named as flags."""
 STYLES = {"info": "cyan", "warning": "yellow", "error": "bold red"}
+
+_OPTIONS = re.compile(r"(?<!\w)(?:" + "|".join(map(re.escape, FLAGS)) + ")")
 
 errors = Console(stderr=True, highlight=False)
 """Where messages and progress go."""
@@ -90,7 +106,7 @@ class _MessageHandler(logging.Handler):
 
 def show(level: str, message: str, **told: Any) -> None:
     """Show one line; what it tells beside its text goes into JSON only."""
-    text = printable(message)
+    text = printable(with_flags(message))
     if style.as_json:
         now = datetime.now(UTC).isoformat(timespec="milliseconds")
         entry = {"time": now, "level": level, "message": text} | {name: told.get(name) for name in FIELDS}
@@ -98,6 +114,11 @@ def show(level: str, message: str, **told: Any) -> None:
         errors.file.flush()
     else:
         errors.print(f"[{STYLES.get(level, 'default')}]{level}:[/] {escape(text)}", soft_wrap=True)
+
+
+def with_flags(message: str) -> str:
+    """Return a message of the library with the options that it names as the command line has them."""
+    return _OPTIONS.sub(lambda found: FLAGS[found[0]], message)
 
 
 def printable(text: str) -> str:

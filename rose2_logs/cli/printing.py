@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 from rich.markup import escape
 
-from rose2_logs.cli.messages import errors, printable, progress_line, style
+from rose2_logs.cli.messages import errors, printable, progress_line, style, with_flags
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -75,7 +75,7 @@ def print_log_facts(facts: LogFacts) -> None:
     _out.print(table)
     for topic_facts in facts.maps:
         if topic_facts.first is None or topic_facts.last is None:
-            trouble = escape(printable(topic_facts.trouble or ""))
+            trouble = escape(printable(with_flags(topic_facts.trouble or "")))
             _out.print(f"[bold]{escape(printable(topic_facts.topic))}[/]: {trouble}", soft_wrap=True)
             continue
         frame = escape(printable(topic_facts.last.frame_id))

@@ -359,10 +359,10 @@ def load_parameters(config: Path | None = None, settings: Iterable[str] = ()) ->
         try:
             parsed = _parsed_setting(setting)
         except tomllib.TOMLDecodeError as error:
-            raise ParameterError(f"--set {setting!r}: write it as block.name=value") from error
+            raise ParameterError(f"{setting!r}: write it as block.name=value") from error
         if not all(isinstance(values, Mapping) for values in parsed.values()):
             meant = _meant(next(iter(parsed)))
-            raise ParameterError(f"--set {setting!r}: write it as block.name=value{meant}")
+            raise ParameterError(f"{setting!r}: write it as block.name=value{meant}")
         parameters = parameters.replaced(parsed)
     return parameters
 

@@ -13,7 +13,7 @@ COPIED_AT_ONCE = 1 << 20
 """Bytes that are in memory while a file is decompressed into another."""
 
 
-REMEDY = "if it is real, raise --set reading.chunk_max_bytes"
+REMEDY = "if it is real, raise the parameter reading.chunk_max_bytes"
 
 
 class TooLargeError(ValueError):

@@ -75,7 +75,7 @@ def check_cells(rows: int, columns: int, most_cells: int) -> None:
     if rows * columns > most_cells:
         raise InvalidMapError(
             f"it has {columns} x {rows} cells, the most that are read is {most_cells}; if it is real, "
-            "raise --set reading.map_max_cells"
+            "raise the parameter reading.map_max_cells"
         )
 
 

@@ -255,6 +255,6 @@ def choose_topic(info: LogInfo, asked: str | None = None) -> str:
             return name
     if len(filled) > 1:
         raise NoMapTopicError(
-            f"{info.path}: several topics hold maps, choose one: {', '.join(filled)} (--topic)"
+            f"{info.path}: several topics hold maps: {', '.join(filled)}; choose one (topic={min(filled)!r})"
         )
     return next(iter(filled))

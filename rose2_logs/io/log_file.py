@@ -162,6 +162,6 @@ def check_count(path: Path, count: int, most: int) -> None:
     if count > most:
         raise LogError(
             f"{path}: holds more than {most} map messages; if they are real, "
-            "raise --set reading.map_max_messages",
+            "raise the parameter reading.map_max_messages",
             file=path,
         )

@@ -169,7 +169,7 @@ class Journal:
             piece = piece[self._file.write(piece) :]
 
     def _does_not_fit(self, why: str) -> OutputError:
-        return OutputError(f"{self._path}: does not fit the log ({why}); leave --resume out to begin anew")
+        return OutputError(f"{self._path}: does not fit the log ({why}); leave out resume=True to begin anew")
 
 
 class JournaledWorkers:

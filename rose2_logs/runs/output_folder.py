@@ -132,7 +132,7 @@ class OutputFolder:
         if not resume:
             if not differs and kept.maps:
                 logger.warning(
-                    "%s: a run was stopped here after %d maps; --resume would have gone on after them; "
+                    "%s: a run was stopped here after %d maps; resume=True would have gone on after them; "
                     "this one begins anew",
                     self._folder,
                     kept.maps,
@@ -142,7 +142,7 @@ class OutputFolder:
         if differs:
             raise OutputError(
                 f"{self._folder}: the run that was stopped here was another one ({differs}); "
-                "leave --resume out to begin anew"
+                "leave out resume=True to begin anew"
             )
         if kept.maps:
             logger.warning(
@@ -193,7 +193,10 @@ class OutputFolder:
         shutil.rmtree(self._work, ignore_errors=True)
         if kept_maps:
             logger.warning(
-                "%s: %d maps are done; --resume goes on after them", self._folder, kept_maps, extra=UNCOUNTED
+                "%s: %d maps are done; resume=True goes on after them",
+                self._folder,
+                kept_maps,
+                extra=UNCOUNTED,
             )
         else:
             self._journal.unlink(missing_ok=True)

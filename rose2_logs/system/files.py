@@ -101,7 +101,9 @@ def refuse_existing(files: Iterable[Path], *, overwrite: bool) -> None:
         If one exists and may not be replaced.
     """
     if not overwrite and (existing := [file for file in files if file.exists()]):
-        raise OutputError(f"{existing[0]}: exists already; choose another folder or pass --overwrite")
+        raise OutputError(
+            f"{existing[0]}: exists already; choose another folder or allow overwriting (overwrite=True)"
+        )
 
 
 @contextmanager

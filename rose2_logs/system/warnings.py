@@ -149,7 +149,7 @@ def collect_warnings(strict: bool = False) -> Iterator[WarningLog]:
             warning_log.add(record)
             # Others are about this machine, not about the log.
             if strict and hasattr(record, "kind"):
-                text = f"{record.getMessage()} (an error because of --strict)"
+                text = f"{record.getMessage()} (an error because of strict=True)"
                 where = {name: getattr(record, name, None) for name in FIELDS[1:]}
                 raise StrictError(text, **where)
 

@@ -114,9 +114,13 @@ def read_static_map(
         raise LogError(f"{map_file}: {what}")
     is_bare = map_file.suffix.lower() in IMAGE_ENDINGS and not map_file.with_suffix(".yaml").exists()
     if is_bare and resolution_m is None:
-        raise ParameterError(f"{map_file}: no .yaml lies beside it; pass --resolution METRES_PER_CELL")
+        raise ParameterError(
+            f"{map_file}: no .yaml lies beside it; give the side of a cell in meters (resolution_m=0.05)"
+        )
     if not is_bare and resolution_m is not None:
-        raise ParameterError(f"{map_file}: its .yaml says the resolution; leave --resolution out")
+        raise ParameterError(
+            f"{map_file}: its .yaml gives the resolution; leave out resolution_m={resolution_m:g}"
+        )
     with _described(map_file, resolution_m) as log, open_log(log, limits=limits) as reader:
         if not isinstance(reader.source, MapFilesSource):
             raise LogError(

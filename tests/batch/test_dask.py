@@ -121,7 +121,7 @@ def test_no_scheduler_is_one_line(monkeypatch):
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         address = f"127.0.0.1:{probe.getsockname()[1]}"
-    with pytest.raises(ParameterError, match=f"--scheduler {address}: no Dask scheduler answers; `dask sch"):
+    with pytest.raises(ParameterError, match=f"{address}: no Dask scheduler answers; `dask sch"):
         DaskWorkers(address)
 
 

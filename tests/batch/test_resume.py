@@ -102,7 +102,7 @@ def test_a_log_that_has_changed_needs_leave_to_be_replaced(batches):
     """Its results stand until then, and so do its rows in the data set."""
     batches.change("two/run")
     assert batches.run() == {"one_run": "up to date", "two_run": "failed"}
-    assert "has changed since its results; --overwrite" in summary(batches.out)["two_run"]["reason"]
+    assert "has changed since its results; overwrite=True" in summary(batches.out)["two_run"]["reason"]
     assert batches.snapshots("two_run") == 2
     assert batches.run(overwrite=True) == {"one_run": "up to date", "two_run": "done"}
     assert batches.snapshots("two_run") == 3
@@ -125,7 +125,7 @@ def test_other_settings_need_leave_too_and_nothing_is_begun_without(batches, cap
         recording=False,
         annotated_log=False,
     )
-    with pytest.raises(OutputError, match=r"match_min_iou 0\.2, now 0\.3.*--overwrite"):
+    with pytest.raises(OutputError, match=r"match_min_iou 0\.2, now 0\.3.*overwrite=True"):
         batches.run("one", settings=other)
     assert tree(batches.out) == before
     assert batches.run("one", settings=other, overwrite=True) == {"one_run": "done"}
@@ -196,7 +196,7 @@ def test_strict_makes_a_warning_about_a_log_its_failure(batches):
     described.write_text(described.read_text().replace("resolution: 0.05", "resolution: 0"))
     settings = dataclasses.replace(QUIET, strict=True)
     assert batches.run(settings=settings, rerun=True) == {"one_run": "done", "two_run": "failed"}
-    assert "an error because of --strict" in summary(batches.out)["two_run"]["reason"]
+    assert "an error because of strict=True" in summary(batches.out)["two_run"]["reason"]
 
 
 def test_a_log_that_moved_is_known_by_its_content(batches):

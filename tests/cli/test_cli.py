@@ -115,7 +115,7 @@ def test_time_options_are_seconds_into_the_log(cli, maps: Path, tmp_path: Path):
         (["analyze", "a/x.bag", "b/x.mcap", "-o", "out"], "several logs are named x"),
         (["batch", "nowhere*.mcap", "-o", "out"], "nowhere*.mcap: no log there"),
         (["batch", "x.bag", "-o", "s3://bucket/out"], "not to a URL"),
-        (["batch", "x.bag", "-o", "out", "--scheduler", "a:1", "--workers", "2"], "--workers is for this"),
+        (["batch", "x.bag", "-o", "out", "--scheduler", "a:1", "--workers", "2"], "is for this machine"),
         (["analyze", "x.bag", "-o", "out", "--layers", "walls"], "there is no layer 'walls'"),
         (["analyze", "x.bag", "-o", "out", "--bag", "--no-mcap"], "--bag is about the annotated MCAP"),
         (["view", "nowhere.rrd"], "nowhere.rrd"),

@@ -106,7 +106,7 @@ def test_where_it_is_asked_for_the_first_warning_is_an_error(table, fault, kind,
     log = make(table, (fault, kind), tmp_path)
     with (
         collect_warnings(strict=True),
-        pytest.raises(StrictError, match="--strict") as caught,
+        pytest.raises(StrictError, match="strict=True") as caught,
         open_log(log, limits=LIMITS) as reader,
     ):
         list(reader.snapshots())

@@ -456,7 +456,7 @@ def test_the_topic_is_the_one_asked_for_else_map_else_the_only_one(tmp_path):
     with open_log(write_bag(tmp_path / "one.bag", [("/grid", START_NS, third)])) as log:
         assert log.topic == "/grid"
     several = [("/a", START_NS, first), ("/b", START_NS, second)]
-    with pytest.raises(NoMapTopicError, match="choose one: /a, /b"):
+    with pytest.raises(NoMapTopicError, match="/a, /b; choose one"):
         open_log(write_rosbag2(tmp_path / "several", several))
     with pytest.raises(NoMapTopicError, match=r"/other is not .* its map topics are /costmap, /map"):
         open_log(path, topic="/other")

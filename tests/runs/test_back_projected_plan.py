@@ -59,5 +59,5 @@ def test_the_command_draws_it_under_a_name_of_its_own(results: RunResults, tmp_p
 
 def test_without_the_maps_it_says_what_to_do(tmp_path: Path):
     folder = run_of(SAMPLE_LOGS / "office.mcap", tmp_path / "office", 2, annotated_log=False)
-    with pytest.raises(LogError, match="without --no-mcap"):
+    with pytest.raises(LogError, match="without annotated_log=False"):
         write_figure(folder, back_projected=True)

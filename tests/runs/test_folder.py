@@ -89,7 +89,7 @@ def test_without_the_annotated_log_shapes_remain(office_results: Path, tmp_path:
         plan = results.plan(5, maps, with_walls=True)
     assert plan.map is None
     assert len(plan.rooms) > 10
-    with pytest.raises(OutputError, match="--no-mcap"):
+    with pytest.raises(OutputError, match="annotated_log=False"):
         export_plan(folder, ["map_server"], tmp_path / "out")
     assert export_plan(folder, ["dxf", "geojson", "svg", "graph"], tmp_path / "out")
 

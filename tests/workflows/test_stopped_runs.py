@@ -238,7 +238,7 @@ def test_a_run_that_was_interrupted_keeps_its_maps_and_says_so(log: Path, fresh,
     for resume, number in ((False, 2), (True, 4)):
         with pytest.raises(KeyboardInterrupt):
             analyze_log(log, out, RunOptions(**OPTIONS, resume=resume), stop(number, KeyboardInterrupt))
-        assert f"{number} maps are done; --resume goes on after them" in caplog.text
+        assert f"{number} maps are done; resume=True goes on after them" in caplog.text
         assert names(tmp_path) == [JOURNAL]
     analyze_log(log, out, RunOptions(**OPTIONS, resume=True, workers=2))
     assert contents(out) == fresh
@@ -255,7 +255,7 @@ def test_a_fresh_start_says_that_the_stopped_run_could_have_gone_on(log: Path, f
     with pytest.raises(KeyboardInterrupt):
         analyze_log(log, tmp_path / "out", RunOptions(**OPTIONS), stop(2, KeyboardInterrupt))
     analyze_log(log, tmp_path / "out", RunOptions(**OPTIONS))
-    assert "stopped here after 2 maps; --resume would have gone on" in caplog.text
+    assert "stopped here after 2 maps; resume=True would have gone on" in caplog.text
     assert contents(tmp_path / "out") == fresh
 
 

@@ -49,7 +49,7 @@ def write_labeled_map(plan: RoomPlan, folder: Path, stem: str) -> tuple[Path, ..
     if plan.map is None:
         raise OutputError(
             f"{folder / stem}: no map to label, because the annotated MCAP is not there; analyze without "
-            "--no-mcap, or export another format"
+            "annotated_log=False, or export another format"
         )
     values = room_values(plan)
     if len(plan.rooms) > ROOM_VALUES:

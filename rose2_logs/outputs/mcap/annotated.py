@@ -255,7 +255,7 @@ class AnnotatedMcap(Sink):
             if self._is_bag and channel.message_encoding != "cdr":
                 raise OutputError(
                     f"{self._info.log_path}: {channel.topic} holds {channel.message_encoding or 'unknown'} "
-                    "messages, which no bag of ROS 2 can hold; leave --bag out"
+                    "messages, which no bag of ROS 2 can hold; leave out bag=True"
                 )
             schema = (channel.schema_name, channel.schema_encoding, channel.schema_data)
             # The chunks that are copied name channels and schemas by their ids.

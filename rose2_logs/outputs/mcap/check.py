@@ -180,7 +180,8 @@ def checked_copy(
         if expected.as_json() != got.as_json() or indexed != got.messages:
             raise OutputError(
                 f"{name}: {channel.topic} has {got.messages} messages (hash {got.hash}) after writing, "
-                f"{expected.messages} (hash {expected.hash}) went in; try another disk, or --no-mcap"
+                f"{expected.messages} (hash {expected.hash}) went in; "
+                "try another disk, or annotated_log=False"
             )
         if number in added:
             channels.append({"topic": channel.topic, "added": got.as_json()})

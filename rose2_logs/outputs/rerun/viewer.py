@@ -51,7 +51,7 @@ def open_viewer(port: int) -> str:
                 return address
         time.sleep(0.1)
     _end(viewer)
-    raise OutputError("no Rerun viewer is open and none can be started here; leave --live out")
+    raise OutputError("no Rerun viewer is open and none can be started here; leave out live=True")
 
 
 def listens(port: int) -> bool:
@@ -96,7 +96,7 @@ def show(recording: str) -> int:
         If there is no screen.
     """
     if not has_screen():
-        raise OutputError("there is no screen here; rose2-logs view --web shows recordings in a browser")
+        raise OutputError("there is no screen here for a window; show it in a browser (web=True)")
     return subprocess.run([*RERUN, recording], check=False).returncode
 
 
@@ -122,7 +122,7 @@ def served_page(recording: str, port: int | None = None) -> Iterator[tuple[str, 
         If it cannot be served.
     """
     if port is not None and listens(port):
-        raise OutputError(f"port {port} is in use; choose another --port")
+        raise OutputError(f"port {port} is in use; choose another port")
     page, data = port or _free_port(PAGE_PORT), _free_port(VIEWER_PORT)
     options = ["--serve-web", "--web-viewer-port", str(page), "--port", str(data)]
     # The server forgets the beginning of what is larger than its memory.

@@ -161,7 +161,7 @@ def test_names_are_text_and_never_markup(tmp_path: Path):
 def test_an_earlier_page_stays_unless_it_may_be_replaced(office_results: Path, tmp_path: Path):
     page = tmp_path / "page.html"
     page.write_text("mine")
-    with pytest.raises(OutputError, match="--overwrite"):
+    with pytest.raises(OutputError, match="overwrite=True"):
         write_report(office_results, page)
     assert page.read_text() == "mine"
     write_report(office_results, page, overwrite=True)
