@@ -32,7 +32,7 @@ from rose2_logs.model.analysis import SnapshotAnalysis
 from rose2_logs.model.explored import ExploredPart
 from rose2_logs.model.labels import known_window
 from rose2_logs.model.occupancy import UNKNOWN, BoolArray, FloatArray, OccupancySnapshot
-from rose2_logs.runs.folder import RunResults
+from rose2_logs.runs.run import Run
 from rose2_logs.segmentation.floor_plan.stage import make_floor_plan
 from rose2_logs.segmentation.pipeline import analyze
 from rose2_logs.segmentation.rose.spectrum import Spectrum, compute_spectrum
@@ -244,9 +244,8 @@ def growth_picture(log: Path) -> tuple[str, Image]:
     """Draw the rooms at some coverages of a run, side by side, as `figure` and the report do."""
     with tempfile.TemporaryDirectory() as name:
         folder = analyze_log(log, Path(name) / "run", RunOptions(recording=False)).folder
-        results = RunResults(folder)
-        with results.open_maps() as maps:
-            plans = [results.plan(results.choose(coverage=each), maps) for each in TUTORIAL_COVERAGES]
+        run = Run(folder)
+        plans = [run.plan(run.choose(coverage=each)) for each in TUTORIAL_COVERAGES]
     corners = np.array([plan.bounds_m for plan in plans])
     low, high = corners[:, :2].min(axis=0).tolist(), corners[:, 2:].max(axis=0).tolist()
     drawings = [draw_plan(plan, PANEL, (*low, *high)) for plan in plans]

@@ -140,7 +140,8 @@ def main() -> None:
     result, samples = watch(log, chosen.out / "results", chosen.snapshots, options)
     (chosen.out / "samples.json").write_text(json.dumps([asdict(sample) for sample in samples]))
     print(table(samples))
-    print(f"{result.totals.snapshots} maps, {result.totals.unchanged} unchanged, {result.seconds:.0f} s")
+    totals = result.summary.totals
+    print(f"{totals.snapshots} maps, {totals.unchanged} unchanged, {result.seconds:.0f} s")
 
 
 if __name__ == "__main__":

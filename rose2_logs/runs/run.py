@@ -73,7 +73,8 @@ class Run(StoredRun, Sequence["RunSnapshot"]):
         last = tracks["track"].to_numpy()[tracks["in_last_map"].to_numpy(zero_copy_only=False)]
         column = pa.array(np.isin(rows["track"].to_numpy(), last))
         meaning = {"description": "whether the run's last map shows the room's track"}
-        return Table("rooms", rows.append_column(pa.field("in_last_map", pa.bool_(), False, meaning), column))
+        field = pa.field("in_last_map", pa.bool_(), nullable=False, metadata=meaning)
+        return Table("rooms", rows.append_column(field, column))
 
     @property
     def tracks(self) -> Table:
@@ -234,7 +235,7 @@ class RunSnapshot:
 
     @cached_property
     def labels(self) -> NDArray[np.int32]:
-        """Label image (H, W) on the map's grid: track of each cell's room, 0 for none; row 0 at the origin."""
+        """Label image (H, W) on the map's grid: track of each cell's room, 0 for none. Row 0: origin."""
         stored, window = self.run.map(self.number)
         whole = np.zeros(self.geometry.shape, np.int32)
         whole[window] = stored.labels
@@ -318,8 +319,8 @@ class RunSnapshot:
         return plot_plan(self.plan(back_projected=back_projected), ax)
 
     def __repr__(self) -> str:
-        rooms = int(self._row["rooms"])
-        return f"<RunSnapshot {self.number} of {self.run.name}: coverage {percent(self.coverage)}, {rooms} rooms>"
+        about = f"coverage {percent(self.coverage)}, {self._row['rooms']} rooms"
+        return f"<RunSnapshot {self.number} of {self.run.name}: {about}>"
 
     def _repr_svg_(self) -> str:
         return self.figure()._repr_svg_()

@@ -260,7 +260,7 @@ class StoredRun:
 
     @property
     def occupancy(self) -> OccupancyParameters:
-        """The run's parameters, for stored maps: these hold classes, which the usual thresholds tell apart."""
+        """The run's parameters for stored maps, whose classes the default thresholds tell apart."""
         usual = OccupancyParameters()
         return replace(
             self.parameters.occupancy,

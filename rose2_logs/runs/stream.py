@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import traceback
 from collections.abc import Iterable, Iterator
 from functools import partial
@@ -11,10 +12,11 @@ from pathlib import Path
 from rose2_logs.config.parameters import Parameters
 from rose2_logs.config.run_options import RunOptions
 from rose2_logs.errors import InvalidMapError
+from rose2_logs.io.log import LogReader
 from rose2_logs.io.poses import RobotPath
 from rose2_logs.model.analysis import SnapshotAnalysis
 from rose2_logs.model.explored import coarser_for_its_size
-from rose2_logs.model.occupancy import OccupancySnapshot, is_same_to_analysis
+from rose2_logs.model.occupancy import OccupancySnapshot, free_area_m2, is_same_to_analysis
 from rose2_logs.model.room_quality import RoomQuality, room_quality
 from rose2_logs.runs.journal import Found, JournaledWorkers
 from rose2_logs.segmentation.pipeline import analyze
@@ -49,8 +51,9 @@ class TrackedStream:
     ----------
     snapshots : iterable of OccupancySnapshot
         The maps.
-    final_free_m2 : float
-        Known free area of the last map of the run in square meters, which coverage refers to.
+    final_free_m2 : float or None
+        Known free area of the last map of the run in square meters, which coverage refers to; coverage is NaN
+        where it is not known.
     workers : Workers
         What analyzes the maps, started.
     parameters : Parameters
@@ -64,6 +67,8 @@ class TrackedStream:
 
     Attributes
     ----------
+    last_log_time_ns : int or None
+        When the last map of the run was recorded, where that is known.
     invalid : int
         Maps so far that could not be analyzed and were left out.
     unchanged : int
@@ -73,7 +78,7 @@ class TrackedStream:
     def __init__(
         self,
         snapshots: Iterable[OccupancySnapshot],
-        final_free_m2: float,
+        final_free_m2: float | None,
         workers: SnapshotWorkers | JournaledWorkers,
         parameters: Parameters,
         *,
@@ -83,6 +88,7 @@ class TrackedStream:
     ) -> None:
         self.invalid = 0
         self.unchanged = 0
+        self.last_log_time_ns: int | None = None
         self._snapshots = snapshots
         self._final_free_m2 = final_free_m2
         self._workers = workers
@@ -92,6 +98,44 @@ class TrackedStream:
         self._tracker = RoomTracker(parameters.tracking, parameters.occupancy)
         self._layout = LayoutFollower()
         self._has_told_coarser = False
+
+    @classmethod
+    def of_log(
+        cls,
+        reader: LogReader,
+        workers: SnapshotWorkers | JournaledWorkers,
+        parameters: Parameters,
+        *,
+        with_path: bool = False,
+    ) -> TrackedStream:
+        """Follow the rooms through an open log.
+
+        Parameters
+        ----------
+        reader : LogReader
+            The log.
+        workers, parameters
+            As for the class.
+        with_path : bool
+            Whether to tell where the robot was.
+
+        Raises
+        ------
+        LogError
+            If the log holds no map that can be read.
+        """
+        last = reader.last()
+        stream = cls(
+            reader.snapshots(),
+            free_area_m2(last, parameters.occupancy),
+            workers,
+            parameters,
+            source=str(reader.info.path),
+            topic=reader.topic,
+            path=reader.robot_path(last.geometry.frame_id) if with_path else None,
+        )
+        stream.last_log_time_ns = last.log_time_ns
+        return stream
 
     def __iter__(self) -> Iterator[TrackedSnapshot]:
         is_same = partial(is_same_to_analysis, parameters=self._occupancy)
@@ -118,10 +162,15 @@ class TrackedStream:
             self.unchanged += 1
         track_ids, events = self._tracker.update(snapshot, analysis)
         change = self._layout.update(analysis.rooms, track_ids, map_motion(events))
-        final_m2 = self._final_free_m2
-        coverage = min(analysis.free_area_m2 / final_m2, 1.0) if final_m2 > 0 else 0.0
+        coverage = self._coverage(analysis.free_area_m2)
         poses = None if self._path is None else self._path.until(snapshot.log_time_ns)
         return TrackedSnapshot(snapshot, analysis, coverage, track_ids, events, quality, change, poses)
+
+    def _coverage(self, free_m2: float) -> float:
+        final_m2 = self._final_free_m2
+        if final_m2 is None:
+            return math.nan
+        return min(free_m2 / final_m2, 1.0) if final_m2 > 0 else 0.0
 
 
 def _analyze_or_refuse(

@@ -166,10 +166,10 @@ def ordered_map(
         yield from processes.map(items)
 
 
-_OwnProcess: Any = multiprocessing.get_context(START_METHOD).Process
+_CONTEXT: Any = multiprocessing.get_context(START_METHOD)
 
 
-class WorkerProcess(_OwnProcess):  # type: ignore[misc]
+class WorkerProcess(_CONTEXT.Process):  # type: ignore[misc]
     """A process that starts without the user's script, which nothing that it calls needs.
 
     Python's own way imports it once more in each process, so that a script without a ``__main__`` guard would
@@ -181,14 +181,14 @@ class WorkerProcess(_OwnProcess):  # type: ignore[misc]
         script = sys.modules["__main__"]
         sys.modules["__main__"] = ModuleType("__main__")
         try:
-            return _OwnProcess._Popen(process)
+            return _CONTEXT.Process._Popen(process)
         finally:
             sys.modules["__main__"] = script
 
 
 def _context(function: Callable[..., Any]) -> BaseContext:
     """Choose how processes start: never by a copy of this one, whose threads (Rerun, Arrow) might lock up."""
-    context: Any = copy.copy(multiprocessing.get_context(START_METHOD))
+    context = copy.copy(_CONTEXT)
     if START_METHOD == "forkserver":
         context.set_forkserver_preload([getattr(function, "func", function).__module__])
     context.Process = WorkerProcess

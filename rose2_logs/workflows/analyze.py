@@ -18,7 +18,6 @@ from rose2_logs.io import inspect_log, open_log
 from rose2_logs.io.discovery import stem_of
 from rose2_logs.io.log import LogReader
 from rose2_logs.io.log_file import LATEST_NS
-from rose2_logs.model.occupancy import OccupancySnapshot, free_area_m2
 from rose2_logs.outputs.mcap.viewer_layouts import bag_metadata_path, foxglove_path, rviz_path
 from rose2_logs.runs.history import RunHistory, RunSummary
 from rose2_logs.runs.journal import JournaledWorkers
@@ -200,17 +199,8 @@ def _follow(
 ) -> RunSummary:
     """Take the log's maps one by one to the history, the store and the sinks, and finish these."""
     parameters = options.parameters
-    last = reader.last()
     history = RunHistory(parameters, back_project=options.back_project)
-    stream = TrackedStream(
-        reader.snapshots(),
-        free_area_m2(last, parameters.occupancy),
-        workers,
-        parameters,
-        source=str(info.log_path),
-        topic=info.topic,
-        path=reader.robot_path(last.geometry.frame_id) if "path" in options.shown_layers else None,
-    )
+    stream = TrackedStream.of_log(reader, workers, parameters, with_path="path" in options.shown_layers)
     store = RunStore(folder, parameters.occupancy, back_project=options.back_project)
     with store, abandoned_on_error(sinks):
         for sink in sinks:
@@ -220,7 +210,7 @@ def _follow(
             store.write(step, history)
             for sink in sinks:
                 sink.write(step)
-            _tell_progress(step, history, last, on_snapshot)
+            _tell_progress(step, history, stream, on_snapshot)
         if not history.totals.snapshots:
             raise InvalidMapError(f"{info.log_path}: none of its {stream.invalid} maps can be analyzed")
         history.totals.invalid, history.totals.unchanged = stream.invalid, stream.unchanged
@@ -246,14 +236,13 @@ def _project_back(reader: LogReader, history: RunHistory, store: RunStore, sinks
 
 
 def _tell_progress(
-    step: TrackedSnapshot, history: RunHistory, last: OccupancySnapshot, on_snapshot: OnSnapshot | None
+    step: TrackedSnapshot, history: RunHistory, stream: TrackedStream, on_snapshot: OnSnapshot | None
 ) -> None:
     rooms = len(step.track_ids)
     logger.info("snapshot %d: coverage %.1f %%, %d rooms", step.snapshot.index, 100 * step.coverage, rooms)
     if on_snapshot is not None:
-        first_ns = history.totals.first_log_time_ns or 0
-        done = step.snapshot.log_time_ns - first_ns
-        on_snapshot(step, done / max(last.log_time_ns - first_ns, 1))
+        first_ns, last_ns = history.totals.first_log_time_ns or 0, stream.last_log_time_ns or 0
+        on_snapshot(step, (step.snapshot.log_time_ns - first_ns) / max(last_ns - first_ns, 1))
 
 
 def _run_info(path: Path, folder: Path, reader: LogReader, options: RunOptions) -> RunInfo:

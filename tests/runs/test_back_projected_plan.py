@@ -10,10 +10,10 @@ import numpy as np
 import pandas as pd
 import pytest
 from finished_runs import SAMPLE_LOGS, run_of
+from rose2_logs.runs.folder import RunResults
 
 from rose2_logs.errors import LogError
 from rose2_logs.runs.back_projected_plan import back_projected_plan
-from rose2_logs.runs.folder import RunResults
 from rose2_logs.workflows.figure import write_figure
 
 

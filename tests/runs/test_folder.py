@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 import shapely
 from finished_runs import SAMPLE_LOGS, run_of
+from rose2_logs.runs.folder import RunResults, find_results
+from rose2_logs.runs.maps import labels_of_segmented
 from saved_maps import save_run
 
 from rose2_logs.errors import LogError, OutputError, ParameterError
 from rose2_logs.model.occupancy import GridGeometry
 from rose2_logs.model.room_plan import PlanRoom
-from rose2_logs.runs.folder import RunResults, find_results
-from rose2_logs.runs.maps import labels_of_segmented
 from rose2_logs.workflows.figure import export_plan
 
 

@@ -19,9 +19,11 @@ from sparse_log import write_sparse_log
 from benchmarking.gauges import bytes_read, timed
 from rose2_logs.config.parameters import Parameters
 from rose2_logs.io import open_log
+from rose2_logs.runs.history import RunSummary, RunTotals
 from rose2_logs.runs.sink import RunInfo, Sink
-from rose2_logs.runs.stream import start_workers, tracked_snapshots
-from rose2_logs.runs.summary import RunTotals
+from rose2_logs.runs.stream import TrackedStream, start_workers
+from rose2_logs.tracking.convergence import Convergence
+from rose2_logs.tracking.track_history import TrackHistories
 from rose2_logs.workflows.analyze import RunOptions
 from rose2_logs.workflows.info import describe_log
 
@@ -103,7 +105,8 @@ def sink_costs(log: Path, parameters: Parameters, folder: Path) -> SinkCosts:
     """
     from rose2_logs.outputs.mcap.annotated import AnnotatedMcap
     from rose2_logs.outputs.rerun.recording import RerunRecording
-    from rose2_logs.runs.tables import Tables
+    from rose2_logs.runs.history import RunHistory
+    from rose2_logs.runs.store import RunStore
 
     options = RunOptions(parameters=parameters)
     info = RunInfo(log, "/map", options.method, parameters, {}, {})
@@ -113,32 +116,33 @@ def sink_costs(log: Path, parameters: Parameters, folder: Path) -> SinkCosts:
     with ExitStack() as stack:
         reader = stack.enter_context(open_log(log))
         workers = stack.enter_context(start_workers(options))
-        tables = Tables(folder)
+        history = RunHistory(parameters)
+        store = stack.enter_context(RunStore(folder, parameters.occupancy))
         sinks: dict[str, Sink] = {
-            "tables": tables,
-            "recording": RerunRecording(files["recording"], info, tables=tables),
-            "annotated log": AnnotatedMcap(files["annotated log"], info),
+            "recording": RerunRecording(files["recording"]),
+            "annotated log": AnnotatedMcap(files["annotated log"]),
         }
         for name, sink in sinks.items():
-            spent[name] += timed(sink.__enter__)[1].cpu_s
-        last, totals = reader.last(), RunTotals()
-        path = reader.robot_path(last.geometry.frame_id)
-        frames = tracked_snapshots(reader, last, workers, parameters, totals, path)
+            spent[name] += timed(partial(sink.begin, info))[1].cpu_s
+        steps = iter(TrackedStream.of_log(reader, workers, parameters, with_path=True))
         while True:
-            step, took = timed(partial(next, frames, None))
+            step, took = timed(partial(next, steps, None))
             if step is None:
                 break
             # Stages tell wall-clock times.
             share = took.cpu_s / took.wall_s
             within = sum(step.analysis.seconds.values()) * share
             analysis_s, others_s = analysis_s + within, others_s + took.cpu_s - within
-            totals.add(step)
+            history.add(step)
+            spent["tables"] += timed(partial(store.write, step, history))[1].cpu_s
             for name, sink in sinks.items():
                 spent[name] += timed(partial(sink.write, step))[1].cpu_s
+        summary, took = timed(partial(store.finish, history))
+        spent["tables"] += took.cpu_s
         for name, sink in sinks.items():
-            spent[name] += timed(partial(sink.__exit__, None, None, None))[1].cpu_s
+            spent[name] += timed(partial(sink.finish, summary))[1].cpu_s
     sizes = {name: file.stat().st_size for name, file in files.items()}
-    return SinkCosts(log.name, totals.snapshots, analysis_s, others_s, spent, sizes)
+    return SinkCosts(log.name, history.totals.snapshots, analysis_s, others_s, spent, sizes)
 
 
 def copy_times(sample: Path, size_bytes: int, folder: Path) -> CopyTimes:
@@ -151,12 +155,15 @@ def copy_times(sample: Path, size_bytes: int, folder: Path) -> CopyTimes:
     options = RunOptions()
     info = RunInfo(log, "/map", options.method, options.parameters, {}, {})
     with open_log(log) as reader, start_workers(options) as workers:
-        frames = list(tracked_snapshots(reader, reader.last(), workers, options.parameters, RunTotals()))
+        steps = list(TrackedStream.of_log(reader, workers, options.parameters))
+    summary = RunSummary(RunTotals(), TrackHistories(), Convergence())
 
     def copy() -> None:
-        with AnnotatedMcap(folder / "copy.mcap", info) as sink:
-            for step in frames:
-                sink.write(step)
+        sink = AnnotatedMcap(folder / "copy.mcap")
+        sink.begin(info)
+        for step in steps:
+            sink.write(step)
+        sink.finish(summary)
 
     _, took = timed(copy)
     return CopyTimes(log.stat().st_size, took.cpu_s, took.wall_s)

@@ -1,0 +1,348 @@
+"""What people call from scripts and notebooks; ``import rose2_logs`` offers all of it."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rose2_logs.comparison.layouts import LayoutComparison
+from rose2_logs.config.parameters import Parameters
+from rose2_logs.config.run_options import RunOptions
+from rose2_logs.config.selection import Selection
+from rose2_logs.errors import ParameterError
+from rose2_logs.io import open_log as open_log_reader
+from rose2_logs.io.log import LogReader
+from rose2_logs.model.analysis import SnapshotAnalysis
+from rose2_logs.model.occupancy import GridGeometry, OccupancySnapshot, free_area_m2
+from rose2_logs.runs.run import Run
+from rose2_logs.runs.sink import Sink
+from rose2_logs.runs.stream import TrackedStream, start_workers
+from rose2_logs.segmentation.pipeline import analyze as analyze_snapshot
+from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot
+from rose2_logs.workflows.analyze import OnSnapshot, analyze_log, log_stem
+from rose2_logs.workflows.compare import compare_runs, compare_stored
+from rose2_logs.workflows.segment import read_static_map
+
+__all__ = ["analyze", "compare", "evaluate", "load", "open_log", "read_map", "segment", "track"]
+
+GivenParameters = Parameters | Mapping[str, Any] | None
+"""Parameters, or a mapping of dotted names (``{"walls.extension_m": 6}``); None for the defaults."""
+
+
+def analyze(
+    log: str | Path,
+    out: str | Path | None = None,
+    *,
+    parameters: GivenParameters = None,
+    sinks: Sequence[Sink] = (),
+    on_snapshot: OnSnapshot | None = None,
+    **options: Any,
+) -> Run:
+    """Find and follow the rooms in all maps of a log.
+
+    Parameters
+    ----------
+    log : str or path
+        An MCAP file, a ROS 1 bag, a ROS 2 bag, saved maps.
+    out : str or path, optional
+        Folder for the results; it is made. Without it nothing stays on the disk: what the run stores goes
+        with the `Run`, and no recording and no annotated MCAP are made unless asked for.
+    parameters : Parameters or mapping, optional
+        Those of all stages; of a mapping as ``{"walls.extension_m": 6}`` the others keep their defaults.
+    sinks : sequence of Sink
+        Outputs of your own, which receive each step as it comes.
+    on_snapshot : callable, optional
+        Called with each finished `TrackedSnapshot` and the share of the log's time that is done.
+    **options
+        Fields of `RunOptions`: ``topic``, ``method``, ``workers``, ``start_s``, ``max_snapshots``,
+        ``overwrite`` and so on.
+
+    Returns
+    -------
+    Run
+        The stored run.
+
+    Raises
+    ------
+    LogError, InvalidMapError
+        If the log cannot be read or holds no map that can be analyzed.
+    ParameterError
+        If an option or a parameter has a value that cannot be used.
+    OutputError
+        If there are results already and they may not be replaced, or one cannot be written.
+
+    Examples
+    --------
+    >>> import rose2_logs as rl
+    >>> run = rl.analyze("sample_logs/office.mcap", max_snapshots=3)
+    >>> run.snapshots.arrow["rooms"].to_pylist()
+    [2, 12, 19]
+    """
+    log = Path(log)
+    if out is None:
+        options = {"recording": False, "annotated_log": False, "journal": False} | options
+    chosen = _options(parameters, options)
+    if out is not None:
+        analyze_log(log, Path(out), chosen, on_snapshot, sinks)
+        return Run(out)
+    temporary = TemporaryDirectory(prefix="rose2_logs_", ignore_cleanup_errors=True)
+    folder = Path(temporary.name) / log_stem(log)
+    analyze_log(log, folder, chosen, on_snapshot, sinks)
+    return Run(folder, temporary)
+
+
+def track(
+    log: str | Path | LogReader | Iterable[OccupancySnapshot],
+    *,
+    parameters: GivenParameters = None,
+    method: str = "rose2",
+    workers: int = 1,
+    topic: str | None = None,
+) -> Iterator[TrackedSnapshot]:
+    """Yield the maps of a log one after the other, each with its rooms and their identity over the run.
+
+    Parameters
+    ----------
+    log : str, path, LogReader or iterable of OccupancySnapshot
+        The log, or what `open_log` gives, or maps of your own. Of an iterator, whose last map is not known
+        beforehand, the coverage is NaN; a list has one.
+    parameters : Parameters or mapping, optional
+        As for `analyze`.
+    method : str
+        The segmentation method.
+    workers : int
+        Processes; what is yielded does not depend on it.
+    topic : str, optional
+        The map topic of a log that is given by its path; by default ``/map``, else the only one.
+
+    Yields
+    ------
+    TrackedSnapshot
+        Rooms, tracks, events, coverage. Maps that cannot be analyzed are left out with a warning.
+
+    Raises
+    ------
+    LogError, InvalidMapError, ParameterError
+        As `analyze`.
+
+    Examples
+    --------
+    >>> import rose2_logs as rl
+    >>> for step in rl.track(rl.open_log("sample_logs/office.mcap", max_snapshots=3)):
+    ...     print(f"{step.coverage:.2f}", len(step.rooms), step.track_ids[:3])
+    0.26 2 (1, 2)
+    0.79 12 (1, 2, 3)
+    1.00 19 (1, 2, 3)
+    """
+    options = _options(parameters, {"method": method, "workers": workers})
+    if isinstance(log, str | Path):
+        with open_log(log, topic=topic, parameters=options.parameters) as reader:
+            yield from _tracked(reader, options)
+    else:
+        yield from _tracked(log, options)
+
+
+def _tracked(maps: LogReader | Iterable[OccupancySnapshot], options: RunOptions) -> Iterator[TrackedSnapshot]:
+    parameters = options.parameters
+    with start_workers(options) as workers:
+        if isinstance(maps, LogReader):
+            yield from TrackedStream.of_log(maps, workers, parameters)
+            return
+        last = maps[-1] if isinstance(maps, Sequence) and len(maps) else None
+        final_m2 = None if last is None else free_area_m2(last, parameters.occupancy)
+        yield from TrackedStream(maps, final_m2, workers, parameters)
+
+
+def segment(
+    map_: ArrayLike | str | Path | OccupancySnapshot,
+    *,
+    resolution_m: float | None = None,
+    method: str = "rose2",
+    parameters: GivenParameters = None,
+    voronoi: bool = False,
+) -> SnapshotAnalysis:
+    """Segment one map into rooms.
+
+    Parameters
+    ----------
+    map_ : (H, W) array of int, str, path or OccupancySnapshot
+        Occupancy in percent, -1 for unknown, row 0 at the origin as in ROS messages; or the file of a saved
+        map.
+    resolution_m : float, optional
+        Side of a cell in meters: of an array, or of an image without a ``.yaml`` beside it.
+    method : str
+        ``rose2``, or one of the classical methods ``morphological``, ``distance``, ``voronoi``.
+    parameters : Parameters or mapping, optional
+        As for `analyze`.
+    voronoi : bool
+        Whether to return the Voronoi graph as well.
+
+    Returns
+    -------
+    SnapshotAnalysis
+        Rooms, label image, walls, faces, clean map.
+
+    Raises
+    ------
+    InvalidMapError
+        If the array is no occupancy grid, or the map cannot be read.
+    ParameterError
+        If the resolution is missing, or a parameter or the method cannot be used.
+
+    Examples
+    --------
+    >>> import numpy as np, rose2_logs as rl
+    >>> grid = np.full((120, 200), -1, np.int8)
+    >>> grid[10:110, 10:190] = 0
+    >>> grid[10:110, [10, 11, 99, 100, 188, 189]] = 100
+    >>> grid[[10, 11, 108, 109], 10:190] = 100
+    >>> grid[50:70, 99:101] = 0
+    >>> rl.segment(grid, resolution_m=0.05).rooms
+    <RoomMap: 2 rooms, 120 x 200 cells of 0.05 m>
+    """
+    if isinstance(map_, OccupancySnapshot):
+        snapshot = map_
+    elif isinstance(map_, str | Path):
+        snapshot = read_map(map_, resolution_m)
+    else:
+        if resolution_m is None:
+            raise ParameterError(
+                "an array does not tell how large its cells are; give resolution_m in meters"
+            )
+        cells = np.asarray(map_)
+        geometry = GridGeometry(resolution_m, (0.0, 0.0), 0.0, "map", cells.shape)
+        snapshot = OccupancySnapshot(0, 0, 0, "array", cells, geometry)
+    return analyze_snapshot(snapshot, Parameters.from_any(parameters), method, voronoi=voronoi)
+
+
+def open_log(
+    log: str | Path | Sequence[str | Path],
+    *,
+    topic: str | None = None,
+    parameters: GivenParameters = None,
+    **selection: Any,
+) -> LogReader:
+    """Open a log to read its maps.
+
+    Parameters
+    ----------
+    log : str, path, or a sequence of them
+        An MCAP file, a ROS 1 bag, a ROS 2 bag, saved maps; or several files of one kind that are one log.
+    topic : str, optional
+        The map topic; by default ``/map``, else the only one.
+    parameters : Parameters or mapping, optional
+        Those of ``reading`` say how much a log may claim.
+    **selection
+        Fields of `Selection`: ``every_s``, ``min_change_m2``, ``max_snapshots`` and so on.
+
+    Returns
+    -------
+    LogReader
+        ``reader.snapshots()`` yields the maps; a context manager that closes the log.
+
+    Raises
+    ------
+    LogError, NoMapTopicError, ParameterError
+        If the log cannot be opened, has no map topic, or an argument cannot be used.
+
+    Examples
+    --------
+    >>> import rose2_logs as rl
+    >>> with rl.open_log("sample_logs/wing.bag") as reader:
+    ...     print(reader.topic, reader.first())
+    /map <OccupancySnapshot 0 of /map: ...>
+    """
+    limits = Parameters.from_any(parameters).reading
+    return open_log_reader(log, topic=topic, selection=Selection(**selection), limits=limits)
+
+
+def read_map(map_file: str | Path, resolution_m: float | None = None) -> OccupancySnapshot:
+    """Read a saved map.
+
+    Parameters
+    ----------
+    map_file : str or path
+        A map_server ``.yaml``, or an image in the gray values of ROS maps.
+    resolution_m : float, optional
+        Side of a cell in meters, for an image without a ``.yaml`` beside it.
+
+    Raises
+    ------
+    LogError, InvalidMapError, ParameterError
+        If it cannot be read, is a log, or its resolution is not known.
+    """
+    return read_static_map(Path(map_file), resolution_m)
+
+
+def load(folder: str | Path) -> Run:
+    """Open the results of a run.
+
+    Parameters
+    ----------
+    folder : str or path
+        What `analyze`, or ``rose2-logs analyze``, has written for one log.
+
+    Raises
+    ------
+    ResultsError
+        If the folder holds no results, or those of another version.
+    """
+    return Run(folder)
+
+
+def compare(
+    a: Run | str | Path, b: Run | str | Path, out: str | Path | None = None, *, overwrite: bool = False
+) -> LayoutComparison:
+    """Lay the last layout of run B over that of run A, wherever they started, and tell what differs.
+
+    Parameters
+    ----------
+    a, b : Run, str or path
+        The runs, or the folders of their results.
+    out : str or path, optional
+        Folder for tables, a picture and a recording of the comparison.
+    overwrite : bool
+        Whether an earlier comparison may be replaced.
+
+    Returns
+    -------
+    LayoutComparison
+        How B lies in A's frame, and which rooms and walls are the same, new, missing, moved or not explored.
+
+    Raises
+    ------
+    ResultsError
+        If results cannot be read, or a last map has too few walls to tell how it lies.
+    OutputError
+        If there is a comparison already and it may not be replaced, or a file cannot be written.
+
+    Examples
+    --------
+    >>> import rose2_logs as rl
+    >>> run = rl.analyze("sample_logs/office.mcap", max_snapshots=3)
+    >>> rl.compare(run, run).room_counts
+    {'same': 19}
+    """
+    run_a, run_b = (each if isinstance(each, Run) else Run(each) for each in (a, b))
+    if out is None:
+        return compare_stored(run_a, run_b)
+    return compare_runs(run_a.folder, run_b.folder, Path(out), overwrite=overwrite).comparison
+
+
+def _options(parameters: GivenParameters, options: Mapping[str, Any]) -> RunOptions:
+    """Make the options of a run, of keywords that people give."""
+    known = {each.name for each in dataclasses.fields(RunOptions)} - {"parameters", "selection"}
+    of_selection = {each.name for each in dataclasses.fields(Selection)}
+    if unknown := sorted(options.keys() - known - of_selection):
+        raise ParameterError(
+            f"no option {unknown[0]!r}; there are: {', '.join(sorted(known | of_selection))}"
+        )
+    selection = Selection(**{name: value for name, value in options.items() if name in of_selection})
+    others = {name: value for name, value in options.items() if name in known}
+    return RunOptions(parameters=Parameters.from_any(parameters), selection=selection, **others)
