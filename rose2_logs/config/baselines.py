@@ -3,30 +3,37 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
-from rose2_logs.config.fields import number
+from rose2_logs.config.fields import ParameterBlock, number
 
 
-@dataclass(frozen=True)
-class MorphologicalParameters:
+@dataclass(frozen=True, repr=False)
+class MorphologicalParameters(ParameterBlock):
     """Baseline: morphological segmentation (survey of Bormann et al., ICRA 2016)."""
+
+    block: ClassVar[str] = "morphological"
 
     room_min_area_m2: float = number(0.8, "m2", "A part that erosion leaves is a room above; the survey's.")
     room_max_area_m2: float = number(47.0, "m2", "And below this area; the survey's value.")
     max_rounds: int = number(73, "rounds", "Rounds of erosion, one cell each; the survey's value.", 0, 10**5)
 
 
-@dataclass(frozen=True)
-class DistanceParameters:
+@dataclass(frozen=True, repr=False)
+class DistanceParameters(ParameterBlock):
     """Baseline: distance transform segmentation (survey of Bormann et al., ICRA 2016)."""
+
+    block: ClassVar[str] = "distance"
 
     room_min_area_m2: float = number(0.35, "m2", "Least area of a room's seed; the survey's value.")
     room_max_area_m2: float = number(163.0, "m2", "Greatest area of a room's seed; the survey's value.")
 
 
-@dataclass(frozen=True)
-class VoronoiBaselineParameters:
+@dataclass(frozen=True, repr=False)
+class VoronoiBaselineParameters(ParameterBlock):
     """Baseline: Voronoi segmentation (survey of Bormann et al., ICRA 2016)."""
+
+    block: ClassVar[str] = "voronoi"
 
     room_min_area_m2: float = number(0.1, "m2", "Least area of a piece between cuts; the survey's value.")
     room_max_area_m2: float = number(1e6, "m2", "Greatest area of a piece; the survey's value: any.")
@@ -43,12 +50,14 @@ class VoronoiBaselineParameters:
     )
 
 
-@dataclass(frozen=True)
-class VoronoiMergeParameters:
+@dataclass(frozen=True, repr=False)
+class VoronoiMergeParameters(ParameterBlock):
     """Baseline: which pieces the Voronoi segmentation joins; the values are those of the survey's program.
 
     Borders and walls are shares of a perimeter.
     """
+
+    block: ClassVar[str] = "voronoi_merge"
 
     dead_end_max_area_m2: float = number(12.5, "m2", "Area of a room with one neighbor; the survey's value.")
     dead_end_max_wall: float = number(0.75, "share", "Wall of a room with one neighbor.", 0, 1)

@@ -1,17 +1,110 @@
-"""How a parameter is declared: a field with its default, unit, bounds and the reason for its value."""
+"""How parameters are declared: blocks of fields that check themselves, each with unit, bounds and a reason."""
 
 from __future__ import annotations
 
-import math
+import dataclasses
+import numbers
 from dataclasses import field
-from typing import Any
+from typing import Any, ClassVar
+
+from rose2_logs.errors import ParameterError
+
+HIGHEST = {
+    "m": 100.0,
+    "m2": 1e6,
+    "rad": 3.2,
+    "share": 1.0,
+    "score": 1.0,
+    "share of the range": 1.0,
+    "%": 100.0,
+    "1": 100.0,
+    "1/m2": 100.0,
+    "cells": 1000.0,
+    "cells^2": 1e6,
+    "tracks": 1e6,
+}
+"""Upper bound of a parameter by its unit, where it names none: a building is in it, a slip of units is not."""
 
 
-def number(default: float, unit: str, why: str, low: float = 0.0, high: float = math.inf) -> Any:
-    """Declare a numeric parameter: its default, unit, the sentence that says where it comes from, bounds."""
+def number(default: float, unit: str, why: str, low: float = 0.0, high: float | None = None) -> Any:
+    """Declare a numeric parameter.
+
+    Parameters
+    ----------
+    default : int or float
+        An int makes a parameter that takes whole numbers only.
+    unit : str
+        Its unit.
+    why : str
+        The sentence that says where the default comes from.
+    low, high : float, optional
+        Bounds, both inclusive; the upper one is by default that of the unit, see `HIGHEST`.
+    """
+    high = HIGHEST[unit] if high is None else high
     return field(default=default, metadata={"unit": unit, "why": why, "low": low, "high": high})
 
 
 def choice(default: str, choices: tuple[str, ...], why: str) -> Any:
     """Declare a parameter that takes one of a few names."""
     return field(default=default, metadata={"unit": "name", "why": why, "choices": choices})
+
+
+class ParameterBlock:
+    """Base of the blocks of parameters: a block checks itself when it is built.
+
+    Subclasses are frozen dataclasses whose fields are declared by `number` and `choice`.
+
+    Attributes
+    ----------
+    block : str
+        Name of the block, as in a configuration file.
+    ascending : tuple of tuple of str
+        Groups of parameters whose values must not fall from one to the next.
+
+    Raises
+    ------
+    ParameterError
+        If a value has the wrong type, lies out of bounds, or contradicts another one.
+    """
+
+    block: ClassVar[str]
+    ascending: ClassVar[tuple[tuple[str, ...], ...]] = ()
+
+    def __post_init__(self) -> None:
+        for declared in dataclasses.fields(self):  # type: ignore[arg-type]
+            value = _checked(f"{self.block}.{declared.name}", declared, getattr(self, declared.name))
+            object.__setattr__(self, declared.name, value)
+        for names in self.ascending:
+            for lower, upper in zip(names, names[1:], strict=False):
+                if getattr(self, lower) > getattr(self, upper):
+                    raise ParameterError(
+                        f"{self.block}.{lower} is {getattr(self, lower)}; it must not be above "
+                        f"{self.block}.{upper}, which is {getattr(self, upper)}"
+                    )
+
+    def __repr__(self) -> str:
+        shown = (f"{name}={value!r}" for name, value in self.changed().items())
+        return f"{type(self).__name__}({', '.join(shown)})"
+
+    def changed(self) -> dict[str, float | int | str]:
+        """Values that differ from the defaults, by name."""
+        values = {
+            declared.name: (getattr(self, declared.name), declared.default)
+            for declared in dataclasses.fields(self)  # type: ignore[arg-type]
+        }
+        return {name: value for name, (value, default) in values.items() if value != default}
+
+
+def _checked(name: str, declared: dataclasses.Field[Any], value: Any) -> float | int | str:
+    kind: Any = type(declared.default)
+    accepted: Any = {float: numbers.Real, int: numbers.Integral}.get(kind, kind)
+    if isinstance(value, bool) or not isinstance(value, accepted):
+        raise ParameterError(f"{name} must be of type {kind.__name__}, not {value!r}")
+    meta = declared.metadata
+    if "choices" in meta:
+        if value not in meta["choices"]:
+            raise ParameterError(f"{name} is {value!r}; it must be one of {', '.join(meta['choices'])}")
+    elif not meta["low"] <= value <= meta["high"]:
+        raise ParameterError(f"{name} is {value}; it must lie between {meta['low']} and {meta['high']}")
+    checked: float | int | str = kind(value)
+    return checked

@@ -13,7 +13,7 @@ import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from rose2_logs.config.baselines import (
     DistanceParameters,
@@ -21,31 +21,38 @@ from rose2_logs.config.baselines import (
     VoronoiBaselineParameters,
     VoronoiMergeParameters,
 )
-from rose2_logs.config.fields import choice, number
+from rose2_logs.config.comparison import ComparisonParameters
+from rose2_logs.config.fields import ParameterBlock, choice, number
 from rose2_logs.errors import ParameterError
 
 
-@dataclass(frozen=True)
-class ReadingParameters:
+@dataclass(frozen=True, repr=False)
+class ReadingParameters(ParameterBlock):
     """How much a log may claim before it is refused as damaged or hostile; real ones stay far below."""
+
+    block: ClassVar[str] = "reading"
 
     map_max_cells: int = number(
         2**27,
         "cells",
         "Largest map that is read: 579 m squared at 5 cm; of an image 2.7 GB are needed.",
         1,
+        2**40,
     )
     chunk_max_bytes: int = number(
-        2**28, "bytes", "Largest chunk or message once decompressed: a largest map; usual is 1 MB.", 1024
+        2**28, "bytes", "Largest chunk or message once decompressed: a largest map; usual is 1 MB.", 1024, 2**40
     )
     map_max_messages: int = number(
-        2_000_000, "messages", "Most messages of a map's topics: one a second for 23 days.", 1
+        2_000_000, "messages", "Most messages of a map's topics: one a second for 23 days.", 1, 10**12
     )
 
 
-@dataclass(frozen=True)
-class OccupancyParameters:
+@dataclass(frozen=True, repr=False)
+class OccupancyParameters(ParameterBlock):
     """Which cells count as occupied and which as free."""
+
+    block: ClassVar[str] = "occupancy"
+    ascending: ClassVar[tuple[tuple[str, ...], ...]] = (("free_max_percent", "occupied_min_percent"),)
 
     occupied_min_percent: float = number(
         65.0, "%", "Cells above are occupied; map_server's default occupied_thresh.", 0, 100
@@ -57,19 +64,24 @@ class OccupancyParameters:
         0.05, "m", "Finer maps are analyzed in blocks up to this size: SLAM's usual cell.", 0.0
     )
     analyzed_max_cells: int = number(
-        20_000_000, "cells", "Explored parts with more are analyzed in blocks; 220 m squared at 5 cm.", 10_000
+        20_000_000, "cells", "Explored parts with more are analyzed in blocks; 220 m squared at 5 cm.", 10_000, 2**40
     )
 
-    def unblocked(self) -> OccupancyParameters:
-        """Return the same, for methods that take every map at its own resolution."""
-        return dataclasses.replace(self, working_resolution_m=0.0, analyzed_max_cells=2**62)
 
-
-@dataclass(frozen=True)
-class SpectrumParameters:
+@dataclass(frozen=True, repr=False)
+class SpectrumParameters(ParameterBlock):
     """Stage A: dominant directions, structure score, clean map (paper, III-A)."""
 
+    block: ClassVar[str] = "spectrum"
+    ascending: ClassVar[tuple[tuple[str, ...], ...]] = (
+        ("shortest_wave_m", "longest_wave_m"),
+        ("threshold_min", "threshold_max"),
+    )
+
     wall_sigma_m: float = number(0.06, "m", "Walls in SLAM maps wobble by about one cell of 5 cm.", 0.001)
+    wall_sigma_min_cells: float = number(
+        0.5, "cells", "Blur of coarse maps, whose cells are wider than the wobble: less leaves steps.", 0.1
+    )
     longest_wave_m: float = number(10.0, "m", "Longer waves show the building's outline, not its walls.", 0.1)
     shortest_wave_m: float = number(0.25, "m", "Shorter waves show the raster (five cells of 5 cm).", 0.001)
     angle_step_rad: float = number(
@@ -112,12 +124,17 @@ class SpectrumParameters:
     )
 
 
-@dataclass(frozen=True)
-class WallParameters:
+@dataclass(frozen=True, repr=False)
+class WallParameters(ParameterBlock):
     """Stage B: segments, wall clusters, representative lines (paper, III-B)."""
+
+    block: ClassVar[str] = "walls"
 
     segment_min_length_m: float = number(0.4, "m", "Shortest segment: a wall beside a door.", 0.01)
     segment_max_gap_m: float = number(0.25, "m", "Gap bridged within a segment; the paper's 5 cells.", 0.0)
+    segment_cover_cells: float = number(
+        1.5, "cells", "Cells of a line this near cover what is between them: a diagonal, rounded up.", 1.0
+    )
     segment_min_fill: float = number(
         0.6, "share", "Least share of a segment that cells cover: more than half is wall.", 0, 1
     )
@@ -137,13 +154,15 @@ class WallParameters:
         8.0, "m", "A wall may go on unseen for a room's width beyond its evidence.", 0.0
     )
     local_extension_m: float = number(1.0, "m", "A chord of a curved wall reaches to the next chord.", 0.0)
-    extension_per_length: float = number(4.0, "1", "A short wall reaches not further than this times itself.")
+    extension_per_length: float = number(4.0, "1", "A short wall reaches no further than this times itself.")
     line_min_weight: float = number(0.1, "share", "Least covered share of a line; the paper's value.", 0, 1)
 
 
-@dataclass(frozen=True)
-class FloorPlanParameters:
+@dataclass(frozen=True, repr=False)
+class FloorPlanParameters(ParameterBlock):
     """Stage C: edge weights, faces, rooms (paper, III-C)."""
+
+    block: ClassVar[str] = "floor_plan"
 
     wall_tolerance_m: float = number(
         0.15, "m", "A wall counts for an edge when it lies this near: a wall's half thickness and drift.", 0.0
@@ -153,6 +172,9 @@ class FloorPlanParameters:
         "m",
         "A wall is blind with no free space this near behind it, more than its thickness; 0: none is.",
         0.0,
+    )
+    frame_margin_m: float = number(
+        1.0, "m", "The plane is cut this far around the map, so that its outer walls lie inside.", 0.01
     )
     face_min_seen: float = number(
         0.1, "share", "A face less seen than this is outside: it holds rays through windows.", 0, 1
@@ -165,20 +187,30 @@ class FloorPlanParameters:
         ("agglomerative", "dbscan"),
         "How faces are joined to rooms: by whole borders, or pair by pair with DBSCAN as in the paper.",
     )
+    known_power: float = number(
+        2.0, "1", "Of a face seen by half three quarters behind its walls are unknown: 1 - 0.5^2.", 0.1, 10
+    )
     dbscan_max_weight: float = number(
         0.24, "share", "DBSCAN joins faces with edges up to this weight: exp(-w / 0.125) = 0.15.", 0, 1
     )
     join_min_openness: float = number(
         0.7, "share", "Faces join when at least this share of their known border is open.", 0, 1
     )
-    join_min_open_m: float = number(0.15, "m", "Least open border for faces to join: three cells of 5 cm.", 0)
+    join_min_open_m: float = number(0.15, "m", "Least open border for faces to join: three cells of 5 cm.")
     join_min_passage: float = number(
         0.7, "1", "Faces join when the passage is this wide against the narrower one's width.", 0
+    )
+    passage_wide: float = number(
+        2.0, "1", "Passages wider than this against the room join no sooner than those as wide.", 0.1
     )
     passage_look_widths: float = number(
         2.0, "1", "How far from a passage its width is compared with the room's, in widths.", 0.0
     )
     passage_look_max_m: float = number(3.0, "m", "The same at most: half a large room.", 0.0)
+    passage_look_points: int = number(
+        3, "points", "Points of a passage from which the room is looked at: its quarters.", 1, 100
+    )
+    passage_look_samples: int = number(25, "samples", "Samples of a look; at 3 m one every 12 cm.", 2, 10_000)
     doorway_max_width_m: float = number(
         2.0, "m", "A gap in a wall up to this width is a doorway: a double door.", 0.0
     )
@@ -194,10 +226,15 @@ class FloorPlanParameters:
     room_min_clearance_m: float = number(0.6, "m", "Half the width of the narrowest room.", 0.0)
 
 
-@dataclass(frozen=True)
-class TopologyParameters:
+@dataclass(frozen=True, repr=False)
+class TopologyParameters(ParameterBlock):
     """Stage D: Voronoi graph, splitting of rooms, doorways (paper, III-D)."""
 
+    block: ClassVar[str] = "topology"
+
+    clearance_blur_cells: float = number(
+        1.0, "cells", "Blur of the clearance, so that the raster's steps are no summits of their own.", 0.1, 100
+    )
     summit_reach_m: float = number(
         0.15, "m", "A summit of the clearance is the highest this far around: a wall's thickness.", 0.0
     )
@@ -209,13 +246,41 @@ class TopologyParameters:
     )
     split_min_area_m2: float = number(3.0, "m2", "Smaller parts are niches: the least room.", 0.0)
     split_min_purity: float = number(0.98, "share", "A cut leaves this share of each part on its side.", 0, 1)
+    cut_tail_share: float = number(
+        0.02, "share", "A cut lies midway between two parts but for this share of each, their fringes.", 0, 0.5
+    )
     max_rounds: int = number(5, "1", "Rounds of splitting; the paper's implementation has five.", 0, 100)
     doorway_min_width_m: float = number(0.3, "m", "Narrower contacts of two rooms are noise.", 0.0)
+    doorway_gap_cells: float = number(
+        2.9, "cells", "Contacts of two rooms this near are one doorway: a cell may be missing between them.", 1.0
+    )
 
 
-@dataclass(frozen=True)
-class TrackingParameters:
+@dataclass(frozen=True, repr=False)
+class QualityParameters(ParameterBlock):
+    """How sure the rooms of a map are: how much of their outlines is wall."""
+
+    block: ClassVar[str] = "quality"
+
+    outline_step_m: float = number(
+        0.1, "m", "Outlines are looked at every so many meters: two cells of 5 cm.", 0.001
+    )
+    wall_reach_m: float = number(
+        0.2, "m", "Occupied cells this near support an outline, which runs in the middle of walls.", 0.0
+    )
+    unsure_below: float = number(
+        0.7, "share", "Rooms with less wall are unsure; doorways alone take a room to about 0.9."
+    )
+
+
+@dataclass(frozen=True, repr=False)
+class TrackingParameters(ParameterBlock):
     """Identity of rooms over the snapshots of a run."""
+
+    block: ClassVar[str] = "tracking"
+    ascending: ClassVar[tuple[tuple[str, ...], ...]] = (
+        ("fit_gate_4_m", "fit_gate_3_m", "fit_gate_2_m", "fit_gate_1_m"),
+    )
 
     match_min_iou: float = number(
         0.2, "share", "Least overlap for a room to continue a track; half-seen rooms double in size.", 0, 1
@@ -223,8 +288,11 @@ class TrackingParameters:
     part_min_share: float = number(
         0.5, "share", "A room is part of another when most of it lies in it: never of two at once.", 0, 1
     )
+    match_power: int = number(
+        2, "1", "Pairs are weighed by this power of their overlap: one good pair beats two poor ones.", 1, 10
+    )
     shapes_kept: int = number(
-        3, "shapes", "Shapes by which a track is known: whole, part, and as it was seen before.", 1
+        3, "shapes", "Shapes by which a track is known: whole, part, and as it was seen before.", 1, 1000
     )
     shape_same_iou: float = number(0.8, "share", "A shape like one in memory by this takes its place.", 0, 1)
     lost_kept: int = number(
@@ -243,11 +311,63 @@ class TrackingParameters:
     back_projected_min_area_m2: float = number(
         1.5, "m2", "A lesser glimpse of a room of the last map is no room yet: half the least room.", 0.0
     )
+    fit_points: int = number(
+        2000, "points", "Wall cells that are laid over the next map, evenly taken: enough for millimeters.", 3, 10**6
+    )
+    fit_min_points: int = number(
+        50, "points", "Fewer wall cells do not tell how a map lies: two meters of wall.", 3, 10**6
+    )
+    fit_neighbors: int = number(
+        12, "points", "Wall cells around one that tell how the wall runs: half a meter of it.", 2, 1000
+    )
+    fit_gate_1_m: float = number(
+        0.5, "m", "How far a wall's nearest wall may be in the fit's first step: a loop closure's leap.", 0.001
+    )
+    fit_gate_2_m: float = number(0.3, "m", "The same in its second step.", 0.001)
+    fit_gate_3_m: float = number(0.2, "m", "The same in its third step.", 0.001)
+    fit_gate_4_m: float = number(0.1, "m", "The same in its last step: drift.", 0.001)
+    fit_gate_min_cells: float = number(
+        2.0, "cells", "Every gate is at least this wide: a wall's two faces, and its wobble."
+    )
+    fit_damping: float = number(
+        1e-3, "share", "Share of the walls that must stand across a direction to tell the shift along it.", 1e-9
+    )
+    fit_max_rounds: int = number(8, "rounds", "Rounds of each step of the fit; it has settled before.", 1, 1000)
+    fit_settled_m: float = number(1e-4, "m", "The fit has settled when no point moves further.")
+    fit_sure_share: float = number(
+        0.75, "share", "With this share of the walls brought together no other position is searched."
+    )
+    fit_better_share: float = number(
+        0.05, "share", "A map moved when that brings this share more of its walls together than staying does."
+    )
+    search_points: int = number(
+        500, "points", "Wall cells that the search among many positions tries.", 3, 10**6
+    )
+    search_raster_m: float = number(0.1, "m", "Cells of the raster on which positions are searched.", 0.01)
+    search_step_m: float = number(0.3, "m", "Step of the search, which the fit's first gate bridges.", 0.01)
+    search_candidates: int = number(
+        5, "positions", "The best positions of the search, which are fitted.", 1, 1000
+    )
+    settled_area_tolerance: float = number(
+        0.1, "share", "A room has its last area when it is within this share of it."
+    )
+    last_shape_min_iou: float = number(
+        0.8, "share", "A room has its last shape from this overlap on: walls a few decimeters off in 5 m."
+    )
+    final_min_share: float = number(
+        0.9, "share", "The layout is final when this share of it is in rooms of their last shape."
+    )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Parameters:
-    """All blocks."""
+    """All blocks.
+
+    Raises
+    ------
+    ParameterError
+        If a block is not of its type; blocks check their values themselves.
+    """
 
     reading: ReadingParameters = field(default_factory=ReadingParameters)
     occupancy: OccupancyParameters = field(default_factory=OccupancyParameters)
@@ -255,22 +375,62 @@ class Parameters:
     walls: WallParameters = field(default_factory=WallParameters)
     floor_plan: FloorPlanParameters = field(default_factory=FloorPlanParameters)
     topology: TopologyParameters = field(default_factory=TopologyParameters)
+    quality: QualityParameters = field(default_factory=QualityParameters)
     morphological: MorphologicalParameters = field(default_factory=MorphologicalParameters)
     distance: DistanceParameters = field(default_factory=DistanceParameters)
     voronoi: VoronoiBaselineParameters = field(default_factory=VoronoiBaselineParameters)
     voronoi_merge: VoronoiMergeParameters = field(default_factory=VoronoiMergeParameters)
     tracking: TrackingParameters = field(default_factory=TrackingParameters)
+    comparison: ComparisonParameters = field(default_factory=ComparisonParameters)
 
-    def resolved(self) -> dict[str, dict[str, float | int | bool | str]]:
+    def __post_init__(self) -> None:
+        for declared in dataclasses.fields(self):
+            kind: Any = declared.default_factory
+            if not isinstance(value := getattr(self, declared.name), kind):
+                raise ParameterError(f"{declared.name} must be {kind.__name__}, not {value!r}")
+
+    def __repr__(self) -> str:
+        blocks = ((block.name, getattr(self, block.name)) for block in dataclasses.fields(self))
+        shown = (f"{name}={block!r}" for name, block in blocks if block.changed())
+        return f"Parameters({', '.join(shown)})"
+
+    @classmethod
+    def from_any(cls, value: Parameters | Mapping[str, Any] | None = None) -> Parameters:
+        """Make parameters of whatever names them.
+
+        Parameters
+        ----------
+        value : Parameters or mapping, optional
+            Parameters are returned as they are; None gives the defaults. A mapping holds values by dotted
+            name, ``{"walls.extension_m": 6}``, or mappings of values by block, ``{"walls": {"extension_m": 6}}``.
+
+        Raises
+        ------
+        ParameterError
+            If a block or a name does not exist, or a value has the wrong type or lies out of bounds.
+
+        Examples
+        --------
+        >>> Parameters.from_any({"walls.extension_m": 6})
+        Parameters(walls=WallParameters(extension_m=6.0))
+        """
+        if isinstance(value, cls):
+            return value
+        if value is not None and not isinstance(value, Mapping):
+            raise ParameterError(f"parameters must be Parameters or a dict of values, not {value!r}")
+        return cls().replaced(value or {})
+
+    def resolved(self) -> dict[str, dict[str, float | int | str]]:
         """Every parameter with its value, block by block, as written beside the results."""
         return dataclasses.asdict(self)
 
-    def replaced(self, changes: Mapping[str, Mapping[str, Any]]) -> Parameters:
+    def replaced(self, changes: Mapping[str, Any]) -> Parameters:
         """Return a copy with some values changed.
 
         Parameters
         ----------
-        changes : mapping of block name to mapping of parameter name to value
+        changes : mapping
+            Values by dotted name, or mappings of values by the name of their block.
 
         Raises
         ------
@@ -278,33 +438,35 @@ class Parameters:
             If a block or a name does not exist, or a value has the wrong type or lies out of bounds.
         """
         blocks = {block.name: getattr(self, block.name) for block in dataclasses.fields(self)}
-        for block_name, values in changes.items():
-            if block_name not in blocks:
-                meant = _meant(
-                    block_name
-                    if not isinstance(values, Mapping)
-                    else f"{block_name}.{next(iter(values), '')}"
-                )
-                raise ParameterError(
-                    f"no parameter block {block_name!r}{meant}; there are: {', '.join(blocks)}"
-                )
-            if not isinstance(values, Mapping):
-                raise ParameterError(f"{block_name!r} must be a table of parameters, not {values!r}")
-            blocks[block_name] = _replaced_block(block_name, blocks[block_name], values)
+        for name, values in _by_block(changes, blocks).items():
+            blocks[name] = _replaced_block(name, blocks[name], values)
         return Parameters(**blocks)
 
 
+def _by_block(changes: Mapping[str, Any], blocks: Iterable[str]) -> dict[str, dict[str, Any]]:
+    """Values by name in mappings by block, of dotted names and of such mappings."""
+    nested: dict[str, dict[str, Any]] = {}
+    for key, given in changes.items():
+        name, dot, parameter = str(key).partition(".")
+        values = {parameter: given} if dot else given
+        if name not in blocks:
+            meant = _meant(f"{name}.{next(iter(values), '')}" if isinstance(values, Mapping) else name)
+            raise ParameterError(f"no parameter block {name!r}{meant}; there are: {', '.join(blocks)}")
+        if not isinstance(values, Mapping):
+            raise ParameterError(f"{name!r} must be a table of parameters, not {values!r}")
+        nested.setdefault(name, {}).update(values)
+    return nested
+
+
 def _replaced_block(block_name: str, block: Any, values: Mapping[str, Any]) -> Any:
-    declared = {item.name: item for item in dataclasses.fields(block)}
-    checked = {}
-    for name, value in values.items():
-        if name not in declared:
+    names = [declared.name for declared in dataclasses.fields(block)]
+    for name in values:
+        if name not in names:
             full_name = f"{block_name}.{name}"
             raise ParameterError(
-                f"no parameter {full_name}{_meant(full_name)}; there are: {', '.join(declared)}"
+                f"no parameter {full_name}{_meant(full_name)}; there are: {', '.join(names)}"
             )
-        checked[name] = _checked(f"{block_name}.{name}", declared[name], value)
-    return dataclasses.replace(block, **checked)
+    return dataclasses.replace(block, **values)
 
 
 def _meant(name: str) -> str:
@@ -313,24 +475,9 @@ def _meant(name: str) -> str:
     rows = describe_parameters()
     for among in ([row for row in rows if row["block"] == block], rows):
         if near := difflib.get_close_matches(own, [row["name"] for row in among], 1):
-            found = next(row for row in among if row["name"] == near[0])
-            return f"; did you mean {found['block']}.{found['name']}?"
+            closest = next(row for row in among if row["name"] == near[0])
+            return f"; did you mean {closest['block']}.{closest['name']}?"
     return ""
-
-
-def _checked(name: str, declared: dataclasses.Field[Any], value: Any) -> Any:
-    kind: Any = type(declared.default)
-    if isinstance(value, bool) is not (kind is bool) or not isinstance(
-        value, (int, float) if kind is float else kind
-    ):
-        raise ParameterError(f"{name} must be of type {kind.__name__}, not {value!r}")
-    meta = declared.metadata
-    if "choices" in meta and value not in meta["choices"]:
-        raise ParameterError(f"{name} is {value!r}; it must be one of {', '.join(meta['choices'])}")
-    if kind in (int, float) and not (meta["low"] <= value <= meta["high"]):
-        raise ParameterError(f"{name} is {value}; it must lie between {meta['low']} and {meta['high']}")
-    checked: float | int | bool | str = kind(value)
-    return checked
 
 
 def load_parameters(config: Path | None = None, settings: Iterable[str] = ()) -> Parameters:
@@ -359,10 +506,10 @@ def load_parameters(config: Path | None = None, settings: Iterable[str] = ()) ->
         try:
             parsed = _parsed_setting(setting)
         except tomllib.TOMLDecodeError as error:
-            raise ParameterError(f"{setting!r}: write it as block.name=value") from error
+            raise ParameterError(f"setting {setting!r}: write it as block.name=value") from error
         if not all(isinstance(values, Mapping) for values in parsed.values()):
             meant = _meant(next(iter(parsed)))
-            raise ParameterError(f"{setting!r}: write it as block.name=value{meant}")
+            raise ParameterError(f"setting {setting!r}: write it as block.name=value{meant}")
         parameters = parameters.replaced(parsed)
     return parameters
 
