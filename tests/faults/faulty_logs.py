@@ -19,7 +19,7 @@ import numpy as np
 from mcap.writer import CompressionType, IndexType, Writer
 from reader_logs import START_NS, typestore
 from rosbags import rosbag1, rosbag2
-from test_messages import SCHEMA, foxglove_message
+from foxglove_grids import SCHEMA, foxglove_message
 
 SECOND = 10**9
 MOST_DOUBT = 19

@@ -128,7 +128,7 @@ def test_every_kind_of_warning_is_explained_on_the_page():
     kinds = set()
     for path in (Path(__file__).parents[2] / "rose2_logs").rglob("*.py"):
         code = path.read_text(encoding="utf-8")
-        kinds |= set(re.findall(r'(?:notice\(logger, |MapWarning\(\s*)"(\w+)"', code))
+        kinds |= set(re.findall(r'(?:log_warning\(logger, |MapWarning\(\s*)"(\w+)"', code))
     assert "invalid_map" not in kinds, "that one is chosen by the error"
     explained = set(
         re.findall(r"`(\w+)`", PAGE.read_text(encoding="utf-8").partition("## Faults of messages")[0])

@@ -58,7 +58,6 @@ def record(folder: Path) -> Path:
 
 def shots(folder: Path) -> dict[str, Path]:
     """Pictures of the view of rooms along the run, and of every other view; the viewer finds no fault."""
-    sys.path.insert(0, str(PROJECT / "tools"))
     from screenshot_recording import Shot, take
 
     along = {f"rooms_{100 * at:.0f}": Shot(folder / f"{at}.png", at, ("Rooms",), True) for at in COVERAGES}
