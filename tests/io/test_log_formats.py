@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from foxglove_grids import SCHEMA, foxglove_message
 from mcap.writer import CompressionType, IndexType
 from reader_logs import (
     SHARED,
@@ -29,7 +30,6 @@ from reader_logs import (
     write_rosbag2,
 )
 from scipy.ndimage import binary_dilation
-from foxglove_grids import SCHEMA, foxglove_message
 
 from rose2_logs.config.parameters import ReadingParameters
 from rose2_logs.config.selection import Selection
