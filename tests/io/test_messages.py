@@ -23,7 +23,7 @@ def decode(data: bytes, message_type: str = GRID, encoding: str = "cdr", schema:
     return found(memoryview(data))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     ros=st.sampled_from([1, 2]),
     little_endian=st.booleans(),
