@@ -63,17 +63,22 @@ def test_all_that_is_needed_is_looked_at():
     assert {each.name for each in [*DIRECT, *BUILD, *OPTIONAL]} <= names
 
 
-@pytest.mark.parametrize("requirement", EVERYTHING, ids=lambda each: each.name)
-def test_the_upper_bound_is_the_first_version_that_may_break_what_is_tested(requirement: Requirement):
+def test_the_upper_bound_is_the_first_version_that_may_break_what_is_tested():
     """The newest version that is allowed is pinned for CI, and nothing beyond its major is let in."""
-    tested = pins("constraints.txt")[requirement.name]
-    assert all(requirement.specifier.contains(version) for version in tested)
-    assert bound(requirement, "<") in set(following(max(tested)))
+    tested = pins("constraints.txt")
+    assert [each.name for each in EVERYTHING if each.name not in tested] == [], "run .ci/pin"
+    wrong = [
+        str(each)
+        for each in EVERYTHING
+        if not all(each.specifier.contains(version) for version in tested[each.name])
+        or bound(each, "<") not in set(following(max(tested[each.name])))
+    ]
+    assert wrong == []
 
 
-@pytest.mark.parametrize("requirement", WITH_LOWEST, ids=lambda each: each.name)
-def test_the_lower_bound_is_what_is_tested(requirement: Requirement):
-    assert pins("lowest.txt")[requirement.name] == [bound(requirement, ">=")]
+def test_the_lower_bound_is_what_is_tested():
+    tested = pins("lowest.txt")
+    assert [str(each) for each in WITH_LOWEST if tested.get(each.name) != [bound(each, ">=")]] == []
 
 
 def test_all_versions_of_python_that_are_named_are_allowed():

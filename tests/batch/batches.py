@@ -4,24 +4,21 @@ from __future__ import annotations
 
 import csv
 import subprocess
-import sys
-import time
 from collections import deque
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Self, TypeVar
+from typing import Self
 
+from commands import ROSE2_LOGS, WAIT_S, started
 from saved_maps import save_run
 
 from rose2_logs.batch.driver import LogState
 from rose2_logs.batch.task import LogOutcome, LogTask, Progress, analyze_task
 from rose2_logs.runs.tables import TABLES
 
-TIMEOUT_S = 90.0
 SLOW = tuple(range(116, 222, 4))
 """Of how many columns the maps of a log know, that takes long enough to be caught while it is analyzed."""
-
-Found = TypeVar("Found")
 
 
 def make_logs(folder: Path) -> Path:
@@ -32,23 +29,23 @@ def make_logs(folder: Path) -> Path:
     return folder
 
 
-def start_batch(*arguments: object) -> subprocess.Popen[str]:
-    """Start ``rose2-logs batch`` as a process group of its own."""
-    command = [sys.executable, "-m", "rose2_logs", "batch", *map(str, arguments), "--no-mcap", "--no-rrd"]
-    return subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
-    )
+@contextmanager
+def started_batch(*arguments: object) -> Iterator[subprocess.Popen[str]]:
+    """Start ``rose2-logs batch`` as a process group of its own, which does not outlive the block."""
+    with started(*ROSE2_LOGS, "batch", *arguments, "--no-mcap", "--no-rrd") as process:
+        yield process
 
 
 def finish(process: subprocess.Popen[str]) -> tuple[int, str, str]:
     """Wait for it; return exit code, stdout and stderr."""
-    out, err = process.communicate(timeout=TIMEOUT_S)
+    out, err = process.communicate(timeout=WAIT_S)
     return process.returncode, out, err
 
 
 def run_batch(*arguments: object) -> tuple[int, str, str]:
     """Run ``rose2-logs batch``."""
-    return finish(start_batch(*arguments))
+    with started_batch(*arguments) as process:
+        return finish(process)
 
 
 class Heard:
@@ -96,30 +93,12 @@ class WorkersHere:
             yield outcome
 
 
-def wait_for(look: Callable[[], Found | None]) -> Found:
-    """Wait until there is something to be seen."""
-    end = time.monotonic() + TIMEOUT_S
-    while time.monotonic() < end:
-        if found := look():
-            return found
-        time.sleep(0.02)
-    raise AssertionError("it never came")
-
-
 def worker_of(out: Path, name: str, but_not: Collection[int] = ()) -> int | None:
     """Process id of the worker that has a log in work, from the name of the folder for its results."""
     for folder in out.glob(f".batch/unfinished/*/{name}/*"):
         if (pid := int(folder.name.split("-")[-2])) not in but_not:
             return pid
     return None
-
-
-def is_running(pid: int) -> bool:
-    """Whether there is a process that has not ended."""
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except OSError:
-        return False
 
 
 def summary(out: Path) -> dict[str, dict[str, str]]:

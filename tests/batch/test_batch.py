@@ -17,16 +17,15 @@ from batches import (
     Heard,
     WorkersHere,
     finish,
-    is_running,
     make_logs,
     run_batch,
-    start_batch,
+    started_batch,
     summary,
     table_bytes,
     tree,
-    wait_for,
     worker_of,
 )
+from commands import is_running, wait_for
 from saved_maps import save_run
 
 from rose2_logs.batch import driver
@@ -154,12 +153,12 @@ def test_a_killed_worker_takes_only_its_try_with_it(tmp_path):
 def test_a_batch_that_is_killed_leaves_whole_results_and_goes_on(tmp_path, monkeypatch):
     """Its workers end with it; what was done is not done again."""
     logs, out = make_logs(tmp_path / "logs"), tmp_path / "out"
-    process = start_batch(logs, "-o", out, "--workers", 2)
-    worker = wait_for(lambda: worker_of(out, "slow"))
-    wait_for(lambda: list(out.glob("logs/*")))
-    process.kill()
-    finish(process)
-    wait_for(lambda: not is_running(worker))
+    with started_batch(logs, "-o", out, "--workers", 2) as process:
+        worker = wait_for(lambda: worker_of(out, "slow"))
+        wait_for(lambda: list(out.glob("logs/*")))
+        process.kill()
+        finish(process)
+        wait_for(lambda: not is_running(worker))
     done = {path.name for path in out.glob("logs/*")}
     assert done
     assert "slow" not in done
@@ -178,14 +177,14 @@ def test_a_batch_that_is_killed_leaves_whole_results_and_goes_on(tmp_path, monke
 def test_ctrl_c_ends_at_once_and_cleans_up(tmp_path):
     """And meanwhile no other batch writes to the folder."""
     logs, out = make_logs(tmp_path / "logs"), tmp_path / "out"
-    process = start_batch(logs, "-o", out)
-    worker = wait_for(lambda: worker_of(out, "slow"))
-    with pytest.raises(OutputError, match="another batch is writing to this folder"), locked(out):
-        pass
-    os.killpg(process.pid, signal.SIGINT)
-    code, told, err = finish(process)
-    assert (code, told) == (130, "")
-    assert err.splitlines()[-1] == "error: interrupted; unfinished results were removed"
-    wait_for(lambda: not is_running(worker))
+    with started_batch(logs, "-o", out) as process:
+        worker = wait_for(lambda: worker_of(out, "slow"))
+        with pytest.raises(OutputError, match="another batch is writing to this folder"), locked(out):
+            pass
+        os.killpg(process.pid, signal.SIGINT)
+        code, told, err = finish(process)
+        assert (code, told) == (130, "")
+        assert err.splitlines()[-1] == "error: interrupted; unfinished results were removed"
+        wait_for(lambda: not is_running(worker))
     assert not [path for path in tree(out) if path.startswith(".batch")]
     assert set(summary(out)) == {path.name for path in out.glob("logs/*")}

@@ -13,18 +13,17 @@ from pathlib import Path
 
 import pytest
 from batches import (
-    TIMEOUT_S,
     Heard,
     WorkersHere,
     finish,
     make_logs,
-    start_batch,
+    started_batch,
     summary,
     table_bytes,
     tree,
-    wait_for,
     worker_of,
 )
+from commands import WAIT_S, started, wait_for
 from saved_maps import save_run
 
 from rose2_logs.batch import dask_workers, driver
@@ -43,21 +42,15 @@ def running(*arguments: object):
     """A process of Dask, which is ended whatever happens."""
     # The scheduler gives a log up at its second loss instead of its fourth.
     settings = {"DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "1"}
-    process = subprocess.Popen(
-        [DASK, *map(str, arguments), "--no-dashboard"],
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-        env=os.environ | settings,
-    )
-    try:
+    silent = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    with started(DASK, *arguments, "--no-dashboard", env=os.environ | settings, **silent) as process:
         yield process
-    finally:
         process.terminate()
-        process.wait(TIMEOUT_S)
+        process.wait(WAIT_S)
 
 
 @pytest.fixture(scope="module")
-def cluster(tmp_path_factory) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
+def cluster(tmp_path_factory) -> Iterator[tuple[str, subprocess.Popen[str]]]:
     """A scheduler, as its file and its process, with two workers, which are started again when they die."""
     file = tmp_path_factory.mktemp("dask") / "scheduler.json"
     starting = ("scheduler", "--host", "127.0.0.1", "--port", 0, "--scheduler-file", file)
@@ -136,10 +129,10 @@ def test_a_scheduler_that_is_lost_ends_the_batch_in_one_line(cluster, tmp_path):
     """What was finished stands. This test comes last, for it takes the cluster with it."""
     file, scheduler = cluster
     logs, out = make_logs(tmp_path / "logs"), tmp_path / "out"
-    process = start_batch(logs, "-o", out, "--scheduler", file)
-    wait_for(lambda: worker_of(out, "slow"))
-    scheduler.kill()
-    code, told, err = finish(process)
+    with started_batch(logs, "-o", out, "--scheduler", file) as process:
+        wait_for(lambda: worker_of(out, "slow"))
+        scheduler.kill()
+        code, told, err = finish(process)
     assert (code, told) == (2, "")
     assert "Traceback" not in err
     assert err.splitlines()[-1].startswith("error: the Dask scheduler at")

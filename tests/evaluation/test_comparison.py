@@ -64,7 +64,7 @@ def test_different_shapes_are_refused():
 
 
 @given(label_arrays, label_arrays)
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_every_cell_has_the_mark_of_its_side(truth, found):
     """Cells in both, one and none are told apart; partners are one to one; the truth itself is right."""
     comparison = compare(truth, found)

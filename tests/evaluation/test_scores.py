@@ -55,7 +55,7 @@ def test_different_shapes_are_refused_with_both_shapes():
 
 
 @given(label_arrays, label_arrays, st.permutations(range(1, 5)))
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_figures_do_not_depend_on_numbers_and_mirror_each_other(truth, segmented, numbers):
     """Renumbering rooms changes nothing; swapping the two maps swaps precision/recall and iou_seg/iou_gt.
 
@@ -72,7 +72,7 @@ def test_figures_do_not_depend_on_numbers_and_mirror_each_other(truth, segmented
 
 
 @given(label_arrays)
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_the_truth_itself_scores_100(truth):
     """A perfect segmentation reaches 100 in every figure."""
     truth[0, 0] = 1

@@ -70,7 +70,7 @@ def runs(draw: st.DrawFn) -> list[Frame]:
 
 
 @given(runs())
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_the_figures_are_those_of_py_motmetrics(frames: list[Frame]):
     """Whatever overlaps whatever: identity figures, switches and fragmentations are the same."""
     accumulator = motmetrics.MOTAccumulator(auto_id=True)

@@ -16,10 +16,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from foxglove_grids import SCHEMA, foxglove_message
 from mcap.writer import CompressionType, IndexType, Writer
 from reader_logs import START_NS, typestore
 from rosbags import rosbag1, rosbag2
-from test_messages import SCHEMA, foxglove_message
 
 SECOND = 10**9
 MOST_DOUBT = 19

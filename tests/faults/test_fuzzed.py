@@ -11,15 +11,13 @@ import numpy as np
 import pytest
 from faulty_logs import START_NS, Grid, Input, Logged, Patch, packed, write_bag, write_mcap, write_rosbag2
 from fuzzing.targets import FRAME_BYTES, TARGETS
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap.writer import CompressionType
 
 from rose2_logs.io import open_log
 
-BUDGET = settings(
-    max_examples=50, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow]
-)
+BUDGET = settings(max_examples=50, derandomize=True)
 """Small and the same each time; tools/fuzz.py is for long runs."""
 NUMBERS = st.floats(width=32) | st.sampled_from([0.05, 0.0, -0.05, 1e9, float("nan"), float("inf")])
 SIZES = st.integers(0, 6) | st.sampled_from([2**16, 2**31, 2**32 - 1])

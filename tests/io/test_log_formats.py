@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from foxglove_grids import SCHEMA, foxglove_message
 from mcap.writer import CompressionType, IndexType
 from reader_logs import (
     SHARED,
@@ -29,7 +30,6 @@ from reader_logs import (
     write_rosbag2,
 )
 from scipy.ndimage import binary_dilation
-from test_messages import SCHEMA, foxglove_message
 
 from rose2_logs.config.parameters import ReadingParameters
 from rose2_logs.config.selection import Selection
@@ -331,7 +331,7 @@ def test_compressed_files_of_one_name_from_several_folders_are_several_files(tmp
 
 def test_each_chunk_of_a_bag_written_topic_by_topic_is_decompressed_once(tmp_path, monkeypatch):
     """Its chunks overlap in time throughout; as many decompressions as messages take hours for a long bag."""
-    from rose2_logs.io import bag_index
+    from rose2_logs.io.rosbag1 import index as bag_index
 
     bag = write_bag(tmp_path / "run.bag", written_topic_by_topic(), compression="LZ4", chunk_bytes=2**14)
     begins = []

@@ -1,12 +1,8 @@
-"""The developers' tools are no package: their folder goes on the path, as it does when one of them runs."""
+"""A building and its exploration, for the tests of several tools."""
 
-import sys
-from pathlib import Path
+from __future__ import annotations
 
 import pytest
-
-ROOT = Path(__file__).parents[2]
-sys.path.insert(0, str(ROOT / "tools"))
 
 
 @pytest.fixture(scope="session")

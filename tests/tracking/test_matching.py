@@ -21,7 +21,7 @@ SHARES = st.floats(-6, 6).map(lambda value: round(value, 2))
     st.sampled_from([0.0, 0.3]),
     st.integers(0, 100),
 )
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_each_center_gets_the_label_of_the_cell_that_holds_it(origin, resolution, yaw, source_yaw, seed):
     """As looked up point by point; centers that lie on a border of cells up to rounding are left out."""
     labels = np.random.default_rng(seed).integers(0, 5, (7, 9)).astype(np.int32)

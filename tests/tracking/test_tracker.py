@@ -156,7 +156,7 @@ def test_maps_without_rooms_are_no_trouble():
     st.lists(st.integers(0, 2**31), min_size=2, max_size=6),
     st.tuples(st.integers(-9, 9), st.integers(-9, 9)),
 )
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_moving_the_world_changes_no_track(seeds, shift):
     """The same run elsewhere in the world has the same tracks; a track is one room at a time."""
     maps = [np.random.default_rng(seed).integers(0, 4, (3, 3)).repeat(4, 0).repeat(4, 1) for seed in seeds]

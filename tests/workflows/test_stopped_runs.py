@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import signal
 import subprocess
 import sys
-import time
 from collections import defaultdict
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
+from commands import ROSE2_LOGS, WAIT_S, below, is_running, started, wait_for
 from saved_maps import save_map, save_run, two_rooms
 
 from rose2_logs.cli.main import main
@@ -325,7 +324,7 @@ def test_a_folder_that_is_a_file_is_told(log: Path, tmp_path: Path):
     assert OutputFolder(tmp_path / "x", ["a"]).files == (tmp_path / "x" / "a",)
 
 
-COMMAND = [sys.executable, "-m", "rose2_logs", "analyze"]
+COMMAND = [*ROSE2_LOGS, "analyze"]
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs limits of POSIX")
@@ -352,14 +351,14 @@ def test_killed_and_interrupted_commands_end_with_their_workers(tmp_path: Path, 
     command = [*COMMAND, str(many), "-o", str(tmp_path / "o"), "--no-rrd"]
     journal = tmp_path / "o" / ".maps.journal"
     for number, extra in ((signal.SIGKILL, ["--workers", "2"]), (signal.SIGINT, ["--resume"])):
-        running = subprocess.Popen([*command, *extra], stderr=subprocess.PIPE, text=True)
-        size = journal.stat().st_size if journal.exists() else 10_000
-        wait_for(lambda size=size: journal.exists() and journal.stat().st_size > size)
-        children = children_of(running.pid)
-        running.send_signal(number)
-        _, err = running.communicate(timeout=60)
-        assert not (tmp_path / "o" / "maps").exists()
-        wait_for(lambda children=children: not any(map(is_alive, children)))
+        with started(*command, *extra) as running:
+            size = journal.stat().st_size if journal.exists() else 10_000
+            wait_for(lambda size=size: journal.exists() and journal.stat().st_size > size)
+            children = below(running.pid)
+            running.send_signal(number)
+            _, err = running.communicate(timeout=WAIT_S)
+            assert not (tmp_path / "o" / "maps").exists()
+            wait_for(lambda children=children: not any(map(is_running, children)))
     assert running.returncode == 130
     assert [line for line in err.splitlines() if line.startswith("error: ")] == [
         "error: interrupted; unfinished results were removed"
@@ -374,26 +373,6 @@ def test_killed_and_interrupted_commands_end_with_their_workers(tmp_path: Path, 
         assert said in capsys.readouterr().out
     analyze_log(many, tmp_path / "fresh", RunOptions(**OPTIONS))
     assert contents(tmp_path / "o" / "maps") == contents(tmp_path / "fresh")
-
-
-def wait_for(done: Callable[[], bool]) -> None:
-    end = time.monotonic() + 60
-    while not done():
-        assert time.monotonic() < end
-        time.sleep(0.02)
-
-
-def children_of(pid: int) -> list[int]:
-    path = Path(f"/proc/{pid}/task/{pid}/children")
-    return [int(child) for child in path.read_text().split()] if path.exists() else []
-
-
-def is_alive(pid: int) -> bool:
-    try:
-        os.kill(pid, 0)
-        return "State:\tZ" not in Path(f"/proc/{pid}/status").read_text()
-    except OSError:
-        return False
 
 
 def test_tables_are_all_there(fresh):

@@ -35,7 +35,7 @@ KINDS = {
 
 
 @pytest.fixture(scope="module", params=METHODS[:2])
-def frame(request) -> TrackedSnapshot:
+def step(request) -> TrackedSnapshot:
     """The drawn office turned, moved and half unknown, with structure and without."""
     cells, _ = office(turn_rad=0.2, clutter=8)
     cells[:, 170:] = -1

@@ -7,14 +7,13 @@ from __future__ import annotations
 
 import os
 import signal
-import subprocess
-import sys
 import tempfile
 import time
 from itertools import cycle, pairwise
 from pathlib import Path
 
 import numpy as np
+from commands import ROSE2_LOGS, WAIT_S, started
 from looking import CHROMIUM, colored_share, free_port, needs_chromium, needs_vulkan, small
 from numpy.typing import NDArray
 from PIL import Image
@@ -24,7 +23,6 @@ from rose2_logs.workflows.analyze import RunOptions, analyze_log
 
 PROJECT = Path(__file__).parents[3]
 GOLDEN = Path(__file__).with_name("golden")
-BIN = Path(sys.executable).parent
 COVERAGES = (0.3, 0.6, 1.0)
 TABS = ("Smoothed rooms", "Clean map", "Structure score", "Walls", "Faces", "Voronoi graph", "Spectrum")
 PANELS = ("Lives of rooms", "Area, m²", "Seen share", "Count", "Change")
@@ -38,7 +36,7 @@ END_OF_CURVES, LANES = (slice(70, 280), slice(1750, 1910)), (slice(340, 700), sl
 """Where they stand in the window: rows and columns."""
 CURVES_SHARE, LANES_SHARE = 0.01, 0.3
 """Share of these that thin curves, and lanes, take at least."""
-LOAD_S, LOOK_S = 180.0, 0.4
+LOOK_S = 0.4
 BROWSER_FLAGS = (
     "--no-sandbox",
     "--use-gl=angle",
@@ -58,7 +56,6 @@ def record(folder: Path) -> Path:
 
 def shots(folder: Path) -> dict[str, Path]:
     """Pictures of the view of rooms along the run, and of every other view; the viewer finds no fault."""
-    sys.path.insert(0, str(PROJECT / "tools"))
     from screenshot_recording import Shot, take
 
     along = {f"rooms_{100 * at:.0f}": Shot(folder / f"{at}.png", at, ("Rooms",), True) for at in COVERAGES}
@@ -108,14 +105,9 @@ def test_the_web_viewer_draws_the_recording_without_an_error(tmp_path):
     from playwright.sync_api import sync_playwright
 
     recording = record(tmp_path)
-    view = subprocess.Popen(
-        [BIN / "rose2-logs", "view", recording.parent, "--web"],
-        stdout=subprocess.PIPE,
-        text=True,
-        env={name: value for name, value in os.environ.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY")},
-    )
+    env = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY")}
     faults: list[str] = []
-    try:
+    with started(*ROSE2_LOGS, "view", recording.parent, "--web", env=env, stderr=None) as view:
         url = view.stdout.readline().split()[0]
         assert url.startswith("http://127.0.0.1:")
         with sync_playwright() as playwright:
@@ -124,8 +116,8 @@ def test_the_web_viewer_draws_the_recording_without_an_error(tmp_path):
             page.on("pageerror", lambda error: faults.append(str(error)))
             page.on("console", lambda said: faults.append(said.text) if said.type == "error" else None)
             page.goto(url)
-            page.wait_for_selector("canvas", timeout=1000 * LOAD_S)
-            end = time.monotonic() + LOAD_S
+            page.wait_for_selector("canvas", timeout=1000 * WAIT_S)
+            end = time.monotonic() + WAIT_S
             # The view of rooms takes the left of the page, below its bars.
             view_of_rooms = (slice(80, 600), slice(0, 650))
             picture = tmp_path / "page.png"
@@ -136,9 +128,8 @@ def test_the_web_viewer_draws_the_recording_without_an_error(tmp_path):
                 assert time.monotonic() < end, "the rooms were not drawn"
                 time.sleep(1)
             browser.close()
-    finally:
         view.send_signal(signal.SIGINT)
-        view.wait(timeout=30)
+        view.wait(timeout=WAIT_S)
     assert not [fault for fault in faults if not any(known in fault for known in FROM_OUTSIDE)]
     assert view.returncode == 0
 

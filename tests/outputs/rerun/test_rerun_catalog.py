@@ -7,12 +7,11 @@ import re
 import shutil
 import signal
 import socket
-import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
+from commands import ROSE2_LOGS, WAIT_S, started, wait_for
 from saved_maps import save_run
 
 from rose2_logs.errors import LogError, OutputError
@@ -98,24 +97,17 @@ def test_without_the_catalogs_client_the_runs_are_served_all_the_same(results, m
 
 def test_the_command_serves_this_machine_alone_until_it_is_interrupted(results):
     """The line that it prints can be copied; Ctrl-C is how it ends."""
-    process = subprocess.Popen(
-        [sys.executable, "-m", "rose2_logs", "serve", str(results), "--port", "0"],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    try:
+    with started(*ROSE2_LOGS, "serve", results, "--port", 0) as process:
         line = process.stdout.readline()
         url = re.fullmatch(r"2 recordings at (\S+); open them with rose2-logs view \1\n", line)[1]
         port = int(url.rpartition(":")[2])
-        with socket.create_connection(("127.0.0.1", port), timeout=10):
+        with socket.create_connection(("127.0.0.1", port), timeout=WAIT_S):
             pass
         with socket.socket() as other:
             # Were the server bound to all addresses, this one would be taken too.
             other.bind(("127.0.0.2", port))
-    finally:
         process.send_signal(signal.SIGINT)
-        _, err = process.communicate(timeout=30)
+        _, err = process.communicate(timeout=WAIT_S)
     assert (process.returncode, err) == (0, "")
 
 
@@ -139,10 +131,6 @@ def test_the_viewer_opens_a_run_of_the_catalog_in_our_layout(results, tmp_path, 
     ):
         (dataset,) = CatalogClient(url).datasets()
         viewer.open(dataset.segment_url(dataset.segment_ids()[0]))
-        end = time.monotonic() + 60
-        while not {"Rooms", "Smoothed rooms", "Lives of rooms"} <= {
-            view.name for view in viewer.get_state().views
-        }:
-            assert time.monotonic() < end
-            time.sleep(0.2)
+        wanted = {"Rooms", "Smoothed rooms", "Lives of rooms"}
+        wait_for(lambda: wanted <= {view.name for view in viewer.get_state().views})
         assert not [report for view in viewer.get_state().views for report in view.reports]

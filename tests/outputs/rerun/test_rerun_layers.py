@@ -86,7 +86,7 @@ STEPS = st.lists(st.tuples(st.integers(0, 9), st.integers(0, 1), st.integers(0, 
 
 
 @given(STEPS, st.sampled_from([0, 600, 10**6]))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_a_viewer_shows_the_same_everywhere_on_every_timeline(steps: list[Step], chunk_bytes: int):
     """Coverage may go back: the snapshot then stands at the greatest coverage so far.
 

@@ -35,7 +35,7 @@ def away(one, other):
     return np.minimum(difference, np.pi - difference)
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 @given(turn=st.floats(0, np.pi))
 @example(turn=1.578125)  # so near the raster's direction that a wall has a single step
 def test_the_two_directions_of_a_building_are_found_at_any_angle(turn):

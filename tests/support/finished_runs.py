@@ -10,7 +10,7 @@ from mcap.writer import Writer
 from rose2_logs.config.selection import Selection
 from rose2_logs.workflows.analyze import RunOptions, analyze_log
 
-SAMPLE_LOGS = Path(__file__).parents[1] / "sample_logs"
+SAMPLE_LOGS = Path(__file__).parents[2] / "sample_logs"
 
 
 def run_of(log: Path, folder: Path, snapshots: int = 6, **options) -> Path:
