@@ -63,7 +63,7 @@ class TrackedStream:
     topic : str, optional
         The map topic.
     path : RobotPath, optional
-        Where the robot was, to be told with the maps.
+        Where the robot was, to be part of the steps.
 
     Attributes
     ----------

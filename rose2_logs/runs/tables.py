@@ -209,7 +209,7 @@ def unpack_image(packed: bytes, shape: tuple[int, int], dtype: str) -> NDArray[A
     """
     size = shape[0] * shape[1] * np.dtype(dtype).itemsize
     try:
-        # One byte more than wanted, so that what is longer is told from what is right.
+        # One byte more than wanted, so that data that is too long is noticed.
         data = zstandard.ZstdDecompressor().stream_reader(packed).read(size + 1)
     except zstandard.ZstdError as error:
         raise ValueError(str(error)) from error

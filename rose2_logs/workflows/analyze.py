@@ -49,7 +49,7 @@ NAMELESS = "log"
 
 @dataclass(frozen=True)
 class RunResult:
-    """What a run has written, what it came to, and what was odd about the log."""
+    """What a run has written, what it came to, and the warnings about the log."""
 
     folder: Path
     files: tuple[Path, ...]
@@ -59,7 +59,7 @@ class RunResult:
 
 
 OnSnapshot = Callable[[TrackedSnapshot, float], None]
-"""Told of each finished snapshot and of the share, in [0, 1], of the log's time that is done."""
+"""Called with each finished step and the share, in [0, 1], of the log's time that is done."""
 
 
 def log_stem(path: Path) -> str:
@@ -87,10 +87,10 @@ def seconds_into_log(
     """
     for seconds in (start_s, end_s):
         if seconds is not None and not abs(seconds) <= LATEST_NS / 1e9:
-            raise ParameterError(f"{seconds:g} is no number of seconds into a log")
+            raise ParameterError(f"{seconds:g} s is not a valid time offset into a log")
     if start_s is None and end_s is None:
         return None, None
-    with muted():  # what is odd is told when the log is analyzed
+    with muted():  # these warnings come again when the log is analyzed
         first_ns = inspect_log(path, limits).start_ns or 0
     start_ns = None if start_s is None else first_ns + round(start_s * 1e9)
     return start_ns, None if end_s is None else first_ns + round(end_s * 1e9)
@@ -227,7 +227,7 @@ def _project_back(reader: LogReader, history: RunHistory, store: RunStore, sinks
         return
     logger.info("the maps are read once more, to project the last layout back")
     counts = reader.counts
-    with muted():  # what is odd was told the first time
+    with muted():  # these warnings came the first time
         for found in history.back_projected(reader.snapshots()):
             store.write_back_projected(found)
             for sink in sinks:

@@ -106,7 +106,7 @@ def _names(folder_a: Path, folder_b: Path) -> tuple[str, str]:
 
 
 def read_final_layout(run: Run, name: str | None = None) -> FinalLayout:
-    """Take the last layout of a stored run, called by the run's name unless told otherwise.
+    """Take the last layout of a stored run, called by the run's name unless another is given.
 
     Raises
     ------

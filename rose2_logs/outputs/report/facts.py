@@ -15,9 +15,9 @@ from rose2_logs.system.text import percent
 LATE_COVERAGE = 0.95
 """A layout that became final only beyond would likely have changed if the run had gone on."""
 FRONTIER_MIN_M = 2.0
-"""Open frontiers from this length on are told: a doorway's width and more."""
+"""Open frontiers from this length on are reported: a doorway's width and more."""
 PREDICTED_SHARE = 0.25
-"""Rooms of whose shape more than this share was not seen are told."""
+"""Rooms of whose shape more than this share was not seen are reported."""
 NAMED_MOST = 6
 """Rooms named in one sentence."""
 NOT_FINAL = "not reached"
@@ -75,7 +75,7 @@ def tiles(results: Run, plan: RoomPlan) -> list[Tile]:
         Tile("Doorways", str(len(plan.doorways)), "between rooms, last map"),
         Tile("Layout final from", *_final(final, results.choose())),
         Tile(
-            "Outlines backed by walls",
+            "Outlines supported by walls",
             MISSING if sure is None else percent(sure),
             "median of the last map's rooms",
         ),
@@ -99,26 +99,24 @@ def notes(results: Run, plan: RoomPlan) -> list[Note]:
     """Tell what is not as it should be, or not sure."""
     summary = results.summary
     found, messages = summary["results"], summary.get("messages", {})
-    told: list[Note] = []
+    found_notes: list[Note] = []
     if found.get("invalid_maps"):
-        told.append(Note(f"{found['invalid_maps']} maps could not be analyzed and were left out."))
+        found_notes.append(Note(f"{found['invalid_maps']} maps could not be analyzed and were left out."))
     if messages.get("damaged"):
-        told.append(Note(f"{messages['damaged']} messages of the log were damaged and were left out."))
+        found_notes.append(Note(f"{messages['damaged']} messages of the log were damaged and were left out."))
     if found["snapshots"] > 1:
-        told += _layout_notes(summary.get("layout", {}), results.choose())
-    told += _room_notes(plan)
-    told += _shift_notes(results)
+        found_notes += _layout_notes(summary.get("layout", {}), results.choose())
+    found_notes += _room_notes(plan)
+    found_notes += _shift_notes(results)
     if messages.get("skipped"):
-        taken = (
-            f"{messages['skipped']} of {messages['messages']} map messages were not taken, as was asked for."
-        )
-        told.append(Note(taken, is_warning=False))
+        taken = f"{messages['skipped']} of {messages['messages']} map messages were skipped, as requested."
+        found_notes.append(Note(taken, is_warning=False))
     row = results.row(results.choose())
     if row["analyzed_resolution_m"] > row["resolution_m"] * 1.001:
         cells = f"{row['analyzed_resolution_m']:g} m instead of {row['resolution_m']:g} m"
         coarse = f"The maps were analyzed in cells of {cells}."
-        told.append(Note(coarse, is_warning=False))
-    return sorted(told, key=lambda note: not note.is_warning)
+        found_notes.append(Note(coarse, is_warning=False))
+    return sorted(found_notes, key=lambda note: not note.is_warning)
 
 
 def _layout_notes(layout: dict[str, Any], last: int) -> list[Note]:
@@ -135,7 +133,7 @@ def _layout_notes(layout: dict[str, Any], last: int) -> list[Note]:
 
 
 def _room_notes(plan: RoomPlan) -> list[Note]:
-    told = []
+    found_notes = []
     unsure = sorted(
         (room.wall_support, room.name)
         for room in plan.rooms
@@ -143,7 +141,9 @@ def _room_notes(plan: RoomPlan) -> list[Note]:
     )
     if unsure:
         names = _listed([f"{name} ({percent(sure)})" for sure, name in unsure])
-        told.append(Note(f"Rooms with little wall around them, so unsure (?): {names}."))
+        found_notes.append(
+            Note(f"Rooms with little of their outline supported by walls, hence unsure (?): {names}.")
+        )
     open_ends = sorted(
         (
             (room.frontier_m, room.name)
@@ -154,7 +154,9 @@ def _room_notes(plan: RoomPlan) -> list[Note]:
     )
     if open_ends:
         names = _listed([f"{name} ({length:.1f} m)" for length, name in open_ends])
-        told.append(Note(f"Rooms with open frontier, not explored to the end: {names}.", is_warning=False))
+        found_notes.append(
+            Note(f"Rooms with open frontier, not explored to the end: {names}.", is_warning=False)
+        )
     unseen = sorted(
         (
             (1 - room.area_m2 / room.predicted_area_m2, room.name)
@@ -165,13 +167,13 @@ def _room_notes(plan: RoomPlan) -> list[Note]:
     )
     if unseen:
         names = _listed([f"{name} ({percent(part)})" for part, name in unseen])
-        told.append(
+        found_notes.append(
             Note(
-                f"Rooms of which a good part was not seen: predicted, or furniture: {names}.",
+                f"Rooms of which a good part was never seen (predicted, or behind furniture): {names}.",
                 False,
             )
         )
-    return told
+    return found_notes
 
 
 def _shift_notes(results: Run) -> list[Note]:

@@ -76,8 +76,8 @@ class BackProjectedWorld:
             self._layers.add(f"{SEEN_SHARE}/{track}", Scalar(share))
             if area > 0:
                 shown.add(track)
-                text = room_label(track, last, view_side_m, told=percent(min(share, 1.0)))
-                self._layers.show(f"{NAMES}/{track}", Label(tuple(points[room]), text))
+                label = room_label(track, last, view_side_m, text=percent(min(share, 1.0)))
+                self._layers.show(f"{NAMES}/{track}", Label(tuple(points[room]), label))
         for track in sorted(self._named - shown):
             self._layers.clear(f"{NAMES}/{track}")
         self._named = shown

@@ -11,7 +11,7 @@ import rerun.blueprint as rrb
 from rose2_logs.config.run_options import RECORDING_LAYERS
 from rose2_logs.model.occupancy import FloatArray
 from rose2_logs.outputs.rerun.back_projected import BACK_PROJECTED, SEEN_SHARE
-from rose2_logs.outputs.rerun.lanes import FINAL_IOU, FINAL_SHARE, LIVES, SHIFTS
+from rose2_logs.outputs.rerun.lanes import FINAL_IOU, FINAL_SHARE, LANES, SHIFTS
 from rose2_logs.outputs.rerun.world import (
     CLEAN,
     DOORWAYS,
@@ -73,7 +73,7 @@ def make_blueprint(
         if not needed or set(needed) & set(layers)
     ]
     if back_projected:
-        views.insert(1, _map_view("Smoothed rooms", low_m, high_m, (BACK_PROJECTED,)))
+        views.insert(1, _map_view("Rooms projected back", low_m, high_m, (BACK_PROJECTED,)))
     if "spectrum" in layers:
         eye = eye_above(np.array([-1.0, -1.0]), np.array([1.0, 1.0]))
         views.append(
@@ -132,7 +132,7 @@ def _map_view(
     overrides: dict[rr.EntityPath | str, Overrides] = {
         path: [rrb.EntityBehavior(visible=False)] for path in hidden
     }
-    # The way so far: the pieces of all maps up to the present one.
+    # The path so far: the pieces of all maps up to the present one.
     overrides[PATH] = [*overrides.get(PATH, []), _up_to_now()]
     return rrb.Spatial3DView(
         name=name,
@@ -188,4 +188,4 @@ def _curves(
 
 
 def _lives() -> rrb.StateTimelineView:
-    return rrb.StateTimelineView(name="Lives of rooms", origin=LIVES, time_view=_axis())
+    return rrb.StateTimelineView(name="Rooms over the run", origin=LANES, time_view=_axis())

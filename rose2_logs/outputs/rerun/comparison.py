@@ -202,13 +202,13 @@ def _document(comparison: LayoutComparison) -> str:
     lengths = "\n".join(
         f"| {status} | {length:.1f} m | {WALL_STATUSES[status]} |" for status, length in walls.items()
     )
-    told = f"Floor overlaps {comparison.floor_iou:.0%}, rooms {comparison.rooms_iou:.0%}."
+    verdict = f"Floor overlaps {comparison.floor_iou:.0%}, rooms {comparison.rooms_iou:.0%}."
     if not comparison.same_building:
-        told = f"**These do not seem to be two runs in one building.** {told}"
+        verdict = f"**These do not seem to be two runs in one building.** {verdict}"
     elif comparison.ambiguous:
-        told = f"**B may lie wrongly: another way fits about as well.** {told}"
+        verdict = f"**B may lie wrongly: another way fits about as well.** {verdict}"
     return (
-        f"A: {comparison.a.name}, B: {comparison.b.name}\n\n{told}\n\n"
+        f"A: {comparison.a.name}, B: {comparison.b.name}\n\n{verdict}\n\n"
         f"| rooms | | |\n|---|---|---|\n{counts}\n\n"
         f"| walls | | |\n|---|---|---|\n{lengths}\n\n"
         "Missing walls are red, new ones blue, moved ones orange.\n"

@@ -12,14 +12,14 @@ from rose2_logs.outputs.rerun.layers import Instant, time_columns
 from rose2_logs.tracking.convergence import Convergence
 from rose2_logs.tracking.track_history import SnapshotRef
 
-LIVES, FINAL_SHARE, FINAL_IOU = "/room", "/run/final_share", "/run/final_iou"
+LANES, FINAL_SHARE, FINAL_IOU = "/room", "/run/final_share", "/run/final_iou"
 SHIFTS = "/run/map_shifted"
 """Marks upon the curve of coverage where the whole map shifted."""
 LOST = ""
 """Ends a state: a gap in the lane."""
 
 
-class Lives:
+class TrackLanes:
     """Gathers when which rooms were there: some numbers a map.
 
     Parameters
@@ -52,7 +52,7 @@ class Lives:
         number = {instant.snapshot: index for index, instant in enumerate(instants)}
         for track, turns in sorted(self._turns.items()):
             changes = self._changes(track, turns, number, convergence)
-            path = f"{LIVES}/{track:03d}"
+            path = f"{LANES}/{track:03d}"
             tints = state_colors(track)
             self._recording.log(
                 path,

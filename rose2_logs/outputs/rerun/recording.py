@@ -18,7 +18,7 @@ from rose2_logs.outputs.rerun.back_projected import BackProjectedWorld
 from rose2_logs.outputs.rerun.blueprint import COVERAGE_UNIT, make_blueprint, view_side_m
 from rose2_logs.outputs.rerun.columns import Entry, Scalar
 from rose2_logs.outputs.rerun.disk import abandon, require_space
-from rose2_logs.outputs.rerun.lanes import FINAL_IOU, FINAL_SHARE, SHIFTS, Lives
+from rose2_logs.outputs.rerun.lanes import FINAL_IOU, FINAL_SHARE, SHIFTS, TrackLanes
 from rose2_logs.outputs.rerun.layers import CHUNK_BYTES, Layers
 from rose2_logs.outputs.rerun.summary import summary_text
 from rose2_logs.outputs.rerun.world import World
@@ -109,7 +109,7 @@ class RerunRecording(Sink):
         self._stream.set_log_time_enabled(False)
         self._stream.set_log_tick_enabled(False)
         self._world = World(self._layers, self._stream, self._wanted)
-        self._lanes = Lives(self._stream)
+        self._lanes = TrackLanes(self._stream)
         for path, (name, color) in CURVES.items():
             self._stream.log(path, rr.SeriesLines(names=name, colors=[color], widths=2), static=True)
         jumps = rr.SeriesPoints(

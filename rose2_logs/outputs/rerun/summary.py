@@ -46,7 +46,7 @@ def summary_text(info: RunInfo, summary: RunSummary) -> str:
     )
     text += _worth_a_look(histories)
     rows = [
-        "| room | area, m² | first seen | shape right | area settled | walls |",
+        "| room | area, m² | first seen | shape final | area final | walls |",
         "|--:|--:|--:|--:|--:|--:|",
     ]
     for track in histories.in_last_map:
@@ -60,9 +60,9 @@ def summary_text(info: RunInfo, summary: RunSummary) -> str:
         )
     text.append("\n".join(rows))
     text.append(
-        "Percent of coverage: when the room was first seen; when its shape with the unseen part first "
-        "overlapped its last one by 0.8; from when on its area was within 10 % of its last. "
-        "Walls: share of its outline that walls back. "
+        "Percent of coverage: when the room was first seen; when its shape, including the unseen part, first "
+        "overlapped its final shape by 0.8; since when its area has been within 10 % of the final one. "
+        "Walls: share of its outline that is supported by walls. "
         f"On the timeline `coverage`, {1 / COVERAGE_UNIT:.0f} is 100 %."
     )
     about = {
@@ -81,23 +81,23 @@ def summary_text(info: RunInfo, summary: RunSummary) -> str:
 
 def _worth_a_look(histories: TrackHistories) -> list[str]:
     """Tell which rooms are unsure, and where the whole map shifted."""
-    told = []
+    lines = []
     shares = [(histories.tracks[track].wall_support, track) for track in histories.in_last_map]
     unsure = sorted((share, track) for share, track in shares if share is not None and is_unsure(share))
     if unsure:
         named = ", ".join(f"{track}{UNSURE_SIGN} ({_percent(share)})" for share, track in unsure[:NAMED_MOST])
         more = f" and {len(unsure) - NAMED_MOST} more" if len(unsure) > NAMED_MOST else ""
-        told.append(f"**Unsure**, with little wall around: room {named}{more}.")
+        lines.append(f"**Unsure**, with little of the outline supported by walls: room {named}{more}.")
     if histories.largest_shift is not None:
         at, motion = histories.largest_shift
         x, y = motion.shift_xy_m
-        told.append(
+        lines.append(
             f"**The whole map shifted** {'once' if histories.shifts == 1 else f'{histories.shifts} times'}, "
             "most by "
             f"{math.hypot(x, y):.2f} m and {math.degrees(motion.turn_rad):+.1f}° at {_percent(at.coverage)} "
             "coverage: loop closures, or trouble of SLAM."
         )
-    return told
+    return lines
 
 
 def _percent(share: float) -> str:

@@ -18,15 +18,15 @@ from urllib.parse import quote
 from rose2_logs.errors import LogError, OutputError
 
 VIEWER_PORT = 9876
-"""Where Rerun's viewer listens unless told otherwise."""
+"""Where Rerun's viewer listens by default."""
 VIEWER_START_S, VIEWER_SETTLE_S = 30.0, 1.0
 PAGE_PORT = 9090
-"""Where Rerun serves its web viewer unless told otherwise."""
+"""Where Rerun serves its web viewer by default."""
 SERVER_MEMORY = "50%"
 SCREENS = ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET")
 """Variables that tell of a screen."""
 RERUN = (sys.executable, "-m", "rerun", "--bind", "127.0.0.1")
-"""Rerun's servers answer the whole network unless they are told otherwise."""
+"""Rerun's servers answer the whole network by default."""
 
 
 def open_viewer(port: int) -> str:

@@ -26,7 +26,7 @@ DOOR_COLOR, PATH_COLOR, ROBOT_COLOR = (230, 90, 20), (20, 90, 200), (200, 20, 60
 LINE_COLOR, VORONOI_COLOR, DIRECTION_COLOR = (60, 110, 230), (150, 20, 150), (255, 190, 40)
 UNCLUSTERED_COLOR = (130, 130, 130)
 STRONG_EDGE, WEAK_EDGE = (20, 20, 90), (80, 165, 235)
-"""Edges that walls cover all along, and not at all; told apart without seeing red or green too."""
+"""Edges that walls cover all along, and not at all; which can be distinguished without seeing red and green."""
 OUTLINE_SHADE, SEGMENT_SHADE = 0.6, 0.75
 """Share of the color of a fill that its outline has, and of a track's that a wall's segments have."""
 PATH_GAP_M = 2.0
@@ -172,14 +172,14 @@ class World:
             self._log_lines(VORONOI, analysis.voronoi_m)
 
     def _log_path(self, path: FloatArray) -> None:
-        """Log the way since the map before; the view shows all that came before with it."""
+        """Log the robot's path since the map before; the view shows it together with all earlier pieces."""
         if not len(path):
             return
-        way = path if self._pose is None else np.concatenate([self._pose[None], path])
+        poses = path if self._pose is None else np.concatenate([self._pose[None], path])
         self._pose = path[-1]
-        far = np.hypot(*np.diff(way[:, :2], axis=0).T) > PATH_GAP_M
-        lengths = np.diff([0, *np.flatnonzero(far) + 1, len(way)])
-        self._layers.add(PATH, Strips(lifted(way[:, :2], HEIGHTS.index(PATH)), lengths.astype(np.int32)))
+        far = np.hypot(*np.diff(poses[:, :2], axis=0).T) > PATH_GAP_M
+        lengths = np.diff([0, *np.flatnonzero(far) + 1, len(poses)])
+        self._layers.add(PATH, Strips(lifted(poses[:, :2], HEIGHTS.index(PATH)), lengths.astype(np.int32)))
         tip, back, side = ROBOT_LENGTH_M / 2, -ROBOT_LENGTH_M / 2, ROBOT_WIDTH_M / 2
         head = np.array([[tip, 0], [back, side], [0.6 * back, 0], [back, -side], [tip, 0]])
         cosine, sine = np.cos(self._pose[2]), np.sin(self._pose[2])
@@ -212,17 +212,17 @@ def label_style() -> rr.Points3D:
 
 
 def room_label(
-    track: int, area_m2: float, view_side_m: float, *, unsure: bool = False, told: str | None = None
+    track: int, area_m2: float, view_side_m: float, *, unsure: bool = False, text: str | None = None
 ) -> str:
     """Name a room: number and area in one line, the number alone if these would cover its neighbors.
 
-    The viewer cuts labels of several lines down to the first one where there are many. `told` stands in place
+    The viewer cuts labels of several lines down to the first one where there are many. `text` stands in place
     of the area where that is not what matters.
     """
     number = f"{track}{UNSURE_SIGN if unsure else ''}"
     if area_m2 < NAMED_SHARE * view_side_m**2:
         return number
-    return f"{number}: {told or f'{area_m2:.0f} m²'}"
+    return f"{number}: {text or f'{area_m2:.0f} m²'}"
 
 
 def _height_m(path: str) -> float:

@@ -24,8 +24,8 @@ from rose2_logs.workflows.analyze import RunOptions, analyze_log
 PROJECT = Path(__file__).parents[3]
 GOLDEN = Path(__file__).with_name("golden")
 COVERAGES = (0.3, 0.6, 1.0)
-TABS = ("Smoothed rooms", "Clean map", "Structure score", "Walls", "Faces", "Voronoi graph", "Spectrum")
-PANELS = ("Lives of rooms", "Area, m²", "Seen share", "Count", "Change")
+TABS = ("Rooms projected back", "Clean map", "Structure score", "Walls", "Faces", "Voronoi graph", "Spectrum")
+PANELS = ("Rooms over the run", "Area, m²", "Seen share", "Count", "Change")
 TEXTS = ("Events", "Summary")
 FIRST_MAP_S = 1_700_000_020.0
 """Log time of the sample's first map."""

@@ -16,7 +16,7 @@ from rerun.chunk import RrdReader
 
 from rose2_logs.config.selection import Selection
 from rose2_logs.drawing.palette import track_color
-from rose2_logs.outputs.rerun.back_projected import SmoothedWorld
+from rose2_logs.outputs.rerun.back_projected import BackProjectedWorld
 from rose2_logs.outputs.rerun.layers import Layers
 from rose2_logs.outputs.rerun.pictures import FILL_OPACITY
 from rose2_logs.system.text import percent
@@ -107,10 +107,10 @@ def test_the_outlines_are_those_of_the_last_map_from_the_first_on(result):
 
 
 def test_there_is_a_tab_for_them(result, tmp_path: Path):
-    assert {"Smoothed rooms", "Seen share"} < names_of_views(result.folder / "office.rrd")
+    assert {"Rooms projected back", "Seen share"} < names_of_views(result.folder / "office.rrd")
     options = RunOptions(selection=Selection(max_snapshots=2), annotated_log=False, layers=())
     plain = analyze_log(SAMPLE_LOGS / "office.mcap", tmp_path / "office", options).folder / "office.rrd"
-    assert not {"Smoothed rooms", "Seen share"} & names_of_views(plain)
+    assert not {"Rooms projected back", "Seen share"} & names_of_views(plain)
     paths = {str(chunk.entity_path) for chunk in RrdReader(str(plain)).stream()}
     assert not any("back_projected" in path or "seen" in path for path in paths)
 
@@ -134,7 +134,7 @@ def test_outlines_lie_where_the_rooms_lay_before_the_map_shifted(tmp_path: Path)
     to_last = RigidMotion((0.0, 0.0), (2.0, 1.0), 0.0)
     recording = rr.RecordingStream("test")
     recording.set_sinks(rr.FileSink(str(tmp_path / "run.rrd")))
-    world = SmoothedWorld(Layers(recording), recording)
+    world = BackProjectedWorld(Layers(recording), recording)
     world.log(BackProjectedSnapshot(snapshot, 1.0, found, rooms, (7,), to_last), 10_000, 20.0)
     world.flush()
     recording.disconnect()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import rerun as rr
 
-from rose2_logs.outputs.rerun.lanes import FORMING, LOST, SETTLED, SHAPED, Lives
+from rose2_logs.outputs.rerun.lanes import FORMING, LOST, SETTLED, SHAPED, TrackLanes
 from rose2_logs.outputs.rerun.layers import Instant
 from rose2_logs.tracking.convergence import Convergence
 from rose2_logs.tracking.track_history import SnapshotRef
@@ -16,7 +16,7 @@ def lanes(tmp_path, tracks_of_maps, convergence) -> dict[str, list[tuple[int, st
 
     recording = rr.RecordingStream("test")
     recording.set_sinks(rr.FileSink(str(tmp_path / "run.rrd")))
-    histories = Lives(recording)
+    histories = TrackLanes(recording)
     for index, tracks in enumerate(tracks_of_maps):
         histories.add(Instant(index, index, 10 + index, 100 * index), tracks)
     histories.log(convergence)
