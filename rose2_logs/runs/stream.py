@@ -15,7 +15,6 @@ from rose2_logs.io.log import LogReader
 from rose2_logs.io.poses import RobotPath
 from rose2_logs.model.explored import coarser_for_its_size
 from rose2_logs.model.occupancy import OccupancySnapshot, free_area_m2, is_same_to_analysis
-from rose2_logs.model.room_quality import room_quality
 from rose2_logs.runs.journal import Found, JournaledWorkers
 from rose2_logs.runs.summary import RunTotals
 from rose2_logs.segmentation.pipeline import analyze
@@ -81,7 +80,7 @@ def tracked_snapshots(
             text = f"{reader.info.path}: snapshot {snapshot.index} is left out: {found}"
             log_warning(logger, "snapshot_left_out", text, file=reader.info.path, topic=reader.topic)
             continue
-        analysis, evidence = found
+        analysis = found
         note = coarser_for_its_size(snapshot.geometry, analysis.resolution_m, parameters.occupancy)
         if note is not None and not said:
             logger.warning("snapshot %d and those of its size: %s", snapshot.index, note)
@@ -93,15 +92,14 @@ def tracked_snapshots(
         change = layout.update(analysis.rooms, track_ids, map_motion(events))
         coverage = min(analysis.free_area_m2 / final_free_m2, 1.0) if final_free_m2 > 0 else 0.0
         way = None if path is None else path.until(snapshot.log_time_ns)
-        yield TrackedSnapshot(snapshot, analysis, coverage, track_ids, events, evidence, change, way)
+        yield TrackedSnapshot(snapshot, analysis, coverage, track_ids, events, analysis.quality, change, way)
 
 
 def _analyze_or_refuse(
     snapshot: OccupancySnapshot, parameters: Parameters, method: str, voronoi: bool
 ) -> Found:
     try:
-        analysis = analyze(snapshot, parameters, method, voronoi=voronoi)
-        return analysis, room_quality(snapshot, analysis.rooms, parameters.occupancy)
+        return analyze(snapshot, parameters, method, voronoi=voronoi)
     except InvalidMapError as error:
         return error
     except MemoryError:
