@@ -36,10 +36,10 @@ from rose2_logs.runs.run import Run
 from rose2_logs.segmentation.floor_plan.stage import make_floor_plan
 from rose2_logs.segmentation.pipeline import analyze
 from rose2_logs.segmentation.rose.spectrum import Spectrum, compute_spectrum
-from rose2_logs.segmentation.rose.stage import find_structure
+from rose2_logs.segmentation.rose.stage import find_structure, make_clean_map
 from rose2_logs.segmentation.topology.splitting import split_rooms
 from rose2_logs.segmentation.topology.voronoi import voronoi_graph
-from rose2_logs.segmentation.walls.stage import count_walls, find_walls
+from rose2_logs.segmentation.walls.stage import WallCounter, find_walls
 from rose2_logs.workflows.analyze import RunOptions, analyze_log, seconds_into_log
 from rose2_logs.workflows.compare import compare_runs
 
@@ -183,21 +183,18 @@ def _labels_along(
     """Rooms as faces were joined, as they were split, and the Voronoi graph of these, on the canvas."""
     part = ExploredPart.of(snapshot.cells, snapshot.geometry, parameters.occupancy)
     cell_m = part.resolution_m
-    found = find_structure(
-        part.occupied,
-        part.free_area_m2,
-        cell_m,
-        lambda clean, directions: count_walls(clean, directions, cell_m, parameters.walls),
-        parameters.spectrum,
-    )
+    structure = find_structure(part.occupied, cell_m, parameters.spectrum)
+    directions = structure.directions_rad
+    count = WallCounter(directions, cell_m, parameters.walls)
+    clean = make_clean_map(structure, part.free_area_m2, count, parameters.spectrum)
     walls = find_walls(
-        found.supported, found.clean, found.attached, found.directions_rad, cell_m, parameters.walls
+        structure.supported, clean.cells, clean.attached, directions, cell_m, parameters.walls
     )
-    first = float(found.directions_rad[0])
+    first = float(directions[0])
     lines = walls.lines.ends_m
     plan = make_floor_plan(lines, walls.walls, part.free, first, cell_m, parameters.floor_plan)
-    split = split_rooms(plan.labels, walls.walls, lines, found.directions_rad, cell_m, parameters.topology)
-    cells = voronoi_graph(split, walls.walls, cell_m, parameters.topology.split_min_clearance_m / 2)
+    split = split_rooms(plan.labels, walls.walls, lines, directions, cell_m, parameters.topology)
+    cells = voronoi_graph(split, walls.walls, cell_m, parameters.topology.split_min_clearance_m / 2, parameters.topology)
     graph = np.zeros(split.shape, np.int32)
     graph[cells[:, 0], cells[:, 1]] = 1
     return part.labels(plan.labels), part.labels(split), part.labels(graph) > 0

@@ -7,9 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 from shapely.geometry import Polygon
+from shapely.geometry.base import BaseGeometry
 
 from rose2_logs.model.occupancy import BoolArray, CellValues, FloatArray, GridGeometry, OccupancySnapshot
-from rose2_logs.model.rooms import RoomMap
+from rose2_logs.model.room_quality import RoomQuality
+from rose2_logs.model.rooms import Doorway, RoomMap
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +38,10 @@ class Structure:
     scores: CellValues[np.float32]
     clean_cells: CellValues[np.bool_]
     spectrum: NDArray[np.uint8]
+
+    def __repr__(self) -> str:
+        degrees = ", ".join(f"{angle:.1f}" for angle in np.degrees(self.directions_rad))
+        return f"Structure(directions of {degrees} degrees, threshold={self.threshold:.2f})"
 
     @property
     def score(self) -> NDArray[np.float32]:
@@ -75,6 +81,9 @@ class Walls:
     line_direction: NDArray[np.int32]
     line_weight: FloatArray
 
+    def __repr__(self) -> str:
+        return f"Walls({len(self.segments_m)} segments, {len(self.lines_m)} lines)"
+
 
 @dataclass(frozen=True, eq=False)
 class FloorPlan:
@@ -103,6 +112,9 @@ class FloorPlan:
     face_inside: NDArray[np.bool_]
     room_of_face: NDArray[np.int32]
 
+    def __repr__(self) -> str:
+        return f"FloorPlan({len(self.faces)} faces, {len(self.edges_m)} edges)"
+
 
 @dataclass(frozen=True, eq=False)
 class SnapshotAnalysis:
@@ -127,6 +139,8 @@ class SnapshotAnalysis:
         Time per stage.
     voronoi_m : (V, 4) float or None
         Lines x0, y0, x1, y1 of the free space's Voronoi graph, world meters, where it was asked for.
+    quality : RoomQuality or None
+        How sure the rooms are; None where it was not measured.
     """
 
     index: int
@@ -141,6 +155,35 @@ class SnapshotAnalysis:
     floor_plan: FloorPlan | None
     seconds: dict[str, float]
     voronoi_m: FloatArray | None = None
+    quality: RoomQuality | None = None
+
+    def __repr__(self) -> str:
+        parts = [f"index={self.index}", repr(self.rooms)]
+        if self.walls is not None:
+            parts.append(f"{len(self.walls.segments_m)} wall segments")
+        if self.floor_plan is not None:
+            parts.append(f"{len(self.floor_plan.faces)} faces")
+        return f"SnapshotAnalysis({', '.join(parts)})"
+
+    @property
+    def labels(self) -> NDArray[np.int32]:
+        """Rooms (H, W) of the cells: 0 = no room, 1..R."""
+        return self.rooms.labels
+
+    @property
+    def polygons(self) -> tuple[BaseGeometry, ...]:
+        """Shape of each room with its predicted part, world meters."""
+        return self.rooms.polygons
+
+    @property
+    def areas_m2(self) -> FloatArray:
+        """Area (R,) of the labeled cells of each room."""
+        return self.rooms.areas_m2
+
+    @property
+    def doorways(self) -> tuple[Doorway, ...]:
+        """Passages between rooms."""
+        return self.rooms.doorways
 
     def again_for(self, snapshot: OccupancySnapshot) -> SnapshotAnalysis:
         """Return the same for another snapshot of the same free and occupied cells at the same place."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
@@ -60,6 +60,10 @@ class ExploredPart:
         any_occupied: BoolArray = np.any(_blocks(occupied, factor), axis=(1, 3))
         mostly_free = 2 * np.count_nonzero(_blocks(free, factor), axis=(1, 3)) >= factor**2
         return cls(geometry, window, factor, mostly_free & ~any_occupied, any_occupied, free, occupied)
+
+    def in_cells(self) -> ExploredPart:
+        """Return the same part with every cell a block of its own."""
+        return replace(self, factor=1, free=self.known_free, occupied=self.known_occupied)
 
     @property
     def resolution_m(self) -> float:

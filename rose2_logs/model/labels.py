@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -44,19 +46,6 @@ def renumber_in_place(labels: NDArray[np.int32], number: NDArray[np.int32]) -> N
     return labels
 
 
-def roots(parent: NDArray[np.intp]) -> NDArray[np.intp]:
-    """What each of N regions (N,) belongs to after all joins.
-
-    Parameters
-    ----------
-    parent : (N,) int
-        The region that each was made part of; itself where it was not.
-    """
-    while not np.array_equal(above := parent[parent], parent):
-        parent = above
-    return parent
-
-
 def label_sizes(labels: NDArray[np.integer], count: int) -> NDArray[np.int64]:
     """Number of cells (count + 1,) of each label 0..count of an image.
 
@@ -66,6 +55,54 @@ def label_sizes(labels: NDArray[np.integer], count: int) -> NDArray[np.int64]:
     for rows in np.array_split(labels, max(1, labels.size // COUNTED_AT_ONCE)):
         sizes += np.bincount(rows.ravel(), minlength=count + 1)
     return sizes
+
+
+@dataclass(frozen=True, eq=False)
+class Contacts:
+    """Sides of cells at which two labels of an image meet, one entry per side.
+
+    Attributes
+    ----------
+    low, high : (N,) int
+        The two labels, the lower one first.
+    first, second : (N,) int
+        Index into the flattened image of the cell before the side and of the one behind it, in its row or
+        column: sides within rows come before sides within columns, each in reading order.
+    """
+
+    low: NDArray[np.integer]
+    high: NDArray[np.integer]
+    first: NDArray[np.intp]
+    second: NDArray[np.intp]
+
+    def chosen(self, which: BoolArray) -> Contacts:
+        """Return some of them, by a mask (N,)."""
+        return Contacts(self.low[which], self.high[which], self.first[which], self.second[which])
+
+    def pairs(self) -> tuple[list[tuple[int, int]], NDArray[np.intp]]:
+        """Distinct pairs of labels that meet, ascending, and the position (N,) of each side's pair there."""
+        span = int(self.high.max(initial=0)) + 1
+        keys, pair = np.unique(self.low.astype(np.int64) * span + self.high, return_inverse=True)
+        low, high = np.divmod(keys, span)
+        return list(zip(low.tolist(), high.tolist(), strict=True)), pair
+
+
+def contacts(labels: NDArray[np.integer]) -> Contacts:
+    """Find where labels of an image (H, W) meet; 0 counts as any other label."""
+    width = labels.shape[1]
+    flat = labels.ravel()
+    firsts, seconds = [], []
+    for before, behind, step in (
+        (labels[:, :-1], labels[:, 1:], 1),
+        (labels[:-1], labels[1:], width),
+    ):
+        row, column = np.nonzero(before != behind)
+        cell = row * width + column
+        firsts.append(cell)
+        seconds.append(cell + step)
+    first, second = np.concatenate(firsts), np.concatenate(seconds)
+    one, other = flat[first], flat[second]
+    return Contacts(np.minimum(one, other), np.maximum(one, other), first, second)
 
 
 def straight_runs(
@@ -103,7 +140,7 @@ def number_rooms(
     Returns
     -------
     number : (N,) int32
-        Number of each label: ``number[labels]`` is the renumber_in_place image.
+        Number of each label: ``number[labels]`` is the image with new numbers.
     """
     size = label_sizes(labels, highest)
     keep = size * resolution_m**2 >= minimum_m2

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from dataclasses import dataclass, replace
 from typing import Generic, TypeVar
 
@@ -16,6 +17,7 @@ BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.int_]
 Scalar = TypeVar("Scalar", bound=np.generic)
 UNKNOWN = -1
+HIGHEST_PERCENT = 100
 SMALLEST_CELL_M, LARGEST_CELL_M = 1e-4, 100.0
 """Sides of cells that maps are made of, in meters: a laser's noise is above, a building below."""
 FARTHEST_ORIGIN_M = 1e8
@@ -50,6 +52,13 @@ class GridGeometry:
     shape: tuple[int, int]
 
     def __post_init__(self) -> None:
+        try:
+            height, width = map(operator.index, self.shape)
+        except (TypeError, ValueError):
+            height = width = -1
+        if height < 0 or width < 0:
+            raise InvalidMapError(f"a grid's shape must be rows and columns, not {self.shape!r}")
+        object.__setattr__(self, "shape", (height, width))
         if not SMALLEST_CELL_M <= self.resolution_m <= LARGEST_CELL_M:
             raise InvalidMapError(
                 f"the map's resolution is {self.resolution_m:g} m; it must be positive, from "
@@ -70,6 +79,11 @@ class GridGeometry:
         x, y = self.grid_to_world(np.array([columns.start, rows.start]) * self.resolution_m).tolist()
         shape = (-(-(rows.stop - rows.start) // block), -(-(columns.stop - columns.start) // block))
         return replace(self, resolution_m=self.resolution_m * block, origin_xy_m=(x, y), shape=shape)
+
+    @property
+    def size_text(self) -> str:
+        """Columns, rows and side of the cells, for people."""
+        return f"{self.shape[1]} x {self.shape[0]} cells of {self.resolution_m:g} m"
 
     @property
     def cell_area_m2(self) -> float:
@@ -124,7 +138,8 @@ class OccupancySnapshot:
     topic : str
         Topic (or file) that the map comes from.
     cells : (H, W) int8, read-only
-        -1 unknown, 0..100 occupancy in percent; row 0 at the origin, as in the message.
+        -1 unknown, 0..100 occupancy in percent; row 0 at the origin, as in the message. Other integers are
+        converted.
     geometry : GridGeometry
         Where the grid lies in the world.
     repeats_before : int
@@ -133,7 +148,7 @@ class OccupancySnapshot:
     Raises
     ------
     InvalidMapError
-        If `cells` has not the geometry's shape.
+        If `cells` has not the geometry's shape, or is not made of integers from -1 to 100.
     """
 
     index: int
@@ -144,13 +159,27 @@ class OccupancySnapshot:
     geometry: GridGeometry
     repeats_before: int = 0
 
+    def __repr__(self) -> str:
+        return f"OccupancySnapshot(index={self.index}, topic={self.topic!r}, {self.geometry.size_text})"
+
     def __post_init__(self) -> None:
-        if self.cells.shape != self.geometry.shape:
+        given = np.asarray(self.cells)
+        if given.shape != self.geometry.shape:
             raise InvalidMapError(
-                f"map {self.index} of {self.topic}: data of shape {self.cells.shape} "
+                f"map {self.index} of {self.topic}: data of shape {given.shape} "
                 f"but its header says {self.geometry.shape}"
             )
-        cells = self.cells.view()
+        if given.dtype.kind not in "iu":
+            raise InvalidMapError(
+                f"map {self.index} of {self.topic}: cells must be integers, -1 for unknown and 0 to 100 percent, "
+                f"not {given.dtype}"
+            )
+        if given.size and not (UNKNOWN <= given.min() and given.max() <= HIGHEST_PERCENT):
+            raise InvalidMapError(
+                f"map {self.index} of {self.topic}: cells must lie between {UNKNOWN} and {HIGHEST_PERCENT}, "
+                f"not from {given.min()} to {given.max()}"
+            )
+        cells = given.astype(np.int8, copy=False).view()
         cells.flags.writeable = False
         object.__setattr__(self, "cells", cells)
 

@@ -8,30 +8,24 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from rose2_logs.config.parameters import OccupancyParameters
+from rose2_logs.config.parameters import QualityParameters
 from rose2_logs.model.explored import ExploredPart
-from rose2_logs.model.labels import known_window
+from rose2_logs.model.labels import contacts, known_window
 from rose2_logs.model.occupancy import UNKNOWN, BoolArray, FloatArray, OccupancySnapshot
 from rose2_logs.model.rooms import RoomMap
 
-OUTLINE_STEP_M = 0.1
-"""Outlines are looked at every so many meters: two cells of usual maps."""
-UNSURE_BELOW = 0.7
-"""Rooms whose outline walls back less are unsure: doorways alone take an ordinary room to about 0.9."""
 UNSURE_SIGN = "?"
 """Behind the number of an unsure room, wherever its name is drawn."""
-WALL_REACH_M = 0.2
-"""An outline is backed by occupied cells this near: it runs in the middle of walls of usual thickness."""
 
 
-def is_unsure(wall_support: float | None) -> bool:
+def is_unsure(wall_support: float | None, unsure_below: float = QualityParameters.unsure_below) -> bool:
     """Whether little of a room's outline is known to be wall; of what was not measured nothing is said."""
-    return wall_support is not None and wall_support < UNSURE_BELOW
+    return wall_support is not None and wall_support < unsure_below
 
 
-def unsure_sign(wall_support: float | None) -> str:
+def unsure_sign(wall_support: float | None, unsure_below: float = QualityParameters.unsure_below) -> str:
     """Return what stands behind the number of a room: the sign where it is unsure."""
-    return UNSURE_SIGN if is_unsure(wall_support) else ""
+    return UNSURE_SIGN if is_unsure(wall_support, unsure_below) else ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,8 +35,8 @@ class RoomQuality:
     Attributes
     ----------
     wall_support : (R,) float
-        Share of each room's outline, with its predicted part, that occupied cells back; NaN for a room
-        without outline. Doorways are not backed, so an ordinary room stays a little below 1.
+        Share of each room's outline, with its predicted part, that occupied cells support; NaN for a room
+        without outline. Doorways are not supported, so an ordinary room stays a little below 1.
     frontier_m : (R,) float
         Length of each room's open frontier: cell sides between its free cells and unknown ones, meters.
     """
@@ -51,28 +45,30 @@ class RoomQuality:
     frontier_m: FloatArray
 
 
-def room_quality(snapshot: OccupancySnapshot, rooms: RoomMap, parameters: OccupancyParameters) -> RoomQuality:
-    """Measure how far the outlines of rooms are backed by walls, and their open frontier.
+def room_quality(
+    snapshot: OccupancySnapshot, explored: ExploredPart, rooms: RoomMap, parameters: QualityParameters
+) -> RoomQuality:
+    """Measure how far the outlines of rooms are supported by walls, and their open frontier.
 
     Parameters
     ----------
     snapshot : OccupancySnapshot
         The map.
+    explored : ExploredPart
+        Its explored part.
     rooms : RoomMap
         The rooms found in it, on its grid.
-    parameters : OccupancyParameters
-        Which cells are walls.
+    parameters : QualityParameters
     """
-    return RoomQuality(_wall_shares(snapshot, rooms, parameters), _frontiers(snapshot, rooms))
+    return RoomQuality(_wall_shares(explored, rooms, parameters), _frontiers(snapshot, rooms))
 
 
-def _wall_shares(snapshot: OccupancySnapshot, rooms: RoomMap, parameters: OccupancyParameters) -> FloatArray:
-    explored = ExploredPart.of(snapshot.cells, snapshot.geometry, parameters)
-    near = _within(explored.occupied, WALL_REACH_M / explored.resolution_m)
-    grid = snapshot.geometry.part(explored.window, explored.factor)
+def _wall_shares(explored: ExploredPart, rooms: RoomMap, parameters: QualityParameters) -> FloatArray:
+    near = _within(explored.occupied, parameters.wall_reach_m / explored.resolution_m)
+    grid = explored.geometry.part(explored.window, explored.factor)
     shares = np.full(len(rooms), np.nan)
     for number, polygon in enumerate(rooms.polygons):
-        points = _points_along(polygon, OUTLINE_STEP_M)
+        points = _points_along(polygon, parameters.outline_step_m)
         if len(points) == 0:
             continue
         row, column = np.moveaxis(grid.world_to_cell(points), -1, 0)
@@ -114,12 +110,6 @@ def _frontiers(snapshot: OccupancySnapshot, rooms: RoomMap) -> FloatArray:
     # What lies beyond the canvas is not known to be unknown, so only neighbors on it count.
     window = tuple(slice(max(part.start - 1, 0), part.stop + 1) for part in known)
     labels, unknown = rooms.labels[window], snapshot.cells[window] == UNKNOWN
-    sides = np.zeros(len(rooms) + 1, np.int64)
-    for here, beside in (
-        ((slice(1, None), slice(None)), (slice(None, -1), slice(None))),
-        ((slice(None), slice(1, None)), (slice(None), slice(None, -1))),
-    ):
-        for one, other in ((here, beside), (beside, here)):
-            open_to = labels[one][unknown[other]]
-            sides += np.bincount(open_to, minlength=len(sides))
+    meet = contacts(np.where(unknown, UNKNOWN, labels))
+    sides = np.bincount(meet.high[(meet.low == UNKNOWN) & (meet.high > 0)], minlength=len(rooms) + 1)
     return sides[1:].astype(np.float64) * snapshot.geometry.resolution_m

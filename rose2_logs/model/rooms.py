@@ -63,6 +63,9 @@ class RoomMap:
     areas_m2: FloatArray
     doorways: tuple[Doorway, ...] = ()
 
+    def __repr__(self) -> str:
+        return f"RoomMap({len(self)} rooms, {len(self.doorways)} doorways, {self.geometry.size_text})"
+
     def __post_init__(self) -> None:
         labels = self.labels.view()
         labels.flags.writeable = False
@@ -122,10 +125,10 @@ class RoomMap:
         parts, room = shapely.get_parts(np.array(self.polygons, object), return_index=True)
         points, ring = shapely.get_coordinates(shapely.get_exterior_ring(parts), return_index=True)
         rings = np.split(points, np.flatnonzero(np.diff(ring)) + 1)
-        found: tuple[list[FloatArray], ...] = tuple([] for _ in self.polygons)
+        of_room: tuple[list[FloatArray], ...] = tuple([] for _ in self.polygons)
         for number, corners in zip(room[np.unique(ring)].tolist(), rings, strict=False):
-            found[number].append(corners)
-        return found
+            of_room[number].append(corners)
+        return of_room
 
     @property
     def adjacency(self) -> tuple[tuple[int, int], ...]:

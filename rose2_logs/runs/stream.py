@@ -17,7 +17,6 @@ from rose2_logs.io.poses import RobotPath
 from rose2_logs.model.analysis import SnapshotAnalysis
 from rose2_logs.model.explored import coarser_for_its_size
 from rose2_logs.model.occupancy import OccupancySnapshot, free_area_m2, is_same_to_analysis
-from rose2_logs.model.room_quality import RoomQuality, room_quality
 from rose2_logs.runs.journal import Found, JournaledWorkers
 from rose2_logs.segmentation.pipeline import analyze
 from rose2_logs.system.warnings import log_warning
@@ -148,11 +147,9 @@ class TrackedStream:
                 text = f"{self._source}: snapshot {snapshot.index} is left out: {found}"
                 log_warning(logger, "snapshot_left_out", text, file=self._source, topic=self._topic)
             else:
-                yield self._step(snapshot, *found)
+                yield self._step(snapshot, found)
 
-    def _step(
-        self, snapshot: OccupancySnapshot, analysis: SnapshotAnalysis, quality: RoomQuality
-    ) -> TrackedSnapshot:
+    def _step(self, snapshot: OccupancySnapshot, analysis: SnapshotAnalysis) -> TrackedSnapshot:
         note = coarser_for_its_size(snapshot.geometry, analysis.resolution_m, self._occupancy)
         if note is not None and not self._has_told_coarser:
             logger.warning("snapshot %d and those of its size: %s", snapshot.index, note)
@@ -164,6 +161,7 @@ class TrackedStream:
         change = self._layout.update(analysis.rooms, track_ids, map_motion(events))
         coverage = self._coverage(analysis.free_area_m2)
         poses = None if self._path is None else self._path.until(snapshot.log_time_ns)
+        quality = analysis.quality
         return TrackedSnapshot(snapshot, analysis, coverage, track_ids, events, quality, change, poses)
 
     def _coverage(self, free_m2: float) -> float:
@@ -177,8 +175,7 @@ def _analyze_or_refuse(
     snapshot: OccupancySnapshot, parameters: Parameters, method: str, voronoi: bool
 ) -> Found:
     try:
-        analysis = analyze(snapshot, parameters, method, voronoi=voronoi)
-        return analysis, room_quality(snapshot, analysis.rooms, parameters.occupancy)
+        return analyze(snapshot, parameters, method, voronoi=voronoi)
     except InvalidMapError as error:
         return error
     except MemoryError:

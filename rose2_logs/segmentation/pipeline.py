@@ -1,49 +1,58 @@
-"""One snapshot in, its building's structure and rooms out; reads like the paper."""
+"""One map in, its building's structure and rooms out; reads like the paper."""
 
 from __future__ import annotations
 
 import time
-from functools import partial
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from rose2_logs.config.parameters import Parameters
+from rose2_logs.config.parameters import FloorPlanParameters, Parameters, TopologyParameters
 from rose2_logs.errors import ParameterError
 from rose2_logs.model.analysis import FloorPlan, SnapshotAnalysis, Structure, Walls
 from rose2_logs.model.explored import ExploredPart
-from rose2_logs.model.labels import distinct_labels, label_sizes, number_rooms, renumber_in_place
-from rose2_logs.model.occupancy import BoolArray, OccupancySnapshot
+from rose2_logs.model.labels import label_sizes
+from rose2_logs.model.occupancy import FloatArray, OccupancySnapshot
 from rose2_logs.model.outlines import room_outlines
+from rose2_logs.model.room_quality import room_quality
 from rose2_logs.model.rooms import Doorway, RoomMap
 from rose2_logs.segmentation.baselines.stage import BASELINES, segment_by_baseline
-from rose2_logs.segmentation.floor_plan.doorways import find_doorways
-from rose2_logs.segmentation.floor_plan.rooms import adopt_left_out, predicted_shapes, settle_borders
 from rose2_logs.segmentation.floor_plan.stage import FloorPlanResult, make_floor_plan
-from rose2_logs.segmentation.rose.stage import RoseResult, find_structure
+from rose2_logs.segmentation.rooms.doorways import find_doorways
+from rose2_logs.segmentation.rooms.stage import make_rooms
+from rose2_logs.segmentation.rose.stage import CleanMap, StructureResult, find_structure, make_clean_map
 from rose2_logs.segmentation.topology.splitting import split_rooms
 from rose2_logs.segmentation.topology.voronoi import voronoi_lines
-from rose2_logs.segmentation.walls.stage import WallResult, count_walls, find_walls
+from rose2_logs.segmentation.walls.stage import WallCounter, WallResult, find_walls
 
 METHODS = ("rose2", *BASELINES)
 """Names of the segmentation methods: the paper's, and those that it compares with."""
 
 
 def analyze(
-    snapshot: OccupancySnapshot, parameters: Parameters, method: str = "rose2", *, voronoi: bool = False
+    snapshot: OccupancySnapshot,
+    parameters: Parameters | Mapping[str, Any] | None = None,
+    method: str = "rose2",
+    *,
+    voronoi: bool = False,
 ) -> SnapshotAnalysis:
     """Segment one map into rooms.
 
     Parameters
     ----------
     snapshot : OccupancySnapshot
-    parameters : Parameters
+        The map.
+    parameters : Parameters or mapping, optional
+        As `Parameters.from_any` takes them; by default all defaults.
     method : str
         One of `METHODS`.
     voronoi : bool
-        Whether to return the Voronoi graph as well, which nothing but looking at it needs.
+        Whether to return the Voronoi graph as well, which is only for looking at.
 
     Returns
     -------
@@ -53,77 +62,102 @@ def analyze(
     Raises
     ------
     ParameterError
-        If `method` is none of `METHODS`.
+        If `method` is none of `METHODS`, or a parameter cannot be used.
     """
+    parameters = Parameters.from_any(parameters)
     if method not in METHODS:
         raise ParameterError(f"no method {method!r}; there are: {', '.join(METHODS)}")
     watch = _StopWatch()
-    geometry = snapshot.geometry
-    # The baselines' parameters count cells, so they take the map as it is.
-    occupancy = parameters.occupancy.unblocked() if method in BASELINES else parameters.occupancy
-    explored = ExploredPart.of(snapshot.cells, geometry, occupancy)
-    resolution, free, occupied = explored.resolution_m, explored.free, explored.occupied
-    free_m2 = explored.free_area_m2
+    explored = ExploredPart.of(snapshot.cells, snapshot.geometry, parameters.occupancy)
     watch.lap("prepare")
+    if method == "rose2":
+        stages = _analyze_by_rose2(explored, parameters, watch, voronoi=voronoi)
+    else:
+        stages = _analyze_by_baseline(method, explored, parameters, watch)
+    quality = room_quality(snapshot, explored, stages.rooms, parameters.quality)
+    watch.lap("quality")
+    return SnapshotAnalysis(
+        snapshot.index,
+        snapshot.log_time_ns,
+        snapshot.stamp_ns,
+        snapshot.geometry,
+        explored.free_area_m2,
+        stages.resolution_m,
+        stages.rooms,
+        stages.structure,
+        stages.walls,
+        stages.floor_plan,
+        watch.seconds,
+        stages.voronoi_m,
+        quality,
+    )
 
-    analysis = partial(
-        SnapshotAnalysis,
-        index=snapshot.index,
-        log_time_ns=snapshot.log_time_ns,
-        stamp_ns=snapshot.stamp_ns,
-        geometry=geometry,
-        free_area_m2=free_m2,
-        resolution_m=resolution,
-        seconds=watch.seconds,
-    )
-    if method in BASELINES:
-        labels = segment_by_baseline(method, free, resolution, parameters)
-        watch.lap(method)
-        rooms = _room_map(labels, room_outlines(labels, resolution), explored, parameters)
-        watch.lap("rooms")
-        return analysis(rooms=rooms, structure=None, walls=None, floor_plan=None)
-    found = find_structure(
-        occupied,
-        free_m2,
-        resolution,
-        lambda clean, directions: count_walls(clean, directions, resolution, parameters.walls),
-        parameters.spectrum,
-    )
-    directions, structure = found.directions_rad, _structure(found, explored)
+
+@dataclass(frozen=True, eq=False)
+class _Stages:
+    """What the stages of a method give, as in `SnapshotAnalysis`."""
+
+    resolution_m: float
+    rooms: RoomMap
+    structure: Structure | None = None
+    walls: Walls | None = None
+    floor_plan: FloorPlan | None = None
+    voronoi_m: FloatArray | None = None
+
+
+def _analyze_by_rose2(
+    explored: ExploredPart, parameters: Parameters, watch: _StopWatch, *, voronoi: bool
+) -> _Stages:
+    """Go through the stages of the paper."""
+    free, occupied, cell_m = explored.free, explored.occupied, explored.resolution_m
+
+    # A: dominant directions and clean map
+    scored = find_structure(occupied, cell_m, parameters.spectrum)
+    directions = scored.directions_rad
+    count_walls = WallCounter(directions, cell_m, parameters.walls)
+    clean = make_clean_map(scored, explored.free_area_m2, count_walls, parameters.spectrum)
+    structure = _structure(scored, clean, explored)
     watch.lap("structure")
-    walls = find_walls(found.supported, found.clean, found.attached, directions, resolution, parameters.walls)
-    del found  # what the stages to come need the memory of
+
+    # B: wall segments, wall clusters, representative lines
+    built = find_walls(scored.supported, clean.cells, clean.attached, directions, cell_m, parameters.walls)
+    del scored, clean  # the stages to come need their memory
+    walls, lines_m = built.walls, built.lines.ends_m
     watch.lap("walls")
-    plan = make_floor_plan(
-        walls.lines.ends_m,
-        walls.walls,
-        free,
-        float(directions[0]) if len(directions) else 0.0,
-        resolution,
-        parameters.floor_plan,
-    )
+
+    # C: faces between the lines, joined where no wall divides them
+    strongest = float(directions[0]) if len(directions) else 0.0
+    plan = make_floor_plan(lines_m, walls, free, strongest, cell_m, parameters.floor_plan)
     watch.lap("floor_plan")
-    labels = split_rooms(
-        plan.labels, walls.walls, walls.lines.ends_m, directions, resolution, parameters.topology
-    )
+
+    # D: rooms split at the narrow places of their Voronoi graph, with straight borders and doorways
+    split = split_rooms(plan.labels, walls, lines_m, directions, cell_m, parameters.topology)
     watch.lap("topology")
-    labels, shapes, room_of_face = _finished_rooms(labels, plan, free, resolution, parameters)
-    rooms = _room_map(labels, shapes, explored, parameters)
+    made = make_rooms(split, plan, free, cell_m, parameters.floor_plan)
+    rooms = _room_map(made.labels, made.shapes, explored, parameters.topology)
     watch.lap("rooms")
+
     graph = None
     if voronoi:
-        passage_m = parameters.topology.doorway_min_width_m / 2
         # Clutter does not keep the free space apart.
-        inside = (labels > 0) | (occupied & ~walls.walls)
-        graph = explored.segments(voronoi_lines(inside, walls.walls, resolution, passage_m))
+        inside = (made.labels > 0) | (occupied & ~walls)
+        graph = explored.segments(voronoi_lines(inside, walls, cell_m, parameters.topology))
         watch.lap("voronoi")
-    return analysis(
-        rooms=rooms,
-        voronoi_m=graph,
-        structure=structure,
-        walls=_walls(walls, explored),
-        floor_plan=_floor_plan(plan, room_of_face, explored, parameters),
-    )
+    floor_plan = _floor_plan(plan, made.room_of_face, explored, parameters.floor_plan)
+    return _Stages(cell_m, rooms, structure, _walls(built, explored), floor_plan, graph)
+
+
+def _analyze_by_baseline(
+    method: str, explored: ExploredPart, parameters: Parameters, watch: _StopWatch
+) -> _Stages:
+    """Segment by one of the methods that the paper compares with."""
+    # Their parameters count cells, so they take the map as it is.
+    cells = explored.in_cells()
+    labels = segment_by_baseline(method, cells.free, cells.resolution_m, parameters)
+    watch.lap(method)
+    rooms = _room_map(labels, room_outlines(labels, cells.resolution_m), cells, parameters.topology)
+    watch.lap("rooms")
+    return _Stages(cells.resolution_m, rooms)
 
 
 class _StopWatch:
@@ -139,66 +173,14 @@ class _StopWatch:
         self._last = now
 
 
-def _finished_rooms(
-    labels: NDArray[np.int32],
-    plan: FloorPlanResult,
-    free: BoolArray,
-    resolution_m: float,
-    parameters: Parameters,
-) -> tuple[NDArray[np.int32], list[BaseGeometry], NDArray[np.int32]]:
-    """Labels (H, W) of the rooms with straight borders, their shapes, and the room of each face."""
-    unsettled = adopt_left_out(labels, free, resolution_m, parameters.floor_plan)
-    labels = settle_borders(unsettled, resolution_m, parameters.floor_plan.border_strip_m)
-    number = number_rooms(
-        labels, int(unsettled.max(initial=0)), parameters.floor_plan.room_min_area_m2, resolution_m
-    )
-    labels = renumber_in_place(labels, number)
-    # Which faces are a room's is told by the labels before their borders settled.
-    room_of_face, shapes = _room_shapes(
-        plan, renumber_in_place(unsettled, number), labels, resolution_m, parameters
-    )
-    return labels, shapes, room_of_face
-
-
-def _room_shapes(
-    plan: FloorPlanResult,
-    unsettled: NDArray[np.int32],
-    labels: NDArray[np.int32],
-    resolution_m: float,
-    parameters: Parameters,
-) -> tuple[NDArray[np.int32], list[BaseGeometry]]:
-    """Room of each face, and predicted shapes: a room's faces, or its cells where a split cut faces."""
-    count = int(labels.max(initial=0))
-    group_count = int(plan.group.max(initial=0)) + 1
-    fits = (count + 1) * group_count < 2**31
-    pair_of_cell = unsettled * (np.int32(group_count) if fits else np.int64(group_count))
-    pair_of_cell += plan.labels
-    pairs, _ = distinct_labels(pair_of_cell)
-    del pair_of_cell
-    rooms, groups = np.divmod(pairs, group_count)
-    # A group that was split, or lost cells to a split, has no faces of its own any more.
-    rooms, groups = rooms[rooms > 0], groups[rooms > 0]
-    rooms_in_group = np.bincount(groups, minlength=group_count)
-    room_of_group = np.zeros(len(rooms_in_group), np.int32)
-    whole = rooms_in_group[groups] == 1
-    room_of_group[groups[whole]] = rooms[whole]
-    room_of_face = room_of_group[plan.group]
-    room_of_face[plan.group == 0] = 0
-    shown = np.where(plan.seen >= parameters.floor_plan.shape_min_seen, room_of_face, 0)
-    shapes = list(predicted_shapes(plan.graph, shown, count))
-    # Rooms that a split took from a face are as large as their cells.
-    without = np.array([False, *(shape.is_empty for shape in shapes)])
-    for room, shape in enumerate(room_outlines(np.where(without[labels], labels, 0), resolution_m)):
-        if not shape.is_empty:
-            shapes[room] = shape
-    return room_of_face, shapes
-
-
 def _room_map(
-    labels: NDArray[np.int32], shapes: list[BaseGeometry], explored: ExploredPart, parameters: Parameters
+    labels: NDArray[np.int32],
+    shapes: list[BaseGeometry],
+    explored: ExploredPart,
+    parameters: TopologyParameters,
 ) -> RoomMap:
     full = explored.labels(labels)
-    doorways = find_doorways(labels, explored.resolution_m, parameters.topology.doorway_min_width_m)
+    doorways = find_doorways(labels, explored.resolution_m, parameters)
     return RoomMap(
         geometry=explored.geometry,
         labels=full,
@@ -209,37 +191,40 @@ def _room_map(
     )
 
 
-def _structure(found: RoseResult, explored: ExploredPart) -> Structure:
+def _structure(scored: StructureResult, clean: CleanMap, explored: ExploredPart) -> Structure:
     cells = explored.occupied_cells()
     return Structure(
-        directions_rad=np.mod(found.directions_rad + explored.geometry.yaw_rad, np.pi),
-        strengths=found.strengths,
-        scores=explored.values_at(cells, found.score),
-        threshold=found.threshold,
-        clean_cells=explored.values_at(cells, found.clean),
-        spectrum=found.spectrum,
+        directions_rad=np.mod(scored.directions_rad + explored.geometry.yaw_rad, np.pi),
+        strengths=scored.strengths,
+        scores=explored.values_at(cells, scored.score),
+        threshold=clean.threshold,
+        clean_cells=explored.values_at(cells, clean.cells),
+        spectrum=scored.spectrum,
     )
 
 
-def _walls(found: WallResult, explored: ExploredPart) -> Walls:
+def _walls(built: WallResult, explored: ExploredPart) -> Walls:
     return Walls(
-        segments_m=explored.segments(found.segments_m),
-        segment_direction=found.segment_direction,
-        segment_cluster=found.segment_line,
-        lines_m=explored.segments(found.lines.ends_m),
-        line_direction=found.lines.direction,
-        line_weight=found.lines.weight,
+        segments_m=explored.segments(built.segments_m),
+        segment_direction=built.segment_direction,
+        segment_cluster=built.segment_line,
+        lines_m=explored.segments(built.lines.ends_m),
+        line_direction=built.lines.direction,
+        line_weight=built.lines.weight,
     )
 
 
 def _floor_plan(
-    found: FloorPlanResult, room_of_face: NDArray[np.int32], explored: ExploredPart, parameters: Parameters
+    plan: FloorPlanResult,
+    room_of_face: NDArray[np.int32],
+    explored: ExploredPart,
+    parameters: FloorPlanParameters,
 ) -> FloorPlan:
     return FloorPlan(
-        edges_m=explored.segments(found.graph.edges_m),
-        edge_weight=found.evidence.weight,
-        edge_faces=found.graph.edge_faces,
-        faces=tuple(shapely.transform(found.graph.polygons, explored.points)),
-        face_inside=found.seen >= parameters.floor_plan.face_min_seen,
+        edges_m=explored.segments(plan.graph.edges_m),
+        edge_weight=plan.evidence.weight,
+        edge_faces=plan.graph.edge_faces,
+        faces=tuple(shapely.transform(plan.graph.polygons, explored.points)),
+        face_inside=plan.seen >= parameters.face_min_seen,
         room_of_face=room_of_face,
     )

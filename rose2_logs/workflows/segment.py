@@ -22,7 +22,6 @@ from rose2_logs.io.saved_maps import MapFilesSource
 from rose2_logs.model.explored import coarser_for_its_size
 from rose2_logs.model.occupancy import OccupancySnapshot
 from rose2_logs.model.room_plan import plan_of_analysis
-from rose2_logs.model.room_quality import room_quality
 from rose2_logs.model.rooms import RoomMap
 from rose2_logs.outputs.exports.formats import planned_files, write_plan
 from rose2_logs.outputs.exports.geojson import plan_geojson
@@ -91,8 +90,7 @@ def segment_map(
     if note is not None:
         logger.warning("%s: %s", map_file, note)
     write_label_image(files[0], np.flipud(analysis.rooms.labels))
-    evidence = room_quality(snapshot, analysis.rooms, parameters.occupancy)
-    plan = plan_of_analysis(snapshot, analysis, evidence, name, parameters.occupancy)
+    plan = plan_of_analysis(snapshot, analysis, analysis.quality, name, parameters.occupancy)
     write_json(files[1], plan_geojson(plan, analysis.walls))
     write_image(files[2], draw_rooms(snapshot, analysis))
     more = write_plan(plan, [each for each in formats if each != "geojson"], folder, name)

@@ -16,8 +16,6 @@ from rose2_logs.segmentation.floor_plan.faces import SNAP_M
 
 LINE_SEARCH_M = 4 * SNAP_M
 """Noding moves an edge off its line by less than this."""
-LOOK_SAMPLES = 25
-"""Samples of a look ahead; at 3 m one every 12 cm."""
 Number = TypeVar("Number", bound=np.generic)
 
 
@@ -118,7 +116,7 @@ def _passages(
 ) -> FloatArray:
     """Length of the stretch without a wall that each sample lies in over the room on both sides of it.
 
-    From three points of a stretch one looks straight ahead and back, as far as the stretch is wide (times
+    From some points of a stretch one looks straight ahead and back, as far as the stretch is wide (times
     `passage_look_widths`) or to the next wall. The greatest distance from walls met on a side is half the
     width of the room there. The stretch is held against the narrower side, so that a line across a corridor
     is as wide as the corridor; but a gap in a wall, between two jambs on its line, against the wider
@@ -140,11 +138,12 @@ def _passages(
     normal = np.column_stack([-vector[:, 1], vector[:, 0]])
     distance = cv2.distanceTransform((~walls).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
     depth = np.minimum(length * parameters.passage_look_widths, parameters.passage_look_max_m)
-    ahead = np.linspace(0, 1, LOOK_SAMPLES)
+    ahead = np.linspace(0, 1, parameters.passage_look_samples)
+    looks = parameters.passage_look_points + 1
     sides = []
     for sign in (1, -1):
         widest = np.zeros(len(begins))
-        for part in (0.25, 0.5, 0.75):
+        for part in np.arange(1, looks) / looks:
             at = (begins - first_of_line + part * (ends - begins)) * step_m[run_line]
             eye = lines_m[run_line, :2] + vector * at[:, None]
             points = eye[:, None] + sign * normal[:, None] * (depth[:, None] * ahead)[..., None]

@@ -9,7 +9,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from rose2_logs.model.occupancy import FloatArray
+from rose2_logs.model.occupancy import BoolArray, FloatArray
 
 SNAP_M = 1e-3
 """Vertices are snapped to this lattice (1 mm), far below a cell and far above rounding."""
@@ -85,3 +85,28 @@ def rasterize(
             ]
             cv2.fillPoly(image, rings, int(value), shift=SUBCELL_BITS)
     return image
+
+
+def label_faces(graph: FaceGraph, shape: tuple[int, int], resolution_m: float) -> NDArray[np.int32]:
+    """Paint the faces: (H, W) int32 with 1 + index of the face that holds each cell, 0 for none."""
+    return rasterize(
+        graph.polygons, np.arange(1, len(graph.polygons) + 1, dtype=np.int32), shape, resolution_m
+    )
+
+
+def free_area(
+    face_of_cell: NDArray[np.int32], free: BoolArray, count: int, resolution_m: float
+) -> FloatArray:
+    """Free area (F,) of each face in square meters."""
+    cells = np.bincount(face_of_cell[free], minlength=count + 1)[1:]
+    return cells.astype(float) * resolution_m**2
+
+
+def clearance(
+    face_of_cell: NDArray[np.int32], free: BoolArray, walls: BoolArray, count: int, resolution_m: float
+) -> FloatArray:
+    """Greatest distance (F,) in meters of a free cell of each face from a wall."""
+    distance = cv2.distanceTransform((~walls).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
+    greatest = np.zeros(count + 1, np.float32)
+    np.maximum.at(greatest, face_of_cell[free], distance[free])
+    return greatest[1:].astype(float) * resolution_m

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import heapq
-from collections import defaultdict
-
 import numpy as np
 from numpy.typing import NDArray
 
 from rose2_logs.config.parameters import FloorPlanParameters
-from rose2_logs.model.labels import roots
-from rose2_logs.model.occupancy import FloatArray
+from rose2_logs.model.occupancy import BoolArray, FloatArray
+from rose2_logs.model.regions import RegionGraph, best_first
 from rose2_logs.segmentation.floor_plan.edge_weights import EdgeEvidence
 
 Border = tuple[float, float, float]
@@ -52,13 +49,59 @@ def group_faces(
     group : (F,) int32
         0.. for faces with free area, -1 for the others.
     """
-    groups = _Groups(_borders(edge_faces, evidence, seen, free_m2 > 0), free_m2, clearance_m)
+    takes_part = free_m2 > 0
+    borders = _borders(edge_faces, evidence, seen, takes_part, parameters.known_power)
+    groups = _Groups(borders, free_m2, clearance_m)
     if parameters.grouping == "dbscan":
         _join_by_dbscan(groups, parameters)
     else:
         _join_by_whole_borders(groups, parameters)
     _absorb_small(groups, parameters)
-    return groups.labels()
+    group = np.full(len(free_m2), -1, np.int32)
+    group[takes_part] = np.unique(groups.holders()[takes_part], return_inverse=True)[1]
+    return group
+
+
+class _Groups(RegionGraph[Border]):
+    """Groups of faces with their free area, their clearance, and the borders between them."""
+
+    def __init__(
+        self, borders: dict[tuple[int, int], Border], free_m2: FloatArray, clearance_m: FloatArray
+    ) -> None:
+        super().__init__(len(free_m2), borders, _add)
+        self.free_m2 = free_m2.copy()
+        self.clearance_m = clearance_m.copy()
+
+    def join(self, region: int, target: int) -> list[int]:
+        """Make a group part of another; return the neighbors that came with it."""
+        self.free_m2[target] += self.free_m2[region]
+        self.clearance_m[target] = max(self.clearance_m[target], self.clearance_m[region])
+        return super().join(region, target)
+
+
+def _add(one: Border, other: Border) -> Border:
+    """Border of two borders together."""
+    return one[0] + other[0], one[1] + other[1], max(one[2], other[2])
+
+
+def _borders(
+    edge_faces: NDArray[np.int32], evidence: EdgeEvidence, seen: FloatArray, takes_part: BoolArray, power: float
+) -> dict[tuple[int, int], Border]:
+    """Border of each pair of neighboring faces that take part."""
+    use = np.all(edge_faces >= 0, axis=1)
+    use[use] &= np.all(takes_part[edge_faces[use]], axis=1)
+    known = np.minimum(seen[edge_faces[use]].min(axis=1), 1.0) ** power
+    closed = evidence.wall_m[use] - known * evidence.blind_m[use]
+    borders: dict[tuple[int, int], Border] = {}
+    for pair, *border in zip(
+        map(tuple, np.sort(edge_faces[use], axis=1).tolist()),
+        evidence.open_m[use].tolist(),
+        closed.tolist(),
+        evidence.passage_share[use].tolist(),
+        strict=True,
+    ):
+        borders[pair] = _add(borders.get(pair, (0.0, 0.0, 0.0)), (border[0], border[1], border[2]))
+    return borders
 
 
 def _join_by_dbscan(groups: _Groups, parameters: FloorPlanParameters) -> None:
@@ -67,10 +110,10 @@ def _join_by_dbscan(groups: _Groups, parameters: FloorPlanParameters) -> None:
     from scipy.sparse import csr_matrix
     from sklearn.cluster import DBSCAN
 
-    count = len(groups.alive)
+    count = len(groups.borders)
     pairs = [
         (a, b, border[1] / (border[0] + border[1]))
-        for a, neighbors in groups.borders.items()
+        for a, neighbors in enumerate(groups.borders)
         for b, border in neighbors.items()
         if border[0] >= parameters.join_min_open_m
     ]
@@ -79,111 +122,50 @@ def _join_by_dbscan(groups: _Groups, parameters: FloorPlanParameters) -> None:
     distance = csr_matrix((weight + 1e-9, (first.astype(int), second.astype(int))), shape=(count, count))
     model = DBSCAN(eps=parameters.dbscan_max_weight, min_samples=1, metric="precomputed")
     cluster = model.fit_predict(distance)
+    takes_part = groups.free_m2 > 0
     for number in np.unique(cluster):
-        members = np.flatnonzero((cluster == number) & groups.alive)
-        for member in members[1:].tolist():
-            groups.join(int(members[0]), member)
+        target, *members = np.flatnonzero((cluster == number) & takes_part).tolist() or [None]
+        for member in members:
+            groups.join(member, target)
 
 
 def _join_by_whole_borders(groups: _Groups, parameters: FloorPlanParameters) -> None:
     """Join the pair of groups with the best border, as long as there is one that is open enough."""
-    heap: list[tuple[float, float, int, int, Border]] = []
 
-    def push(a: int, b: int) -> None:
-        border = groups.borders[a][b]
-        if border[0] < parameters.join_min_open_m:
-            return
-        openness, passage = border[0] / (border[0] + border[1]), border[2]
-        if openness >= parameters.join_min_openness and passage >= parameters.join_min_passage:
-            heapq.heappush(heap, (-openness * min(passage, 2.0), -border[0], min(a, b), max(a, b), border))
+    def worst_last(pair: tuple[int, int]) -> tuple[float, float] | None:
+        border = groups.borders[pair[0]].get(pair[1])
+        if border is None or border[0] < parameters.join_min_open_m:
+            return None
+        open_m, closed_m, passage = border
+        openness = open_m / (open_m + closed_m)
+        if openness < parameters.join_min_openness or passage < parameters.join_min_passage:
+            return None
+        return -openness * min(passage, parameters.passage_wide), -open_m
 
-    for a, neighbors in groups.borders.items():
-        for b in neighbors:
-            if a < b:
-                push(a, b)
-    while heap:
-        _, _, a, b, border = heapq.heappop(heap)
-        # An entry is stale when one of the two is gone or their border has changed since.
-        if groups.borders.get(a, {}).get(b) != border:
-            continue
-        for c in groups.join(a, b):
-            push(a, c)
+    def join(pair: tuple[int, int]) -> list[tuple[int, int]]:
+        target, region = pair
+        return [(min(target, c), max(target, c)) for c in groups.join(region, target)]
+
+    pairs = [(a, b) for a, neighbors in enumerate(groups.borders) for b in neighbors if a < b]
+    best_first(pairs, worst_last, join)
 
 
 def _absorb_small(groups: _Groups, parameters: FloorPlanParameters) -> None:
     """Join what is too small or too narrow for a room to the neighbor that it opens to most."""
-    heap = [(groups.free_m2[a], a) for a in np.flatnonzero(groups.alive).tolist()]
-    heapq.heapify(heap)
-    while heap:
-        area, a = heapq.heappop(heap)
-        if not groups.alive[a] or area != groups.free_m2[a]:
-            continue
-        small = area < parameters.room_min_area_m2
-        narrow = groups.clearance_m[a] < parameters.room_min_clearance_m
-        neighbors = groups.borders.get(a, {})
+
+    def smallest_first(group: int) -> float | None:
+        return float(groups.free_m2[group]) if groups.exists(group) else None
+
+    def absorb(group: int) -> list[int]:
+        small = groups.free_m2[group] < parameters.room_min_area_m2
+        narrow = groups.clearance_m[group] < parameters.room_min_clearance_m
+        neighbors = groups.borders[group]
         if not (small or narrow) or not neighbors:
-            continue
-        best = max(neighbors, key=lambda b: (neighbors[b][0], -b))
+            return []
+        best = max(neighbors, key=lambda other: (neighbors[other][0], -other))
         if neighbors[best][0] < parameters.join_min_open_m:
-            continue
-        groups.join(best, a)
-        heapq.heappush(heap, (groups.free_m2[best], best))
+            return []
+        groups.join(group, best)
+        return [best]
 
-
-class _Groups:
-    """Groups of faces with what is known of the borders between them."""
-
-    def __init__(
-        self, borders: dict[int, dict[int, Border]], free_m2: FloatArray, clearance_m: FloatArray
-    ) -> None:
-        self.alive = free_m2 > 0
-        self.free_m2 = free_m2.copy()
-        self.clearance_m = np.maximum(clearance_m, 1e-6)
-        self.borders = borders
-        self._active = self.alive.copy()
-        self._parent = np.arange(len(free_m2))
-
-    def join(self, a: int, b: int) -> list[int]:
-        """Make `b` part of `a`; return the neighbors that `a` now has from it."""
-        self.alive[b] = False
-        self._parent[b] = a
-        self.free_m2[a] += self.free_m2[b]
-        self.clearance_m[a] = max(self.clearance_m[a], self.clearance_m[b])
-        taken = self.borders.pop(b, {})
-        self.borders[a].pop(b, None)
-        taken.pop(a, None)
-        for c, (open_m, closed_m, passage) in taken.items():
-            before = self.borders[a].get(c, (0.0, 0.0, 0.0))
-            border = (before[0] + open_m, before[1] + closed_m, max(before[2], passage))
-            self.borders[a][c] = self.borders[c][a] = border
-            del self.borders[c][b]
-        return list(taken)
-
-    def labels(self) -> NDArray[np.int32]:
-        """Group of each face, 0.., -1 for faces that take no part."""
-        root = roots(self._parent)
-        group = np.full(len(root), -1, np.int32)
-        group[self._active] = np.unique(root[self._active], return_inverse=True)[1]
-        return group
-
-
-def _borders(
-    edge_faces: NDArray[np.int32], evidence: EdgeEvidence, seen: FloatArray, active: NDArray[np.bool_]
-) -> dict[int, dict[int, Border]]:
-    use = np.all(edge_faces >= 0, axis=1)
-    use[use] &= np.all(active[edge_faces[use]], axis=1)
-    # Squared, so that what is behind the walls of a face seen by half is still three quarters unknown.
-    known = np.minimum(seen[edge_faces[use]].min(axis=1), 1.0) ** 2
-    closed = evidence.wall_m[use] - known * evidence.blind_m[use]
-    borders: dict[int, dict[int, Border]] = defaultdict(dict)
-    for (a, b), open_m, closed_m, passage in zip(
-        edge_faces[use].tolist(),
-        evidence.open_m[use].tolist(),
-        closed.tolist(),
-        evidence.passage_share[use].tolist(),
-        strict=True,
-    ):
-        before = borders[a].get(b, (0.0, 0.0, 0.0))
-        border = (before[0] + open_m, before[1] + closed_m, max(before[2], passage))
-        borders[a][b] = borders[b][a] = border
-    return borders
+    best_first(np.flatnonzero(groups.free_m2 > 0).tolist(), smallest_first, absorb)

@@ -12,12 +12,14 @@ from shapely.affinity import rotate
 from rose2_logs.config.parameters import FloorPlanParameters
 from rose2_logs.model.occupancy import BoolArray, FloatArray
 from rose2_logs.segmentation.floor_plan.edge_weights import EdgeEvidence, edge_evidence
-from rose2_logs.segmentation.floor_plan.faces import FaceGraph, build_faces
+from rose2_logs.segmentation.floor_plan.faces import (
+    FaceGraph,
+    build_faces,
+    clearance,
+    free_area,
+    label_faces,
+)
 from rose2_logs.segmentation.floor_plan.grouping import group_faces
-from rose2_logs.segmentation.floor_plan.rooms import clearance, free_area, label_faces
-
-FRAME_MARGIN_M = 1.0
-"""The plane is cut within the map's box and this much around it, so that its outer walls lie inside."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +58,7 @@ def make_floor_plan(
     The plane is cut within a box along `direction_rad`, the strongest dominant direction: what lies beyond
     counts as unseen, so that a box along the axes of the raster would give other rooms to a turned map.
     """
-    graph = build_faces(lines_m, _frame(free | walls, direction_rad, resolution_m))
+    graph = build_faces(lines_m, _frame(free | walls, direction_rad, resolution_m, parameters.frame_margin_m))
     count = len(graph.polygons)
     evidence = edge_evidence(graph.edges_m, lines_m, walls, free, resolution_m, parameters)
     face_of_cell = label_faces(graph, (free.shape[0], free.shape[1]), resolution_m)
@@ -72,7 +74,9 @@ def make_floor_plan(
     return FloorPlanResult(graph, evidence, seen, group, labels)
 
 
-def _frame(known: BoolArray, direction_rad: float, resolution_m: float) -> shapely.Polygon:
+def _frame(
+    known: BoolArray, direction_rad: float, resolution_m: float, margin_m: float
+) -> shapely.Polygon:
     """Box around the known cells along a direction, with a margin: it turns with the map."""
     rows = np.flatnonzero(known.any(1))
     if len(rows) == 0:
@@ -81,6 +85,6 @@ def _frame(known: BoolArray, direction_rad: float, resolution_m: float) -> shape
     last = known.shape[1] - known[:, ::-1].argmax(1)[rows]
     corners = np.concatenate([np.column_stack([x, y]) for x in (first, last) for y in (rows, rows + 1)])
     turned = rotate(shapely.multipoints(corners * resolution_m), -direction_rad, (0, 0), use_radians=True)
-    box = shapely.buffer(shapely.envelope(turned), FRAME_MARGIN_M, join_style="mitre")
+    box = shapely.buffer(shapely.envelope(turned), margin_m, join_style="mitre")
     frame: shapely.Polygon = rotate(box, direction_rad, (0, 0), use_radians=True)
     return frame

@@ -53,7 +53,8 @@ def compute_spectrum(occupied: BoolArray, resolution_m: float, parameters: Spect
     """
     margin = int(np.ceil(2 * parameters.structure_length_m / resolution_m))
     shape = tuple(fft.next_fast_len(side + margin, real=True) for side in occupied.shape)
-    walls = _walls_of_one_thickness(occupied, resolution_m, parameters.wall_sigma_m)
+    sigma = max(parameters.wall_sigma_m / resolution_m, parameters.wall_sigma_min_cells)
+    walls = _walls_of_one_thickness(occupied, sigma)
     # One axis after the other, so that rows of zeros are not transformed.
     values = fft.fft(fft.rfft(walls, shape[1], axis=1), shape[0], axis=0)
     frequency_x = fft.rfftfreq(shape[1], resolution_m).astype(np.float32)[None, :]
@@ -85,9 +86,8 @@ def spectrum_picture(spectrum: Spectrum, parameters: SpectrumParameters) -> NDAr
     return shown
 
 
-def _walls_of_one_thickness(occupied: BoolArray, resolution_m: float, sigma_m: float) -> NDArray[np.float32]:
+def _walls_of_one_thickness(occupied: BoolArray, sigma: float) -> NDArray[np.float32]:
     """Blur the occupied cells, scaled so that a straight wall one cell thick is 1 and cut off there."""
-    sigma = max(sigma_m / resolution_m, 0.5)
     walls: NDArray[np.float32] = occupied.astype(np.float32)
     cv2.GaussianBlur(walls, (0, 0), sigma, dst=walls, borderType=cv2.BORDER_CONSTANT)
     walls /= np.float32(1 / (np.sqrt(2 * np.pi) * sigma))

@@ -1,4 +1,4 @@
-"""Stage A in one call."""
+"""Stage A in two calls: the structure of a map, and the clean map that it leaves."""
 
 from __future__ import annotations
 
@@ -25,43 +25,82 @@ from rose2_logs.segmentation.rose.spectrum import (
 
 
 @dataclass(frozen=True, eq=False)
-class RoseResult:
-    """Stage A in the grid frame: see `rose.structure.Structure`, which is the same in the world.
+class StructureResult:
+    """The structure of a map in the grid frame.
 
-    `attached` (H, W) holds the clean map and the cells of lower score that touch it: jambs, ends of walls;
-    `supported` (H, W) all occupied cells but those of small pieces that no structure supports.
+    Attributes
+    ----------
+    directions_rad : (D,) float
+        Dominant directions in [0, pi), strongest first.
+    strengths : (D,) float
+        Share of the spectrum's energy that each holds.
+    score : (H, W) float32
+        Structure score of the occupied cells, 0 elsewhere.
+    supported : (H, W) bool
+        Occupied cells but those of small pieces that no structure supports.
+    spectrum : (S, S) uint8
+        Picture of the spectrum, see `spectrum_picture`.
     """
 
     directions_rad: FloatArray
     strengths: FloatArray
     score: NDArray[np.float32]
-    threshold: float
-    clean: BoolArray
-    attached: BoolArray
     supported: BoolArray
     spectrum: NDArray[np.uint8]
 
 
-def find_structure(
-    occupied: BoolArray,
-    free_m2: float,
-    resolution_m: float,
-    count_walls: Callable[[BoolArray, FloatArray], int],
-    parameters: SpectrumParameters,
-) -> RoseResult:
-    """Spectrum, dominant directions, structure score, clean map of the occupied cells (H, W).
+@dataclass(frozen=True, eq=False)
+class CleanMap:
+    """The clean map.
 
-    `free_m2` and `count_walls` set the clean map's threshold, see `clean_threshold`.
+    Attributes
+    ----------
+    threshold : float
+        Least structure score of its cells.
+    cells : (H, W) bool
+        Its cells.
+    attached : (H, W) bool
+        These, and cells of lower score that touch them: jambs, ends of walls.
     """
+
+    threshold: float
+    cells: BoolArray
+    attached: BoolArray
+
+
+def find_structure(
+    occupied: BoolArray, resolution_m: float, parameters: SpectrumParameters
+) -> StructureResult:
+    """Find dominant directions by the spectrum of the occupied cells (H, W), and score the cells by them."""
     spectrum = compute_spectrum(occupied, resolution_m, parameters)
     directions, strengths = dominant_directions(angular_energy(spectrum, parameters), parameters)
     picture = spectrum_picture(spectrum, parameters)
     score = structure_score(spectrum, occupied, directions, parameters)
     del spectrum  # as large as the rest of the stage needs
     supported = supported_cells(score, occupied, resolution_m, parameters)
-    threshold = clean_threshold(
-        score, supported, free_m2, lambda clean: count_walls(clean, directions), parameters
-    )
+    return StructureResult(directions, strengths, score, supported, picture)
+
+
+def make_clean_map(
+    structure: StructureResult,
+    free_m2: float,
+    count_walls: Callable[[BoolArray], int],
+    parameters: SpectrumParameters,
+) -> CleanMap:
+    """Keep the cells of high structure score.
+
+    Parameters
+    ----------
+    structure : StructureResult
+        The scores.
+    free_m2 : float
+        Free area of the map, by which the number of walls that it may have is known.
+    count_walls : callable
+        Number of walls in a map (H, W) of occupied cells: the threshold is the lowest that leaves few enough.
+    parameters : SpectrumParameters
+    """
+    supported, score = structure.supported, structure.score
+    threshold = clean_threshold(score, supported, free_m2, count_walls, parameters)
     clean = supported & (score >= threshold)
     attached = attached_cells(clean, supported & (score >= parameters.attached_share * threshold))
-    return RoseResult(directions, strengths, score, threshold, clean, attached, supported, picture)
+    return CleanMap(threshold, clean, attached)

@@ -34,7 +34,7 @@ def split_rooms(
         With new numbers for the split off parts, above the old ones.
     """
     labels = labels.copy()
-    clear = clearance_m(walls, resolution_m)
+    clear = clearance_m(walls, resolution_m, parameters.clearance_blur_cells)
     lines = _Lines.of(lines_m)
     number = int(labels.max(initial=0))
     pending = [
@@ -95,7 +95,7 @@ def _beyond_cut(
     points *= resolution_m
     of_cell = part[row, column]
     one, two = points[of_cell == largest[0] + 1], points[of_cell == largest[1] + 1]
-    candidates = [lines.near(points), _between(one, two, directions_rad)]
+    candidates = [lines.near(points), _between(one, two, directions_rad, parameters.cut_tail_share)]
     beyond = _cut(points, one, two, candidates, parameters.split_min_purity)
     return None if beyond is None else (row[beyond], column[beyond])
 
@@ -133,7 +133,7 @@ def _as_normals(lines_m: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _between(
-    one: NDArray[np.float32], two: NDArray[np.float32], directions_rad: FloatArray
+    one: NDArray[np.float32], two: NDArray[np.float32], directions_rad: FloatArray, tail_share: float
 ) -> tuple[FloatArray, FloatArray]:
     """Lines along the dominant directions, each at the offset that best divides two sets of points."""
     normals = np.column_stack([-np.sin(directions_rad), np.cos(directions_rad)])
@@ -141,5 +141,5 @@ def _between(
     for k, normal in enumerate(normals):
         a, b = one @ normal, two @ normal
         low, high = (a, b) if np.median(a) <= np.median(b) else (b, a)
-        offsets[k] = (np.quantile(low, 0.98) + np.quantile(high, 0.02)) / 2
+        offsets[k] = (np.quantile(low, 1 - tail_share) + np.quantile(high, tail_share)) / 2
     return normals, offsets

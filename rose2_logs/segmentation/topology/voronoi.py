@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import heapq
-from collections import defaultdict
-
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -13,13 +10,12 @@ from skimage.morphology import skeletonize
 from skimage.segmentation import watershed
 
 from rose2_logs.config.parameters import TopologyParameters
-from rose2_logs.model.labels import roots, straight_runs
+from rose2_logs.model.labels import contacts, straight_runs
 from rose2_logs.model.occupancy import BoolArray, FloatArray
+from rose2_logs.model.regions import RegionGraph, best_first
 
 DRAWN_BLOCK = 2
 """The graph is drawn by every so many cells: a passage of 30 cm is three of 10 cm wide."""
-SMOOTH_CELLS = 1.0
-"""Blur of the clearance, so that the steps of the raster are no summits of their own."""
 
 
 def parts_of_room(
@@ -51,7 +47,7 @@ def parts_of_room(
     summit = np.zeros(count)
     np.maximum.at(summit, basin[inside], clear[inside])
     area: FloatArray = np.bincount(basin[inside], minlength=count).astype(float) * resolution_m**2
-    root = _join_basins(_passages(basin, count, clear), summit, area, parameters)
+    root = _join_basins(_passages(basin, clear), summit, area, parameters)
     number = np.zeros(count, np.int32)
     number[1:] = np.unique(root[1:], return_inverse=True)[1] + 1
     return number[basin]
@@ -73,16 +69,20 @@ def _is_one_part(inside: BoolArray, clear: NDArray[np.float32], parameters: Topo
 
 
 def voronoi_graph(
-    labels: NDArray[np.int32], walls: BoolArray, resolution_m: float, min_clearance_m: float
+    labels: NDArray[np.int32],
+    walls: BoolArray,
+    resolution_m: float,
+    min_clearance_m: float,
+    parameters: TopologyParameters,
 ) -> NDArray[np.int32]:
     """Row and column (K, 2) of the cells of the Voronoi graph: the skeleton of the clear free space."""
-    clear = (labels > 0) & (clearance_m(walls, resolution_m) >= min_clearance_m)
-    skeleton = skeletonize(clear)  # type: ignore[no-untyped-call]
+    clearance = clearance_m(walls, resolution_m, parameters.clearance_blur_cells)
+    skeleton = skeletonize((labels > 0) & (clearance >= min_clearance_m))  # type: ignore[no-untyped-call]
     return np.argwhere(skeleton).astype(np.int32)
 
 
 def voronoi_lines(
-    inside: BoolArray, walls: BoolArray, resolution_m: float, min_clearance_m: float
+    inside: BoolArray, walls: BoolArray, resolution_m: float, parameters: TopologyParameters
 ) -> FloatArray:
     """Draw the Voronoi graph of a map as straight lines between the middles of its cells.
 
@@ -96,15 +96,17 @@ def voronoi_lines(
         Wall cells.
     resolution_m : float
         Side of a cell.
-    min_clearance_m : float
-        Points nearer to a wall are left out, and with them what only they connect.
+    parameters : TopologyParameters
+        Points nearer to a wall than half the narrowest doorway are left out, and with them what only they
+        connect.
 
     Returns
     -------
     (N, 4) float
         x0, y0, x1, y1 in meters, in the frame of the cells.
     """
-    clear = inside & (clearance_m(walls, resolution_m) >= min_clearance_m)
+    clearance = clearance_m(walls, resolution_m, parameters.clearance_blur_cells)
+    clear = inside & (clearance >= parameters.doorway_min_width_m / 2)
     skeleton = np.pad(skeletonize(clear[::DRAWN_BLOCK, ::DRAWN_BLOCK]), 1)  # type: ignore[no-untyped-call]
     row, column = np.nonzero(skeleton)
     found = []
@@ -120,10 +122,10 @@ def voronoi_lines(
     return cells[:, [1, 0, 3, 2]] * resolution_m
 
 
-def clearance_m(walls: BoolArray, resolution_m: float) -> NDArray[np.float32]:
-    """Distance (H, W) from the nearest wall cell in meters, slightly blurred."""
+def clearance_m(walls: BoolArray, resolution_m: float, blur_cells: float) -> NDArray[np.float32]:
+    """Distance (H, W) from the nearest wall cell in meters, blurred by a number of cells."""
     distance = cv2.distanceTransform((~walls).view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
-    clear: NDArray[np.float32] = np.asarray(cv2.GaussianBlur(distance, (0, 0), SMOOTH_CELLS), np.float32)
+    clear: NDArray[np.float32] = np.asarray(cv2.GaussianBlur(distance, (0, 0), blur_cells), np.float32)
     clear *= np.float32(resolution_m)
     return clear
 
@@ -151,62 +153,46 @@ def _summits(
 
 
 def _passages(
-    basin: NDArray[np.int32], count: int, clear: NDArray[np.float32]
-) -> dict[int, dict[int, float]]:
-    """Clearance in meters of the widest passage between neighboring ones of some basins."""
-    keys, widths = [], []
-    for first, second in (
-        ((slice(None), slice(None, -1)), (slice(None), slice(1, None))),
-        ((slice(None, -1), slice(None)), (slice(1, None), slice(None))),
-    ):
-        meet = basin[first] != basin[second]
-        meet &= (basin[first] > 0) & (basin[second] > 0)
-        a, b = basin[first][meet].astype(np.int64), basin[second][meet].astype(np.int64)
-        keys.append(np.minimum(a, b) * count + np.maximum(a, b))
-        widths.append(np.minimum(clear[first][meet], clear[second][meet]))
-    pairs, index = np.unique(np.concatenate(keys), return_inverse=True)
+    basin: NDArray[np.int32], clear: NDArray[np.float32]
+) -> dict[tuple[int, int], float]:
+    """Clearance in meters of the widest passage between each two neighboring basins."""
+    meet = contacts(basin)
+    meet = meet.chosen(meet.low > 0)
+    pairs, pair = meet.pairs()
     widest = np.zeros(len(pairs))
-    np.maximum.at(widest, index, np.concatenate(widths))
-    passages: dict[int, dict[int, float]] = defaultdict(dict)
-    for pair, width in zip(pairs.tolist(), widest.tolist(), strict=True):
-        a, b = divmod(pair, count)
-        passages[a][b] = passages[b][a] = width
-    return passages
+    np.maximum.at(widest, pair, np.minimum(clear.ravel()[meet.first], clear.ravel()[meet.second]))
+    return dict(zip(pairs, widest.tolist(), strict=True))
 
 
 def _join_basins(
-    passages: dict[int, dict[int, float]],
+    passages: dict[tuple[int, int], float],
     summit: FloatArray,
     area: FloatArray,
     parameters: TopologyParameters,
 ) -> NDArray[np.intp]:
     """Join the two basins with the widest passage, again and again; return the part of each basin."""
-    parent = np.arange(len(summit))
+    basins = RegionGraph(len(summit), passages, max)
 
-    def openness(a: int, b: int) -> float:
+    def narrowest_last(pair: tuple[int, int]) -> float | None:
         """Width of the passage for the less open side; what is no part by itself comes first."""
-        ratio = passages[a][b] / max(min(summit[a], summit[b]), 1e-9)
+        a, b = pair
+        width = basins.borders[a].get(b)
+        if width is None:
+            return None
+        ratio = width / max(min(summit[a], summit[b]), 1e-9)
         is_part = (
             min(area[a], area[b]) >= parameters.split_min_area_m2
             and min(summit[a], summit[b]) >= parameters.split_min_clearance_m
         )
-        return float(ratio if is_part else 1 + ratio)
+        openness = float(ratio if is_part else 1 + ratio)
+        return -openness if openness >= parameters.passage_min_ratio else None
 
-    heap = [(-openness(a, b), a, b) for a in passages for b in passages[a] if a < b]
-    heapq.heapify(heap)
-    while heap:
-        value, a, b = heapq.heappop(heap)
-        if b not in passages.get(a, {}) or value != -openness(a, b):
-            continue
-        if -value < parameters.passage_min_ratio:
-            break
-        parent[b] = a
-        summit[a] = max(summit[a], summit[b])
-        area[a] += area[b]
-        for c, width in passages.pop(b).items():
-            del passages[c][b]
-            if c != a:
-                passages[a][c] = passages[c][a] = max(passages[a].get(c, 0.0), width)
-        for c in passages[a]:
-            heapq.heappush(heap, (-openness(a, c), min(a, c), max(a, c)))
-    return roots(parent)
+    def join(pair: tuple[int, int]) -> list[tuple[int, int]]:
+        target, basin = pair
+        summit[target] = max(summit[target], summit[basin])
+        area[target] += area[basin]
+        basins.join(basin, target)
+        return [(min(target, c), max(target, c)) for c in basins.borders[target]]
+
+    best_first(passages, narrowest_last, join)
+    return basins.holders()

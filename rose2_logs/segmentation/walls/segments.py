@@ -17,9 +17,6 @@ from numpy.typing import NDArray
 from rose2_logs.config.parameters import WallParameters
 from rose2_logs.model.occupancy import BoolArray, FloatArray
 
-COVER_CELLS = 1.5
-"""Two cells that follow one another on a line cover it without a gap: up to a cell's diagonal, rounded up."""
-
 
 @dataclass(frozen=True, eq=False)
 class Segments:
@@ -164,7 +161,9 @@ def _straight_runs(
         first = np.flatnonzero(new)
         last = np.append(first[1:], len(point)) - 1
         cover = np.full(len(point), resolution_m)
-        np.minimum(np.abs(gap), COVER_CELLS * resolution_m, out=cover[1:], where=~new[1:])
+        np.minimum(
+            np.abs(gap), parameters.segment_cover_cells * resolution_m, out=cover[1:], where=~new[1:]
+        )
         covered = np.bincount(run, weights=cover)
         start, end = position[first] - resolution_m / 2, position[last] + resolution_m / 2
         yield _Runs(

@@ -1,4 +1,4 @@
-"""Stage B in one call."""
+"""Stage B in one call, and the count of walls that stage A needs."""
 
 from __future__ import annotations
 
@@ -79,11 +79,27 @@ def find_walls(
     )
 
 
-def count_walls(
-    clean: BoolArray, dominant_rad: FloatArray, resolution_m: float, parameters: WallParameters
-) -> int:
-    """Number of wall clusters along the dominant directions of a clean map (H, W)."""
-    segments, _ = detect_segments(
-        clean, dominant_rad, resolution_m, parameters.segment_min_length_m, parameters
-    )
-    return len(cluster_segments(segments, parameters).offset)
+@dataclass(frozen=True, eq=False)
+class WallCounter:
+    """Counts the walls of a clean map, as the search for its threshold asks.
+
+    Attributes
+    ----------
+    directions_rad : (D,) float
+        The dominant directions.
+    resolution_m : float
+        Side of a cell.
+    parameters : WallParameters
+    """
+
+    directions_rad: FloatArray
+    resolution_m: float
+    parameters: WallParameters
+
+    def __call__(self, clean: BoolArray) -> int:
+        """Number of wall clusters along the dominant directions of a clean map (H, W)."""
+        length_m = self.parameters.segment_min_length_m
+        segments, _ = detect_segments(
+            clean, self.directions_rad, self.resolution_m, length_m, self.parameters
+        )
+        return len(cluster_segments(segments, self.parameters).offset)

@@ -45,7 +45,7 @@ def test_a_room_in_one_piece_stays_whole():
 def test_the_voronoi_graph_runs_in_the_middle_of_a_corridor():
     labels = np.zeros((40, 200), np.int32)
     labels[10:30] = 1
-    graph = voronoi_graph(labels, labels == 0, 0.05, 0.25)
+    graph = voronoi_graph(labels, labels == 0, 0.05, 0.25, PARAMETERS)
     middle = graph[(graph[:, 1] > 30) & (graph[:, 1] < 170)]
     assert len(middle) > 100
     assert np.abs(middle[:, 0] - 19.5).max() <= 1
@@ -71,7 +71,7 @@ def test_the_drawn_voronoi_graph_is_a_straight_line_in_a_corridor_and_goes_throu
 
 def parts(walls):
     """Parts of all cells that are no wall, as one room."""
-    return parts_of_room(~walls, clearance_m(walls, 0.05), 0.05, PARAMETERS)
+    return parts_of_room(~walls, clearance_m(walls, 0.05, 1.0), 0.05, PARAMETERS)
 
 
 def test_a_narrow_gap_divides_the_parts_of_a_room_and_a_wide_one_does_not():

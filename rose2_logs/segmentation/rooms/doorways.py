@@ -10,14 +10,13 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from rose2_logs.config.parameters import TopologyParameters
+from rose2_logs.model.labels import contacts
 from rose2_logs.model.occupancy import FloatArray
-
-CONTACT_GAP_CELLS = 2.9
-"""Contacts of the same two rooms this near belong to one doorway: one cell may be missing between them."""
 
 
 def find_doorways(
-    labels: NDArray[np.int32], resolution_m: float, min_width_m: float
+    labels: NDArray[np.int32], resolution_m: float, parameters: TopologyParameters
 ) -> list[tuple[tuple[int, int], FloatArray]]:
     """Find the passages between rooms.
 
@@ -25,45 +24,37 @@ def find_doorways(
     ----------
     labels : (H, W) int32
         The segmented map.
-    min_width_m : float
-        Narrower contacts are noise of the map.
+    resolution_m : float
+        Side of a cell.
+    parameters : TopologyParameters
+        The narrowest doorway, and which contacts are one.
 
     Returns
     -------
     doorways : list of ((int, int), (2, 2) float)
         The two rooms, smaller first, and the ends of the passage in the grid frame, meters; sorted.
     """
-    points, low, high = _contacts(labels)
-    if len(points) == 0:
+    meet = contacts(labels)
+    meet = meet.chosen(meet.low > 0)
+    if len(meet.low) == 0:
         return []
-    pair = low * (int(labels.max()) + 1) + high
-    near = cKDTree(points).query_pairs(CONTACT_GAP_CELLS, output_type="ndarray")
+    # Middles of the sides at which two rooms meet, x and y in cells.
+    corners = [np.column_stack(np.divmod(cell, labels.shape[1])[::-1]) for cell in (meet.first, meet.second)]
+    points = (corners[0] + corners[1] + 1) / 2
+    pairs, pair = meet.pairs()
+    near = cKDTree(points).query_pairs(parameters.doorway_gap_cells, output_type="ndarray")
     near = near[pair[near[:, 0]] == pair[near[:, 1]]]
     graph = coo_matrix((np.ones(len(near), bool), near.T), shape=(len(points), len(points)))
     count, component = connected_components(graph, directed=False)
     order = np.argsort(component, kind="stable")
     bounds = np.searchsorted(component[order], np.arange(count + 1))
-    found = []
+    doorways = []
     for first, last in itertools.pairwise(bounds):
         members = order[first:last]
         ends = _extremes(points[members]) * resolution_m
-        if np.linalg.norm(ends[1] - ends[0]) + resolution_m >= min_width_m:
-            found.append(((int(low[members[0]]), int(high[members[0]])), ends))
-    return sorted(found, key=lambda item: (item[0], item[1].tolist()))
-
-
-def _contacts(labels: NDArray[np.int32]) -> tuple[FloatArray, NDArray[np.int64], NDArray[np.int64]]:
-    """Middles (K, 2) as x, y in cells between neighboring cells of two rooms, and the two rooms."""
-    points, pairs = [], []
-    for first, second, shift in (
-        (labels[:, :-1], labels[:, 1:], (1.0, 0.5)),
-        (labels[:-1], labels[1:], (0.5, 1.0)),
-    ):
-        row, column = np.nonzero((first != second) & (first > 0) & (second > 0))
-        points.append(np.column_stack([column, row]) + np.array(shift))
-        pairs.append(np.sort(np.column_stack([first[row, column], second[row, column]]), axis=1))
-    both = np.concatenate(pairs).astype(np.int64)
-    return np.concatenate(points), both[:, 0], both[:, 1]
+        if np.linalg.norm(ends[1] - ends[0]) + resolution_m >= parameters.doorway_min_width_m:
+            doorways.append((pairs[pair[members[0]]], ends))
+    return sorted(doorways, key=lambda item: (item[0], item[1].tolist()))
 
 
 def _extremes(points: FloatArray) -> FloatArray:

@@ -1,0 +1,106 @@
+"""Joining regions to larger ones: who borders on whom, and which two are joined next."""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, Generic, Protocol, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+Border = TypeVar("Border")
+
+
+class _Ordered(Protocol):
+    def __lt__(self, other: Any, /) -> bool: ...
+
+
+Item = TypeVar("Item", bound=_Ordered)
+
+
+class RegionGraph(Generic[Border]):
+    """Regions 0..N - 1 and the borders between neighbors, while regions are joined.
+
+    Parameters
+    ----------
+    count : int
+        Number of regions.
+    borders : mapping of (int, int) to border
+        What is known of the border of two neighboring regions, each pair once.
+    add : callable
+        Border of two borders that become one.
+
+    Attributes
+    ----------
+    borders : list of N dict
+        The border with each neighbor of each region; empty for one that was made part of another.
+    """
+
+    def __init__(
+        self,
+        count: int,
+        borders: Mapping[tuple[int, int], Border],
+        add: Callable[[Border, Border], Border],
+    ) -> None:
+        self.borders: list[dict[int, Border]] = [{} for _ in range(count)]
+        for (one, other), border in borders.items():
+            self.borders[one][other] = self.borders[other][one] = border
+        self._add = add
+        self._holder = np.arange(count)
+
+    def exists(self, region: int) -> bool:
+        """Whether a region was not made part of another."""
+        return bool(self._holder[region] == region)
+
+    def join(self, region: int, target: int) -> list[int]:
+        """Make a region part of another; return the neighbors that came with it."""
+        self._holder[region] = target
+        taken, self.borders[region] = self.borders[region], {}
+        taken.pop(target, None)
+        own = self.borders[target]
+        own.pop(region, None)
+        for other, border in taken.items():
+            together = self._add(own[other], border) if other in own else border
+            own[other] = self.borders[other][target] = together
+            del self.borders[other][region]
+        return list(taken)
+
+    def holders(self) -> NDArray[np.intp]:
+        """Region (N,) that each belongs to after all joins."""
+        holder = self._holder
+        while not np.array_equal(above := holder[holder], holder):
+            holder = above
+        return holder
+
+
+def best_first(
+    items: Iterable[Item],
+    key: Callable[[Item], _Ordered | None],
+    act: Callable[[Item], Iterable[Item]],
+) -> None:
+    """Act on items, always the one with the least key next, while acting changes the keys of others.
+
+    Parameters
+    ----------
+    items : iterable
+        Of equal keys the lesser item comes first.
+    key : callable
+        Key of an item as it stands now, None for one that is not to be acted on (any more).
+    act : callable
+        Acts on an item; returns those whose keys it changed.
+    """
+    heap: list[tuple[_Ordered, Item]] = []
+
+    def push(changed: Iterable[Item]) -> None:
+        for item in changed:
+            value = key(item)
+            if value is not None:
+                heapq.heappush(heap, (value, item))
+
+    push(items)
+    while heap:
+        value, item = heapq.heappop(heap)
+        # What was pushed before the item changed is out of date.
+        if key(item) == value:
+            push(act(item))

@@ -1,0 +1,71 @@
+"""Which cells are a room's: left out free space is taken in, borders are straightened."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from rose2_logs.config.parameters import FloorPlanParameters
+from rose2_logs.model.labels import contacts
+from rose2_logs.model.occupancy import BoolArray
+
+
+def adopt_left_out(
+    labels: NDArray[np.int32], free: BoolArray, resolution_m: float, parameters: FloorPlanParameters
+) -> NDArray[np.int32]:
+    """Give free space outside all rooms to the room that it opens to most, where it is wide.
+
+    A face of which little was seen is outside, for it holds rays through windows; what was seen of it
+    may yet be the corner of a room. Rays are narrower than `leak_max_width_m`.
+
+    Parameters
+    ----------
+    labels : (H, W) int32
+        Rooms of the free cells, 0 elsewhere.
+    free : (H, W) bool
+        Free cells.
+    """
+    width = 2 * round(parameters.leak_max_width_m / resolution_m / 2) + 1
+    wide = cv2.morphologyEx(free.astype(np.uint8), cv2.MORPH_OPEN, np.ones((width, width), np.uint8))
+    left_out = (wide > 0) & (labels == 0)
+    count, piece = cv2.connectedComponents(left_out.astype(np.uint8), connectivity=4)
+    # Pieces have negative labels, so that their contacts with rooms are those of two signs.
+    meet = contacts(np.where(left_out, -piece, labels))
+    meet = meet.chosen((meet.low < 0) & (meet.high > 0))
+    rooms = int(labels.max(initial=0)) + 1
+    sides = np.bincount(-meet.low.astype(np.int64) * rooms + meet.high, minlength=count * rooms)
+    sides = sides.reshape(count, rooms)
+    room = sides.argmax(1).astype(np.int32)
+    room[sides.max(1) * resolution_m < parameters.join_min_open_m] = 0
+    adopted = labels.copy()
+    adopted[left_out] = room[piece[left_out]]
+    return adopted
+
+
+def settle_borders(labels: NDArray[np.int32], resolution_m: float, strip_m: float) -> NDArray[np.int32]:
+    """Give strips of a room that lie along the other side of a wall to the room on that side.
+
+    A representative line runs within a wall, but not in the middle of every cell of it, so that a strip of
+    free cells before the wall may fall on the line's other side. What is narrower than `strip_m` is taken
+    away from its room and grown again from the rooms that it is open to.
+
+    Parameters
+    ----------
+    labels : (H, W) int32
+        Rooms of the free cells, 0 elsewhere.
+    """
+    radius = max(1, round(strip_m / resolution_m / 2))
+    kernel = np.ones((2 * radius + 1, 2 * radius + 1), np.uint8)
+    grown = labels.astype(np.float32)
+    core = cv2.erode(grown, kernel) == grown
+    core &= cv2.dilate(grown, kernel) == grown
+    grown[~core] = 0
+    open_cells = labels > 0
+    cross = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
+    # Every step reaches a cell further; twice the strip brings back what lies in corners.
+    for _ in range(4 * radius):
+        np.copyto(grown, cv2.dilate(grown, cross), where=(grown == 0) & open_cells)
+    settled = labels.copy()
+    np.copyto(settled, grown, where=grown > 0, casting="unsafe")
+    return settled

@@ -1,0 +1,66 @@
+"""The end of stage D in one call: from labels of cells to rooms."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from shapely.geometry.base import BaseGeometry
+
+from rose2_logs.config.parameters import FloorPlanParameters
+from rose2_logs.model.labels import number_rooms, renumber_in_place
+from rose2_logs.model.occupancy import BoolArray
+from rose2_logs.segmentation.floor_plan.stage import FloorPlanResult
+from rose2_logs.segmentation.rooms.borders import adopt_left_out, settle_borders
+from rose2_logs.segmentation.rooms.shapes import room_shapes, rooms_of_faces
+
+
+@dataclass(frozen=True, eq=False)
+class RoomsResult:
+    """The rooms in the grid frame, meters.
+
+    Attributes
+    ----------
+    labels : (H, W) int32
+        Rooms 1..R of the free cells, by their first cell; 0 for none.
+    shapes : list of R shapely geometries
+        With the predicted part.
+    room_of_face : (F,) int32
+        Room of each face, 0 for none.
+    """
+
+    labels: NDArray[np.int32]
+    shapes: list[BaseGeometry]
+    room_of_face: NDArray[np.int32]
+
+
+def make_rooms(
+    labels: NDArray[np.int32],
+    plan: FloorPlanResult,
+    free: BoolArray,
+    resolution_m: float,
+    parameters: FloorPlanParameters,
+) -> RoomsResult:
+    """Make rooms of what splitting left: whole, with straight borders, numbers, and predicted shapes.
+
+    Parameters
+    ----------
+    labels : (H, W) int32
+        Split groups of faces of the free cells, 0 for none.
+    plan : FloorPlanResult
+        Result of stage C.
+    free : (H, W) bool
+        Free cells.
+    resolution_m : float
+        Side of a cell.
+    parameters : FloorPlanParameters
+    """
+    whole = adopt_left_out(labels, free, resolution_m, parameters)
+    settled = settle_borders(whole, resolution_m, parameters.border_strip_m)
+    number = number_rooms(settled, int(whole.max(initial=0)), parameters.room_min_area_m2, resolution_m)
+    settled = renumber_in_place(settled, number)
+    # Which faces are a room's is told by the labels before their borders settled.
+    room_of_face = rooms_of_faces(renumber_in_place(whole, number), plan)
+    shapes = room_shapes(settled, plan, room_of_face, resolution_m, parameters.shape_min_seen)
+    return RoomsResult(settled, shapes, room_of_face)
