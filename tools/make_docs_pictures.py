@@ -22,8 +22,7 @@ import shapely
 from numpy.typing import NDArray
 from PIL import Image as PillowImage
 
-from rose2_logs.config.parameters import Parameters, ReadingParameters
-from rose2_logs.config.selection import Selection
+from rose2_logs.config.parameters import Parameters
 from rose2_logs.drawing.case_picture import room_colors
 from rose2_logs.drawing.pixels import as_pixels
 from rose2_logs.drawing.plan import PANEL, draw_plan
@@ -40,7 +39,7 @@ from rose2_logs.segmentation.rose.stage import find_structure
 from rose2_logs.segmentation.topology.splitting import split_rooms
 from rose2_logs.segmentation.topology.voronoi import voronoi_graph
 from rose2_logs.segmentation.walls.stage import count_walls, find_walls
-from rose2_logs.workflows.analyze import RunOptions, analyze_log, seconds_into_log
+from rose2_logs.workflows.analyze import RunOptions, analyze_log
 from rose2_logs.workflows.compare import compare_runs
 
 Image = NDArray[np.uint8]
@@ -257,10 +256,8 @@ def comparison_picture(log: Path) -> tuple[str, Image]:
     """Compare a run with the same run that ended half way, as `compare` draws it."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        _, end_ns = seconds_into_log(log, None, HALF_WAY_S, ReadingParameters())
-        for run, selection in (("half", Selection(end_ns=end_ns)), ("whole", Selection())):
-            options = RunOptions(selection=selection, recording=False)
-            analyze_log(log, folder / run, options)
+        for run, end_s in (("half", HALF_WAY_S), ("whole", None)):
+            analyze_log(log, folder / run, RunOptions(end_s=end_s, recording=False))
         compare_runs(folder / "half", folder / "whole", folder / "changes", recording=False)
         with PillowImage.open(folder / "changes" / "comparison.png") as picture:
             return "compare", np.asarray(picture)

@@ -6,6 +6,9 @@ from dataclasses import dataclass
 
 from rose2_logs.config.fields import number
 
+METHODS = ("rose2", "morphological", "distance", "voronoi")
+"""Names of the segmentation methods: the paper's, and those that it is compared with."""
+
 
 @dataclass(frozen=True)
 class MorphologicalParameters:

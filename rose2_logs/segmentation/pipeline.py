@@ -10,6 +10,7 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
+from rose2_logs.config.baselines import METHODS
 from rose2_logs.config.parameters import Parameters
 from rose2_logs.errors import ParameterError
 from rose2_logs.model.analysis import FloorPlan, SnapshotAnalysis, Structure, Walls
@@ -27,8 +28,7 @@ from rose2_logs.segmentation.topology.splitting import split_rooms
 from rose2_logs.segmentation.topology.voronoi import voronoi_lines
 from rose2_logs.segmentation.walls.stage import WallResult, count_walls, find_walls
 
-METHODS = ("rose2", *BASELINES)
-"""Names of the segmentation methods: the paper's, and those that it compares with."""
+__all__ = ["METHODS", "analyze"]
 
 
 def analyze(
@@ -56,7 +56,7 @@ def analyze(
         If `method` is none of `METHODS`.
     """
     if method not in METHODS:
-        raise ParameterError(f"no method {method!r}; there are: {', '.join(METHODS)}")
+        raise ParameterError(f"method={method!r}: it must be one of {', '.join(METHODS)}")
     watch = _StopWatch()
     geometry = snapshot.geometry
     # The baselines' parameters count cells, so they take the map as it is.
