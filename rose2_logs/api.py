@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+import difflib
+import inspect
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -13,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from rose2_logs.comparison.layouts import LayoutComparison
 from rose2_logs.config.parameters import Parameters
-from rose2_logs.config.run_options import RunOptions
+from rose2_logs.config.run_options import RunOptions, options_of
 from rose2_logs.config.selection import Selection
 from rose2_logs.errors import ParameterError
 from rose2_logs.io import open_log as open_log_reader
@@ -27,6 +29,7 @@ from rose2_logs.segmentation.pipeline import analyze as analyze_snapshot
 from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot
 from rose2_logs.workflows.analyze import OnSnapshot, analyze_log, log_stem
 from rose2_logs.workflows.compare import compare_runs, compare_stored
+from rose2_logs.workflows.evaluate import Evaluation, evaluate_method
 from rose2_logs.workflows.segment import read_static_map
 
 __all__ = ["analyze", "compare", "evaluate", "load", "open_log", "read_map", "segment", "track"]
@@ -35,6 +38,29 @@ GivenParameters = Parameters | Mapping[str, Any] | None
 """Parameters, or a mapping of dotted names (``{"walls.extension_m": 6}``); None for the defaults."""
 
 
+def _with_run_options(function: Callable[..., Run]) -> Callable[..., Run]:
+    """Give a function that takes the options of a run as keywords their names, defaults and meanings."""
+    own = inspect.signature(function)
+    options = [each for each in dataclasses.fields(RunOptions) if each.name not in own.parameters]
+    added = [
+        inspect.Parameter(
+            each.name, inspect.Parameter.KEYWORD_ONLY, default=_default(each), annotation=each.type
+        )
+        for each in options
+    ]
+    kept = [each for each in own.parameters.values() if each.kind is not inspect.Parameter.VAR_KEYWORD]
+    function.__signature__ = own.replace(parameters=[*kept, *added])  # type: ignore[attr-defined]
+    about = options_of(RunOptions)
+    lines = [f"{each.name} : {each.type}\n        {about[each.name].meaning}" for each in options]
+    function.__doc__ = (function.__doc__ or "").replace("**options", "\n    ".join(lines))
+    return function
+
+
+def _default(of: dataclasses.Field[Any]) -> Any:
+    return of.default if of.default_factory is dataclasses.MISSING else of.default_factory()
+
+
+@_with_run_options
 def analyze(
     log: str | Path,
     out: str | Path | None = None,
@@ -60,8 +86,6 @@ def analyze(
     on_snapshot : callable, optional
         Called with each finished `TrackedSnapshot` and the share of the log's time that is done.
     **options
-        Fields of `RunOptions`: ``topic``, ``method``, ``workers``, ``start_s``, ``max_snapshots``,
-        ``overwrite`` and so on.
 
     Returns
     -------
@@ -335,14 +359,66 @@ def compare(
     return compare_runs(run_a.folder, run_b.folder, Path(out), overwrite=overwrite).comparison
 
 
+def evaluate(
+    cases: str | Path,
+    *,
+    method: str = "rose2",
+    parameters: GivenParameters = None,
+    group: str | None = None,
+    along: bool = False,
+    workers: int = 1,
+) -> Evaluation:
+    """Segment maps whose true rooms are known, and measure how well the found rooms agree with them.
+
+    Parameters
+    ----------
+    cases : str or path
+        A JSON file that lists the maps with their true rooms, see `rose2_logs.evaluation.cases`.
+    method : str
+        The segmentation method.
+    parameters : Parameters or mapping, optional
+        As for `analyze`.
+    group : str, optional
+        Evaluate only the cases of this group.
+    along : bool
+        Whether the cases of each group are, in their order, the maps of one run: then there are figures over
+        its coverage and of its tracks, too.
+    workers : int
+        Processes; results do not depend on it.
+
+    Returns
+    -------
+    Evaluation
+        Figures of each map (``maps``) and means of each group (``groups``).
+
+    Raises
+    ------
+    CasesError
+        If the list or an image cannot be read, or the two images of a case differ in size.
+    ParameterError
+        If a parameter, the method or the number of workers cannot be used.
+
+    Examples
+    --------
+    >>> import rose2_logs as rl
+    >>> found = rl.evaluate("../shared/benchmark/cases.json", group="campus")  # doctest: +SKIP
+    >>> found.groups["campus"].iou_sym  # doctest: +SKIP
+    """
+    return evaluate_method(
+        cases,
+        method=method,
+        parameters=Parameters.from_any(parameters),
+        group=group,
+        along=along,
+        workers=workers,
+    )
+
+
 def _options(parameters: GivenParameters, options: Mapping[str, Any]) -> RunOptions:
     """Make the options of a run, of keywords that people give."""
-    known = {each.name for each in dataclasses.fields(RunOptions)} - {"parameters", "selection"}
-    of_selection = {each.name for each in dataclasses.fields(Selection)}
-    if unknown := sorted(options.keys() - known - of_selection):
-        raise ParameterError(
-            f"no option {unknown[0]!r}; there are: {', '.join(sorted(known | of_selection))}"
-        )
-    selection = Selection(**{name: value for name, value in options.items() if name in of_selection})
-    others = {name: value for name, value in options.items() if name in known}
-    return RunOptions(parameters=Parameters.from_any(parameters), selection=selection, **others)
+    known = [each.name for each in dataclasses.fields(RunOptions) if each.name != "parameters"]
+    if unknown := [name for name in options if name not in known]:
+        meant = difflib.get_close_matches(unknown[0], known, 1)
+        hint = f"; did you mean {meant[0]!r}?" if meant else ""
+        raise ParameterError(f"no option {unknown[0]!r}{hint}; there are: {', '.join(known)}")
+    return RunOptions(parameters=Parameters.from_any(parameters), **options)

@@ -22,8 +22,7 @@ import shapely
 from numpy.typing import NDArray
 from PIL import Image as PillowImage
 
-from rose2_logs.config.parameters import Parameters, ReadingParameters
-from rose2_logs.config.selection import Selection
+from rose2_logs.config.parameters import Parameters
 from rose2_logs.drawing.case_picture import room_colors
 from rose2_logs.drawing.pixels import as_pixels
 from rose2_logs.drawing.plan import PANEL, draw_plan
@@ -40,7 +39,7 @@ from rose2_logs.segmentation.rose.stage import find_structure, make_clean_map
 from rose2_logs.segmentation.topology.splitting import split_rooms
 from rose2_logs.segmentation.topology.voronoi import voronoi_graph
 from rose2_logs.segmentation.walls.stage import WallCounter, find_walls
-from rose2_logs.workflows.analyze import RunOptions, analyze_log, seconds_into_log
+from rose2_logs.workflows.analyze import RunOptions, analyze_log
 from rose2_logs.workflows.compare import compare_runs
 
 Image = NDArray[np.uint8]
@@ -187,14 +186,14 @@ def _labels_along(
     directions = structure.directions_rad
     count = WallCounter(directions, cell_m, parameters.walls)
     clean = make_clean_map(structure, part.free_area_m2, count, parameters.spectrum)
-    walls = find_walls(
-        structure.supported, clean.cells, clean.attached, directions, cell_m, parameters.walls
-    )
+    walls = find_walls(structure.supported, clean.cells, clean.attached, directions, cell_m, parameters.walls)
     first = float(directions[0])
     lines = walls.lines.ends_m
     plan = make_floor_plan(lines, walls.walls, part.free, first, cell_m, parameters.floor_plan)
     split = split_rooms(plan.labels, walls.walls, lines, directions, cell_m, parameters.topology)
-    cells = voronoi_graph(split, walls.walls, cell_m, parameters.topology.split_min_clearance_m / 2, parameters.topology)
+    cells = voronoi_graph(
+        split, walls.walls, cell_m, parameters.topology.split_min_clearance_m / 2, parameters.topology
+    )
     graph = np.zeros(split.shape, np.int32)
     graph[cells[:, 0], cells[:, 1]] = 1
     return part.labels(plan.labels), part.labels(split), part.labels(graph) > 0
@@ -253,10 +252,8 @@ def comparison_picture(log: Path) -> tuple[str, Image]:
     """Compare a run with the same run that ended half way, as `compare` draws it."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        _, end_ns = seconds_into_log(log, None, HALF_WAY_S, ReadingParameters())
-        for run, selection in (("half", Selection(end_ns=end_ns)), ("whole", Selection())):
-            options = RunOptions(selection=selection, recording=False)
-            analyze_log(log, folder / run, options)
+        for run, end_s in (("half", HALF_WAY_S), ("whole", None)):
+            analyze_log(log, folder / run, RunOptions(end_s=end_s, recording=False))
         compare_runs(folder / "half", folder / "whole", folder / "changes", recording=False)
         with PillowImage.open(folder / "changes" / "comparison.png") as picture:
             return "compare", np.asarray(picture)

@@ -20,7 +20,8 @@ from rose2_logs.batch.folders import LOGS_FOLDER, locked, put_in_place, work_fol
 from rose2_logs.batch.local_workers import LocalWorkers
 from rose2_logs.batch.location import Location
 from rose2_logs.batch.names import assign_names
-from rose2_logs.batch.record import BatchSettings, Record, Signature, local_signature, read_record
+from rose2_logs.batch.options import BatchOptions
+from rose2_logs.batch.record import Record, Signature, deciding_settings, local_signature, read_record
 from rose2_logs.batch.task import LogOutcome, LogTask, Progress
 from rose2_logs.errors import LogError, OutputError, ParameterError
 from rose2_logs.io.discovery import BAG_DESCRIPTION
@@ -29,34 +30,6 @@ from rose2_logs.runs.tables import BACK_PROJECTED, TABLES
 from rose2_logs.system.files import require_utf8
 
 logger = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True)
-class BatchOptions:
-    """How to go about a batch.
-
-    Attributes
-    ----------
-    settings : BatchSettings
-        What to take from each log and what to do with it.
-    workers : int, optional
-        Logs at a time on this machine; by default one for each processor.
-    scheduler : str, optional
-        Address of a Dask scheduler; its workers do the work.
-    retries : int
-        More tries for a log whose worker was lost or whose storage failed.
-    overwrite : bool
-        Whether results of other settings, or of a log that has changed, may be replaced.
-    rerun : bool
-        Whether to analyze also what is up to date; implies `overwrite`.
-    """
-
-    settings: BatchSettings = dataclasses.field(default_factory=BatchSettings)
-    workers: int | None = None
-    scheduler: str | None = None
-    retries: int = 2
-    overwrite: bool = False
-    rerun: bool = False
 
 
 @dataclass(frozen=True)
@@ -131,8 +104,8 @@ def run_batch(arguments: Sequence[str], out: Path, options: BatchOptions, listen
     """Analyze many logs into one folder.
 
     Each log's results go to ``out/logs/NAME``, as `analyze_log` writes them; the tables of all logs to
-    ``out/tables``, partitioned by log; one line a log to ``out/summary.parquet`` and ``out/summary.csv``.
-    Logs whose results are there already, of the same content and settings, are left as they are. A log that
+    ``out/tables``, partitioned by log; one row per log to ``out/summary.parquet`` and ``out/summary.csv``.
+    Logs with results of the same content and options are left as they are. A log that
     fails does not stop the others, and leaves what was there before.
 
     Parameters
@@ -161,10 +134,6 @@ def run_batch(arguments: Sequence[str], out: Path, options: BatchOptions, listen
     # A path holds one of the two slashes of a URL.
     if re.match(r"[a-z][a-z0-9+.-]+:/", str(out)):
         raise ParameterError(f"{out}: results go to a folder, not to a URL")
-    if options.scheduler is not None and options.workers is not None:
-        raise ParameterError(
-            "a number of workers is for this machine; a cluster has the workers that joined its scheduler"
-        )
     out = Path(os.path.abspath(out))  # noqa: PTH100 (as in find_logs)
     require_utf8(out)
     logs = find_logs(arguments, out)
@@ -187,7 +156,7 @@ class _Batch:
         self._work = work
         self._options = options
         self._listener = listener
-        self._settings = options.settings.determining()
+        self._settings = deciding_settings(options.run)
         self._may_replace = options.overwrite or options.rerun
         folders = sorted(folder for folder in (out / LOGS_FOLDER).glob("*") if folder.is_dir())
         self._records = {folder.name: read_record(folder) for folder in folders}
@@ -203,7 +172,7 @@ class _Batch:
         for log, name in names.items():
             look, known_name = looks[log], moved.get(log, name)
             known = self._standing(known_name)
-            task = LogTask(log, name, self._work, self._options.settings, known, known_name)
+            task = LogTask(log, name, self._work, self._options.run, known, known_name)
             task = dataclasses.replace(
                 task,
                 is_whole=self._is_whole(known_name),
@@ -275,7 +244,7 @@ class _Batch:
     def _is_whole(self, name: str) -> bool:
         """Whether results that stand have all the files that are wanted now."""
         wanted = [SUMMARY, *(f"{table}.parquet" for table in TABLES)]
-        asked, record = self._options.settings, self._records.get(name)
+        asked, record = self._options.run, self._records.get(name)
         if asked.recording and record is not None and record.layers != asked.layers:
             return False
         wanted += ["*.rrd"] if asked.recording else []

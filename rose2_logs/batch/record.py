@@ -11,8 +11,7 @@ from typing import Any
 
 from rose2_logs import __version__
 from rose2_logs.batch.location import Location
-from rose2_logs.config.parameters import Parameters
-from rose2_logs.config.run_options import RECORDING_LAYERS
+from rose2_logs.config.run_options import RECORDING_LAYERS, RunOptions
 from rose2_logs.errors import LogError
 from rose2_logs.runs.provenance import log_files
 from rose2_logs.runs.summary import write_json
@@ -24,58 +23,12 @@ SETTLED_S = 2.0
 """A file may change again within this time and keep its time stamp: FAT's stamps are even seconds."""
 
 
-@dataclass(frozen=True)
-class BatchSettings:
-    """What to take from each log and what to do with it.
-
-    Attributes
-    ----------
-    topic : str, optional
-        The map topic; by default ``/map``, else the only one.
-    start_s, end_s : float, optional
-        Seconds into the log.
-    every_s, min_change_m2, max_snapshots
-        As for `Selection`.
-    parameters : Parameters
-        Of all stages.
-    method : str
-        The segmentation method.
-    recording, annotated_log : bool
-        Whether to write the Rerun recording and the annotated MCAP.
-    layers : tuple of str
-        Those of `RECORDING_LAYERS` that the recordings get.
-    back_project : bool
-        Whether to tell how much of the last map's rooms each map shows.
-    bag : bool
-        Whether each folder becomes a bag of ROS 2 that holds the annotated MCAP.
-    strict : bool
-        Whether the first warning about a log is an error. It is not asked of logs whose results stand.
-    """
-
-    topic: str | None = None
-    start_s: float | None = None
-    end_s: float | None = None
-    every_s: float | None = None
-    min_change_m2: float | None = None
-    max_snapshots: int | None = None
-    parameters: Parameters = dataclasses.field(default_factory=Parameters)
-    method: str = "rose2"
-    recording: bool = True
-    annotated_log: bool = True
-    layers: tuple[str, ...] = RECORDING_LAYERS
-    back_project: bool = False
-    bag: bool = False
-    strict: bool = False
-
-    def determining(self) -> dict[str, Any]:
-        """Everything that the tables depend on beside the log, as flat JSON values; the version too."""
-        flat = {
-            f"{block}.{name}": value
-            for block, values in self.parameters.resolved().items()
-            for name, value in values.items()
-        }
-        names = ("topic", "start_s", "end_s", "every_s", "min_change_m2", "max_snapshots", "method")
-        return {"rose2-logs": __version__} | {name: getattr(self, name) for name in names} | flat
+def deciding_settings(options: RunOptions) -> dict[str, Any]:
+    """Return everything but the log that its tables depend on, as flat JSON values; the version too."""
+    deciding = options.deciding()
+    blocks = deciding.pop("parameters")
+    flat = {f"{block}.{name}": value for block, values in blocks.items() for name, value in values.items()}
+    return {"rose2-logs": __version__, **deciding, **flat}
 
 
 @dataclass(frozen=True)
@@ -147,7 +100,7 @@ class Record:
     sha256 : str
         Its fingerprint.
     settings : dict
-        `BatchSettings.determining`.
+        `deciding_settings`.
     layers : tuple of str
         Those of the recording, if there is one.
     """

@@ -21,7 +21,8 @@ from typing import Literal
 
 from rose2_logs import __version__
 from rose2_logs.batch.location import Location
-from rose2_logs.batch.record import BatchSettings, Record, Signature, signature_of
+from rose2_logs.batch.record import Record, Signature, deciding_settings, signature_of
+from rose2_logs.config.run_options import RunOptions
 from rose2_logs.errors import LogError, OutputError, Rose2LogsError
 from rose2_logs.system.warnings import PACKAGE, WarningLog, collect_warnings
 
@@ -67,8 +68,8 @@ class LogTask:
         Of its results' folder.
     work : path
         Folder of this batch's unfinished results. Its file `RUNNING` is there as long as the batch.
-    settings : BatchSettings
-        What to take and do.
+    options : RunOptions
+        What to take from the log, how to analyze it, what to write.
     known : Record, optional
         Of results that stand: nothing is done if they are of this very log.
     known_name : str
@@ -88,7 +89,7 @@ class LogTask:
     log: Location
     name: str
     work: Path
-    settings: BatchSettings
+    options: RunOptions
     known: Record | None = None
     known_name: str = ""
     is_whole: bool = False
@@ -177,7 +178,9 @@ def analyze_task(task: LogTask, report: Report) -> LogOutcome:
             outcome = LogOutcome(
                 task.name,
                 "failed",
-                reason=str(error) if known else f"{type(error).__name__}: {error} (a fault of rose2-logs)",
+                reason=str(error)
+                if known
+                else f"{type(error).__name__}: {error} (internal error of rose2-logs)",
                 is_transient=is_transient(error),
                 details=traceback.format_exc(),
             )
@@ -222,10 +225,9 @@ def _analyze(task: LogTask, report: Report, warning_log: WarningLog) -> LogOutco
 
 
 def _analyze_local(task: LogTask, path: Path, signature: Signature, report: Report) -> LogOutcome:
-    from rose2_logs.config.selection import Selection
     from rose2_logs.runs.provenance import fingerprint
     from rose2_logs.runs.summary import SUMMARY
-    from rose2_logs.workflows.analyze import RunOptions, analyze_log, seconds_into_log
+    from rose2_logs.workflows.analyze import analyze_log
 
     if task.known is not None:
         is_same = fingerprint(path)["sha256"] == task.known.sha256
@@ -235,24 +237,9 @@ def _analyze_local(task: LogTask, path: Path, signature: Signature, report: Repo
             raise OutputError(
                 f"{task.log.address}: has changed since its results; overwrite=True replaces them"
             )
-    asked = task.settings
     with _attempt_folder(task) as folder:
-        start_ns, end_ns = seconds_into_log(path, asked.start_s, asked.end_s, asked.parameters.reading)
-        options = RunOptions(
-            topic=asked.topic,
-            selection=Selection(start_ns, end_ns, asked.every_s, asked.min_change_m2, asked.max_snapshots),
-            parameters=asked.parameters,
-            method=asked.method,
-            recording=asked.recording,
-            layers=asked.layers,
-            annotated_log=asked.annotated_log,
-            back_project=asked.back_project,
-            bag=asked.bag,
-            strict=asked.strict,
-            journal=False,  # a log that was stopped is begun anew, in another folder
-            origin=task.log.address,
-            home=task.home,
-        )
+        # A log that was stopped is analyzed anew, in another folder: nothing is to be kept for it.
+        options = dataclasses.replace(task.options, journal=False, origin=task.log.address, home=task.home)
         reported = 0.0
 
         def on_snapshot(_: object, share: float) -> None:
@@ -278,8 +265,8 @@ def _confirmed(task: LogTask, known: Record, signature: Signature) -> Record:
 
 
 def _record(task: LogTask, signature: Signature, sha256: str) -> Record:
-    asked = task.settings
-    return Record(task.log.address, signature, sha256, asked.determining(), asked.layers)
+    asked = task.options
+    return Record(task.log.address, signature, sha256, deciding_settings(asked), asked.layers)
 
 
 @contextmanager

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
-import re
+import sys
 import traceback
 from collections import Counter
 from dataclasses import dataclass
@@ -15,26 +15,13 @@ from rich.console import Console
 from rich.markup import escape
 from rich.text import Text
 
+from rose2_logs.cli.flags import with_flags
+from rose2_logs.errors import Rose2LogsError
 from rose2_logs.system.warnings import FIELDS, PACKAGE
 
 SHOWN_OF_KIND = 3
 """Warnings of one kind that are shown; a log with a thousand damaged messages has a thousand more."""
-FLAGS = {
-    "overwrite=True": "--overwrite",
-    "resume=True": "--resume",
-    "strict=True": "--strict",
-    "bag=True": "--bag",
-    "live=True": "--live",
-    "web=True": "--web",
-    "annotated_log=False": "--no-mcap",
-    "topic=": "--topic ",
-    "resolution_m=": "--resolution ",
-    "the parameter reading.": "--set reading.",
-}
-"""The library's messages name options as they are written in Python; here they are named as flags."""
 STYLES = {"info": "cyan", "warning": "yellow", "error": "bold red"}
-
-_OPTIONS = re.compile(r"(?<!\w)(?:" + "|".join(map(re.escape, FLAGS)) + ")")
 
 errors = Console(stderr=True, highlight=False)
 """Where messages and progress go."""
@@ -49,11 +36,14 @@ class MessageStyle:
     level : int
         The least, of the `logging` module.
     as_json : bool
-        Whether as one JSON object a line.
+        Whether each is one line of JSON.
+    debug : bool
+        Whether errors are shown with their tracebacks.
     """
 
     level: int = logging.WARNING
     as_json: bool = False
+    debug: bool = False
 
     @property
     def shows_progress(self) -> bool:
@@ -74,7 +64,7 @@ def show_messages(*, quiet: bool = False, verbose: bool = False, as_json: bool =
     verbose : bool
         Also what is done, and every warning; it wins over `quiet`.
     as_json : bool
-        As one JSON object a line: time, level, message, kind, file, topic, index.
+        Each as one line of JSON: time, level, message, kind, file, topic, index.
     """
     style.level = logging.INFO if verbose else logging.ERROR if quiet else logging.WARNING
     style.as_json = as_json
@@ -92,7 +82,7 @@ class _MessageHandler(logging.Handler):
         self._shown: Counter[str] = Counter()
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Show one message, of a kind that came often only that it does."""
+        """Show one message; of a kind that came often only that it did."""
         told = {name: getattr(record, name, None) for name in FIELDS}
         kind = told["kind"]
         if kind is not None and not style.as_json and style.level >= logging.WARNING:
@@ -105,7 +95,7 @@ class _MessageHandler(logging.Handler):
 
 
 def show(level: str, message: str, **told: Any) -> None:
-    """Show one line; what it tells beside its text goes into JSON only."""
+    """Show one line; what is told beside its text goes into JSON only."""
     text = printable(with_flags(message))
     if style.as_json:
         now = datetime.now(UTC).isoformat(timespec="milliseconds")
@@ -116,23 +106,24 @@ def show(level: str, message: str, **told: Any) -> None:
         errors.print(f"[{STYLES.get(level, 'default')}]{level}:[/] {escape(text)}", soft_wrap=True)
 
 
-def with_flags(message: str) -> str:
-    """Return a message of the library with the options that it names as the command line has them."""
-    return _OPTIONS.sub(lambda found: FLAGS[found[0]], message)
-
-
 def printable(text: str) -> str:
     """Return a text as one line without control characters, which names in a log may hold."""
     return "".join(sign if sign.isprintable() else "\ufffd" for sign in " ".join(text.split()))
 
 
-def error(message: str, debug: bool = False, **told: Any) -> None:
-    """Show one line about an error, after its traceback if asked for."""
-    if debug and not style.as_json:
-        errors.print(escape(traceback.format_exc()), soft_wrap=True)
-    elif debug:
-        told["traceback"] = traceback.format_exc()
+def error(message: str, **told: Any) -> None:
+    """Show one line about an error, after the traceback of the one that is handled if that was asked for."""
+    if style.debug and sys.exc_info()[0] is not None:
+        if style.as_json:
+            told["traceback"] = traceback.format_exc()
+        else:
+            errors.print(escape(traceback.format_exc()), soft_wrap=True)
     show("error", message, **told)
+
+
+def show_error(failure: Rose2LogsError) -> None:
+    """Show one line about a known error, with what it concerns for programs."""
+    error(str(failure), file=failure.file, topic=failure.topic, index=failure.index)
 
 
 def warning(message: str) -> None:

@@ -1,103 +1,77 @@
-"""What several commands share: options, exit codes, parameters from the options."""
+"""Options of commands: those that all have, and those that are made from dataclasses of the library."""
 
 from __future__ import annotations
 
+import dataclasses
+import functools
+import inspect
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated, Any, get_args, get_type_hints
 
 import typer
+from typer.models import OptionInfo
 
-from rose2_logs.errors import ParameterError
+from rose2_logs.batch.options import BatchOptions
+from rose2_logs.cli.flags import flag_of
+from rose2_logs.cli.messages import show_messages, style
+from rose2_logs.config.parameters import Parameters, load_parameters
+from rose2_logs.config.run_options import METHOD, Option, RunOptions, options_of
 
-if TYPE_CHECKING:
-    from rose2_logs.config.parameters import Parameters
-
+MESSAGES = "Messages on stderr"
+VALUES = {bool: "", int: "N", str: "NAME", Path: "PATH"}
+"""What stands in a command's help for the value of an option of this type that has no name of its own."""
 EXIT_FAULT, EXIT_KNOWN, EXIT_INTERRUPTED = 1, 2, 130
-
 EXIT_CODES = (
-    "[bold]Exit codes:[/bold] 0 done, also with warnings, which summary.json counts; 1 a fault of "
-    "rose2-logs itself; 2 a log, a file or an option cannot be used, or with --strict a warning, and one "
+    "[bold]Exit codes:[/bold] 0 done, also with warnings, which summary.json counts; 1 internal error of "
+    "rose2-logs; 2 a log, a file or an option cannot be used, or there was a warning with --strict, and one "
     "line says which; 130 interrupted."
 )
 
-state = {"debug": False}
-"""What the options that every command takes have set."""
-
 
 def _set_debug(value: bool) -> None:
-    state["debug"] = value or state["debug"]
+    style.debug = value or style.debug
 
 
+Quiet = Annotated[
+    bool,
+    typer.Option(
+        "--quiet", "-q", help="Show only errors: no progress, no warnings.", rich_help_panel=MESSAGES
+    ),
+]
+Verbose = Annotated[
+    bool,
+    typer.Option(
+        "--verbose", "-v", help="Also show what is being done, and every warning.", rich_help_panel=MESSAGES
+    ),
+]
+JsonLog = Annotated[
+    bool,
+    typer.Option(
+        "--json-log",
+        help="Write each message as one line of JSON for programs: time, level, message, kind, file, topic, "
+        "index of the message.",
+        rich_help_panel=MESSAGES,
+    ),
+]
 Debug = Annotated[
-    bool, typer.Option("--debug", help="Show the traceback of errors.", callback=_set_debug, is_eager=True)
-]
-Workers = Annotated[int, typer.Option(min=1, help="Processes; results do not depend on their number.")]
-Topic = Annotated[
-    str | None, typer.Option(help="Map topic; by default /map, else the only one.", show_default=False)
-]
-Start = Annotated[
-    float | None, typer.Option(metavar="S", help="Skip this many seconds of the log.", show_default=False)
-]
-End = Annotated[
-    float | None, typer.Option(metavar="S", help="Stop this many seconds into the log.", show_default=False)
-]
-Every = Annotated[
-    float | None, typer.Option(metavar="S", help="Least seconds between maps.", show_default=False)
-]
-MinChange = Annotated[
-    float | None,
-    typer.Option(metavar="M2", help="Least newly known area between maps.", show_default=False),
-]
-MaxSnapshots = Annotated[
-    int | None, typer.Option(metavar="N", help="Most maps, spread evenly.", show_default=False)
-]
-Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace what an earlier call has written.")]
-Resume = Annotated[
     bool,
     typer.Option(
-        "--resume",
-        help="Go on after the last map of a run of the same log and parameters that was stopped; "
-        "results that are whole stay as they are.",
+        "--debug",
+        help="Show the traceback of an error, for a bug report.",
+        callback=_set_debug,
+        is_eager=True,
+        rich_help_panel=MESSAGES,
     ),
 ]
-NoRecording = Annotated[bool, typer.Option("--no-rrd", help="Write no Rerun recording.")]
-Layers = Annotated[
-    str,
-    typer.Option(
-        metavar="NAMES",
-        help="What the recording gets besides map, rooms and doorways: all, none, or some of "
-        "predicted, path, clean_map, score, spectrum, segments, lines, faces, voronoi, between commas.",
-    ),
-]
-NoAnnotatedLog = Annotated[bool, typer.Option("--no-mcap", help="Write no annotated MCAP.")]
-Bag = Annotated[
-    bool,
-    typer.Option(
-        "--bag", help="Also write metadata.yaml: `ros2 bag play` of the folder then plays the annotated MCAP."
-    ),
-]
-Method = Annotated[str, typer.Option(help="Segmentation: rose2, morphological, distance or voronoi.")]
-Strict = Annotated[
-    bool,
-    typer.Option(
-        "--strict",
-        help="Take the first warning about the log as an error; by default what is whole is analyzed.",
-    ),
-]
-Smooth = Annotated[
-    bool,
-    typer.Option(
-        "--back-project",
-        help="Read the maps once more in the end and tell how much of each of the last map's rooms every "
-        "map shows: back_projected.parquet, a tab in the recording, a section in the report.",
-    ),
-]
+MESSAGE_OPTIONS = {"quiet": Quiet, "verbose": Verbose, "json_log": JsonLog, "debug": Debug}
 Config = Annotated[
     Path | None,
     typer.Option(
         metavar="FILE.toml",
-        help="Parameters, one table per stage: as in the summary.json of a run.",
+        help="Read parameters from a TOML file with a table for each stage, as summary.json shows them.",
         show_default=False,
+        rich_help_panel=METHOD,
     ),
 ]
 Settings = Annotated[
@@ -105,57 +79,116 @@ Settings = Annotated[
     typer.Option(
         "--set",
         metavar="STAGE.NAME=VALUE",
-        help="Change one parameter, as in walls.extension_m=6; may be repeated. The summary.json of a run "
-        "lists all.",
+        help="Change one parameter, as in walls.extension_m=6; may be repeated and wins over --config. "
+        "The summary.json of a run lists all parameters with their values.",
         show_default=False,
+        rich_help_panel=METHOD,
     ),
 ]
+PARAMETER_OPTIONS = {"config": Config, "settings": Settings}
+MADE_FROM = (RunOptions, BatchOptions, Parameters)
+"""A command that takes one of these gets an option for each of its fields."""
 
 
-def wanted_bag(bag: bool, no_mcap: bool) -> bool:
-    """Check that what is to become a bag is written.
+def option_of(name: str) -> Any:
+    """Make the option of a command that takes a single one of `RunOptions`, with its default."""
+    declared = next(each for each in dataclasses.fields(RunOptions) if each.name == name)
+    return _typer_option(name, declared.metadata["option"], declared.default)
 
-    Raises
-    ------
-    ParameterError
-        If it is not.
+
+class App(typer.Typer):
+    """A Typer application whose commands all have the options about messages.
+
+    A parameter of a command that is annotated with one of `MADE_FROM` stands for all the options of that
+    class; the command is called with an object that was made of what was given.
     """
-    if bag and no_mcap:
-        raise ParameterError("--bag is about the annotated MCAP: leave --no-mcap out")
-    return bag
+
+    def command(self, *arguments: Any, **options: Any) -> Callable[[Any], Any]:
+        """Register a command."""
+        register = super().command(*arguments, **options)
+        return lambda command: register(_with_options(command))
 
 
-def chosen_layers(names: str) -> tuple[str, ...]:
-    """Read which layers of a recording were asked for: all, none, or names between commas.
+def _with_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    name = command.__name__
+    signature = inspect.signature(command, eval_str=True)
+    made = {
+        each.name: each.annotation for each in signature.parameters.values() if each.annotation in MADE_FROM
+    }
 
-    Raises
-    ------
-    ParameterError
-        If there is no such layer.
-    """
-    from rose2_logs.config.run_options import RECORDING_LAYERS
+    @functools.wraps(command)
+    def with_options(**given: Any) -> Any:
+        quiet, verbose, as_json, _ = (given.pop(each) for each in MESSAGE_OPTIONS)
+        show_messages(quiet=quiet, verbose=verbose, as_json=as_json)
+        return command(**{each: _built(kind, name, given) for each, kind in made.items()}, **given)
 
-    if names in ("all", "none"):
-        return RECORDING_LAYERS if names == "all" else ()
-    asked = [name.strip() for name in names.split(",")]
-    if unknown := [name for name in asked if name not in RECORDING_LAYERS]:
-        raise ParameterError(
-            f"--layers: there is no layer {unknown[0]!r}; there are: all, none, {', '.join(RECORDING_LAYERS)}"
-        )
-    return tuple(name for name in RECORDING_LAYERS if name in asked)
+    parameters: list[inspect.Parameter] = []
+    for each in signature.parameters.values():
+        own = _parameters_of(each.annotation, name) if each.name in made else [each]
+        parameters += [one.replace(kind=inspect.Parameter.KEYWORD_ONLY) for one in own]
+    parameters += [_parameter(each, kind, False) for each, kind in MESSAGE_OPTIONS.items()]
+    for each in parameters:
+        _name_value(each.annotation)
+    with_options.__annotations__ = {each.name: each.annotation for each in parameters}
+    with_options.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
+    return with_options
 
 
-def resolve_parameters(config: Path | None, settings: list[str] | None, method: str = "rose2") -> Parameters:
-    """Read the parameters and check the method that were asked for.
+def _parameter(name: str, kind: Any, default: Any) -> inspect.Parameter:
+    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=kind)
 
-    Raises
-    ------
-    ParameterError
-        If there is no such method or parameter, or a value cannot be used.
-    """
-    from rose2_logs.config.parameters import load_parameters
-    from rose2_logs.segmentation.pipeline import METHODS
 
-    if method not in METHODS:
-        raise ParameterError(f"no method {method!r}; there are: {', '.join(METHODS)}")
-    return load_parameters(config, settings or ())
+def _parameters_of(kind: Any, command: str) -> list[inspect.Parameter]:
+    """Make a command's parameters from the options of a dataclass that it has."""
+    if kind is Parameters:
+        return [_parameter(each, about, None) for each, about in PARAMETER_OPTIONS.items()]
+    hints, parameters = get_type_hints(kind), []
+    for declared in dataclasses.fields(kind):
+        if hints[declared.name] in MADE_FROM:
+            parameters += _parameters_of(hints[declared.name], command)
+            continue
+        about: Option = declared.metadata["option"]
+        if command not in about.commands:
+            continue
+        option = _typer_option(declared.name, about, declared.default)
+        given = str if about.parse is not None else hints[declared.name]
+        parameters.append(_parameter(declared.name, given, option))
+    return parameters
+
+
+def _typer_option(name: str, about: Option, default: Any) -> Any:
+    # A flag is off until it is given, also one that turns off what is on.
+    shown = False if isinstance(default, bool) else about.text if about.parse is not None else default
+    return typer.Option(
+        shown,
+        flag_of(name, about),
+        metavar="" if isinstance(default, bool) else about.metavar or None,
+        help=about.help,
+        show_default=shown is not None,
+        rich_help_panel=about.panel,
+    )
+
+
+def _built(kind: Any, command: str, given: dict[str, Any]) -> Any:
+    """Make an object of a dataclass from its options, which are taken out of what was given."""
+    if kind is Parameters:
+        return load_parameters(given.pop("config"), given.pop("settings") or ())
+    hints, values = get_type_hints(kind), {}
+    for declared in dataclasses.fields(kind):
+        if hints[declared.name] in MADE_FROM:
+            values[declared.name] = _built(hints[declared.name], command, given)
+    for name, about in options_of(kind).items():
+        if command in about.commands and name not in values:
+            value = given.pop(name)
+            value = about.parse(value) if about.parse is not None else value
+            values[name] = not value if about.flag.startswith("--no-") else value
+    return kind(**values)
+
+
+def _name_value(kind: Any) -> None:
+    """Name what an option takes as people do; behind a flag nothing, as if it took a value."""
+    base, *about = get_args(kind) or (kind,)
+    base = next((each for each in get_args(base) if each is not type(None)), base)
+    for each in about:
+        if isinstance(each, OptionInfo) and each.metavar is None:
+            each.metavar = VALUES.get(base)

@@ -7,6 +7,9 @@ from typing import ClassVar
 
 from rose2_logs.config.fields import ParameterBlock, number
 
+METHODS = ("rose2", "morphological", "distance", "voronoi")
+"""Names of the segmentation methods: the paper's, and those that it is compared with."""
+
 
 @dataclass(frozen=True, repr=False)
 class MorphologicalParameters(ParameterBlock):

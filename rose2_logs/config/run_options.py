@@ -1,12 +1,25 @@
-"""What a run is to take from a log, do with it, and write."""
+"""Every option of a run, defined once: the command line, batches and the Python functions take theirs here.
+
+An option is a field that `option` declares, with its default and an `Option` about it. To add one, add a
+field here and use it where it matters.
+"""
 
 from __future__ import annotations
 
+import dataclasses
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from numbers import Integral, Real
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
+from rose2_logs.config.baselines import METHODS
 from rose2_logs.config.parameters import Parameters
-from rose2_logs.config.selection import Selection
+from rose2_logs.errors import ParameterError
+
+if TYPE_CHECKING:
+    from rose2_logs.config.selection import Selection
 
 RECORDING_LAYERS = (
     "predicted",
@@ -20,75 +33,318 @@ RECORDING_LAYERS = (
     "voronoi",
 )
 """Layers of a recording that can be left out; map, rooms and doorways are always there."""
+LONGEST_LOG_S = 2.0**63 / 1e9
+"""Log times are 64 bit integers that count nanoseconds."""
+BOTH = ("analyze", "batch")
+MAPS, OUTPUTS, METHOD = "Which maps", "What to write", "Method and parameters"
+"""Groups of options in the help."""
 
-NOT_IN_JOURNAL = (
-    *("topic", "selection", "parameters", "workers", "recording", "layers", "annotated_log", "bag"),
-    *("live", "back_project", "origin", "home", "overwrite", "resume", "journal", "strict"),
-)
-"""Options that the analysis does not depend on, or that a journal names otherwise."""
+
+@dataclass(frozen=True)
+class Option:
+    """What is to be known of an option beside its name, type and default.
+
+    Attributes
+    ----------
+    help : str
+        What it does, in plain English; with its unit, and when one wants it.
+    panel : str
+        Group in the help.
+    commands : tuple of str
+        Commands that have it; an option for programs alone has none.
+    flag : str
+        On the command line; by default the name with dashes. That of an option which is on by default begins
+        with ``--no-`` and turns it off.
+    metavar : str
+        What stands for the value in the help.
+    low, high : float
+        Bounds of a number, both allowed.
+    choices : tuple of str
+        All values, where these are a few names.
+    parse : callable, optional
+        Makes the value from a text, where the command line takes one in its place.
+    text : str
+        That text for the default.
+    decides : bool
+        Whether what is found in the maps depends on it, and not only what is written about it.
+    """
+
+    help: str
+    panel: str = "Options"
+    commands: tuple[str, ...] = ()
+    flag: str = ""
+    metavar: str = ""
+    low: float = -math.inf
+    high: float = math.inf
+    choices: tuple[str, ...] = ()
+    parse: Callable[[str], Any] | None = None
+    text: str = ""
+    decides: bool = False
+
+    @property
+    def meaning(self) -> str:
+        """What it does, as said of a keyword in Python."""
+        return (
+            f"If False: {self.help[0].lower()}{self.help[1:]}" if self.flag.startswith("--no-") else self.help
+        )
+
+
+def option(default: Any, help: str, **about: Any) -> Any:
+    """Declare an option of a dataclass; a default that is a class is called for the value."""
+    known = {"option": Option(help, **about)}
+    if isinstance(default, type):
+        return field(default_factory=default, metadata=known)
+    return field(default=default, metadata=known)
+
+
+def options_of(kind: Any) -> dict[str, Option]:
+    """List what is known of the options of a dataclass, by their names."""
+    return {each.name: each.metadata["option"] for each in dataclasses.fields(kind) if each.metadata}
+
+
+def check_options(given: Any) -> None:
+    """Check numbers against their bounds and names against their choices.
+
+    Parameters
+    ----------
+    given : dataclass
+        With options; None is right where it is the default.
+
+    Raises
+    ------
+    ParameterError
+        That names the first option whose value cannot be used.
+    """
+    for each in dataclasses.fields(given):
+        value = getattr(given, each.name)
+        if each.metadata and not (value is None and each.default is None):
+            _check(each, value)
+
+
+def check_option(kind: Any, name: str, value: Any) -> None:
+    """Check the value of one option of a dataclass as `check_options` does."""
+    _check(next(each for each in dataclasses.fields(kind) if each.name == name), value)
+
+
+def _check(declared: dataclasses.Field[Any], value: Any) -> None:
+    about: Option = declared.metadata["option"]
+    if about.choices and value not in about.choices:
+        raise ParameterError(f"{declared.name}={value!r}: it must be one of {', '.join(about.choices)}")
+    if about.low == -math.inf and about.high == math.inf:
+        return
+    is_whole = "int" in str(declared.type)
+    is_number = isinstance(value, Integral if is_whole else Real) and value is not True and value is not False
+    if not is_number or not about.low <= value <= about.high:
+        what = "a whole number" if is_whole else "a number"
+        bounds = f"{about.low:g} or more" if about.high == math.inf else f"{about.low:g} to {about.high:g}"
+        raise ParameterError(f"{declared.name}={value!r}: it must be {what}, {bounds}")
+
+
+def layers_named(text: str) -> tuple[str, ...]:
+    """Read which layers of a recording are wanted.
+
+    Parameters
+    ----------
+    text : str
+        ``all``, ``none``, or names among `RECORDING_LAYERS` with commas between them.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such layer.
+    """
+    if text in ("all", "none"):
+        return RECORDING_LAYERS if text == "all" else ()
+    asked = [name.strip() for name in text.split(",")]
+    _check_layers(asked)
+    return tuple(name for name in RECORDING_LAYERS if name in asked)
+
+
+def _check_layers(names: Sequence[str]) -> None:
+    for name in names:
+        if name not in RECORDING_LAYERS:
+            raise ParameterError(
+                f"layers={name!r}: there is no such layer; there are: all, none, "
+                f"{', '.join(RECORDING_LAYERS)}"
+            )
 
 
 @dataclass(frozen=True)
 class RunOptions:
-    """What to take from a log, what to do with it, what to write.
+    """What to take from a log, how to analyze it, what to write.
 
-    Attributes
-    ----------
-    topic : str, optional
-        The map topic; by default ``/map``, else the only one.
-    selection : Selection
-        Which maps.
-    parameters : Parameters
-        Of all stages.
-    method : str
-        The segmentation method.
-    workers : int
-        Processes; results do not depend on it. A script that asks for several does so under
-        ``if __name__ == "__main__"``, as each of them imports it.
-    recording, annotated_log : bool
-        Whether to write the Rerun recording and the annotated MCAP. The tables are always written.
-    bag : bool
-        Whether the folder becomes a bag of ROS 2 that holds the annotated MCAP.
-    layers : tuple of str
-        Those of `RECORDING_LAYERS` that the recording gets.
-    back_project : bool
-        Whether to go through the maps once more in the end and tell how much of the last map's rooms each
-        shows.
-    live : bool
-        Also send the recording to an open Rerun viewer.
-    overwrite : bool
-        Whether results of an earlier run may be replaced.
-    resume : bool
-        Whether to go on where a run of the same log and parameters was stopped; without one, begin anew.
-    journal : bool
-        Whether to keep what is found on the way beside the folder, so that a run that is stopped can go on.
-    origin : str, optional
-        What the summary names as the log; by default its path. For a log that was copied to be read.
-    home : path, optional
-        The folder in which the results will stand, if they are moved there afterwards.
-    strict : bool
-        Whether the first warning about the log is an error.
+    Each option has a default, and is explained where it is declared.
+
+    Raises
+    ------
+    ParameterError
+        If a value cannot be used; the message names the option.
     """
 
-    topic: str | None = None
-    selection: Selection = field(default_factory=Selection)
-    parameters: Parameters = field(default_factory=Parameters)
-    method: str = "rose2"
-    workers: int = 1
-    recording: bool = True
-    annotated_log: bool = True
-    bag: bool = False
-    layers: tuple[str, ...] = RECORDING_LAYERS
-    back_project: bool = False
-    live: bool = False
-    overwrite: bool = False
-    resume: bool = False
-    journal: bool = True
-    origin: str | None = None
-    home: Path | None = None
-    strict: bool = False
+    topic: str | None = option(
+        None,
+        "Topic of the maps. By default /map, or the only topic that holds maps.",
+        panel=MAPS,
+        commands=BOTH,
+        metavar="NAME",
+        decides=True,
+    )
+    start_s: float | None = option(
+        None,
+        "Skip the first S seconds of the log.",
+        panel=MAPS,
+        commands=BOTH,
+        flag="--start",
+        metavar="S",
+        low=0.0,
+        high=LONGEST_LOG_S,
+        decides=True,
+    )
+    end_s: float | None = option(
+        None,
+        "Stop S seconds after the beginning of the log.",
+        panel=MAPS,
+        commands=BOTH,
+        flag="--end",
+        metavar="S",
+        low=0.0,
+        high=LONGEST_LOG_S,
+        decides=True,
+    )
+    every_s: float | None = option(
+        None,
+        "Minimum seconds between maps: for logs with a map several times a second.",
+        panel=MAPS,
+        commands=BOTH,
+        flag="--every",
+        metavar="S",
+        low=0.0,
+        high=LONGEST_LOG_S,
+        decides=True,
+    )
+    min_change_m2: float | None = option(
+        None,
+        "Minimum area, in square meters, that changed between known and unknown since the map before: skips "
+        "maps that are recorded while the robot stands still.",
+        panel=MAPS,
+        commands=BOTH,
+        flag="--min-change",
+        metavar="M2",
+        low=0.0,
+        high=1e12,
+        decides=True,
+    )
+    max_snapshots: int | None = option(
+        None,
+        "Maximum number of maps, evenly spaced: for a quick look at a long log.",
+        panel=MAPS,
+        commands=BOTH,
+        metavar="N",
+        low=1,
+        decides=True,
+    )
+    method: str = option(
+        "rose2",
+        f"Segmentation method: {', '.join(METHODS)}.",
+        panel=METHOD,
+        commands=BOTH,
+        metavar="NAME",
+        choices=METHODS,
+        decides=True,
+    )
+    parameters: Parameters = option(  # noqa: RUF009 (it calls `field`)
+        Parameters, "Parameters of all stages.", panel=METHOD, decides=True
+    )
+    workers: int = option(
+        1,
+        "Number of processes that analyze maps at the same time. Results do not depend on it.",
+        panel=METHOD,
+        commands=("analyze",),
+        metavar="N",
+        low=1,
+    )
+    recording: bool = option(True, "Write no Rerun recording.", panel=OUTPUTS, commands=BOTH, flag="--no-rrd")
+    layers: tuple[str, ...] = option(
+        RECORDING_LAYERS,
+        "What the recording shows beside map, rooms and doorways: all, none, or names with commas between "
+        f"them, of {', '.join(RECORDING_LAYERS)}.",
+        panel=OUTPUTS,
+        commands=BOTH,
+        metavar="NAMES",
+        parse=layers_named,
+        text="all",
+    )
+    annotated_log: bool = option(
+        True, "Write no annotated MCAP.", panel=OUTPUTS, commands=BOTH, flag="--no-mcap"
+    )
+    bag: bool = option(
+        False,
+        "Also write metadata.yaml, which makes the folder a ROS 2 bag: `ros2 bag play` plays the annotated "
+        "MCAP.",
+        panel=OUTPUTS,
+        commands=BOTH,
+    )
+    back_project: bool = option(
+        False,
+        "Read the maps a second time and tell how much of each room of the last map every earlier map shows: "
+        "in back_projected.parquet, a tab of the recording, a section of the report.",
+        panel=OUTPUTS,
+        commands=BOTH,
+    )
+    live: bool = option(
+        False,
+        "Also show the run in a Rerun viewer while it is analyzed; one is started if none is open.",
+        panel=OUTPUTS,
+        commands=("analyze",),
+    )
+    overwrite: bool = option(
+        False, "Replace the results of an earlier run.", panel=OUTPUTS, commands=("analyze",)
+    )
+    resume: bool = option(
+        False,
+        "Continue a run of the same log and options that was stopped, after its last map. Complete results "
+        "are left as they are.",
+        panel=OUTPUTS,
+        commands=("analyze",),
+    )
+    strict: bool = option(
+        False,
+        "Stop at the first warning about the log. By default everything that can be read is analyzed.",
+        panel=MAPS,
+        commands=BOTH,
+    )
+    journal: bool = option(True, "Keep what is found on the way, so that a stopped run can be resumed.")
+    origin: str | None = option(
+        None, "What the summary names as the log, for a log that was copied to be read; by default its path."
+    )
+    home: Path | None = option(  # noqa: RUF009 (it calls `field`)
+        None, "Folder to which the results will be moved afterwards, if they will."
+    )
+
+    def __post_init__(self) -> None:
+        check_options(self)
+        _check_layers(self.layers)
+        if self.bag and not self.annotated_log:
+            raise ParameterError(
+                "bag=True makes a ROS 2 bag of the annotated MCAP, which annotated_log=False leaves out"
+            )
+        if self.start_s is not None and self.end_s is not None and self.start_s > self.end_s:
+            raise ParameterError(f"start_s={self.start_s:g}: it lies after end_s={self.end_s:g}")
+
+    @property
+    def selection(self) -> Selection:
+        """Which maps of the log to take."""
+        from rose2_logs.config.selection import Selection  # brings NumPy, which a command's help does without
+
+        names = ("start_s", "end_s", "every_s", "min_change_m2", "max_snapshots")
+        return Selection(**{name: getattr(self, name) for name in names})
 
     @property
     def shown_layers(self) -> tuple[str, ...]:
         """The layers that a recording, stored or live, is going to show."""
         return self.layers if self.recording or self.live else ()
+
+    def deciding(self) -> dict[str, Any]:
+        """Return the options on which it depends what is found in the maps, as JSON values."""
+        values = {name: getattr(self, name) for name, about in options_of(self).items() if about.decides}
+        return values | {"parameters": self.parameters.resolved()}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +15,7 @@ Times = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Selection:
-    """Which maps of a log to take; without arguments all of them.
+    """Which maps of a log to take; by default all of them.
 
     All but `min_change_m2` is decided from message times, so that what is not taken is not decoded either.
 
@@ -23,12 +24,14 @@ class Selection:
     start_ns, end_ns : int, optional
         First and last log time to take, both inclusive, nanoseconds since the epoch.
     every_s : float, optional
-        Least time between two taken messages, seconds; the first one is taken.
+        Minimum time between two taken messages, seconds; the first one is taken.
     min_change_m2 : float, optional
-        Least area that became known, or unknown again, since the last taken map, square meters.
+        Minimum area, square meters, that changed between known and unknown since the last taken map.
     max_snapshots : int, optional
-        Most messages to take, spread evenly over those that are left; the first and the last one stay in
-        (of 1, the last one stays).
+        Maximum number of messages, evenly spaced over those that are left; the first and the last one are
+        among them (of 1, it is the last one).
+    start_s, end_s : float, optional
+        The time range in seconds since the log's first message, in place of `start_ns` and `end_ns`.
 
     Raises
     ------
@@ -41,17 +44,27 @@ class Selection:
     every_s: float | None = None
     min_change_m2: float | None = None
     max_snapshots: int | None = None
+    start_s: float | None = None
+    end_s: float | None = None
 
     def __post_init__(self) -> None:
         if self.start_ns is not None and self.end_ns is not None and self.start_ns > self.end_ns:
             raise ParameterError(
                 f"the time range starts at {self.start_ns} ns, after its end at {self.end_ns} ns"
             )
-        for what, value in (("time between snapshots", self.every_s), ("map change", self.min_change_m2)):
+        for name in ("every_s", "min_change_m2", "start_s", "end_s"):
+            value = getattr(self, name)
             if value is not None and not (np.isfinite(value) and value >= 0):
-                raise ParameterError(f"the least {what} must be 0 or more, not {value}")
+                raise ParameterError(f"{name}={value!r}: it must be a number, 0 or more")
         if self.max_snapshots is not None and self.max_snapshots < 1:
-            raise ParameterError(f"the most snapshots to take must be 1 or more, not {self.max_snapshots}")
+            raise ParameterError(f"max_snapshots={self.max_snapshots!r}: it must be 1 or more")
+
+    def since(self, first_ns: int | None) -> Selection:
+        """Return the same with a time range in log times, for a log whose first message is of `first_ns`."""
+        begin_ns = first_ns or 0
+        start_ns = self.start_ns if self.start_s is None else begin_ns + round(self.start_s * 1e9)
+        end_ns = self.end_ns if self.end_s is None else begin_ns + round(self.end_s * 1e9)
+        return dataclasses.replace(self, start_ns=start_ns, end_ns=end_ns, start_s=None, end_s=None)
 
     def in_range(self, times: Times) -> Times:
         """Keep those of the sorted `times` that lie in the time range."""

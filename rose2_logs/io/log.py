@@ -53,7 +53,7 @@ class LogReader:
         self.topic = choose_topic(source.info, topic)
         self.counts = ReadCounts()
         self.source = source
-        self._selection = selection
+        self._selection = selection.since(source.info.start_ns)
         self._first_failure: str | None = None
         self._topics = [self.topic] + [
             item.name

@@ -10,16 +10,16 @@ import shapely
 from rose2_logs.model.occupancy import OccupancySnapshot
 from rose2_logs.model.room_plan import PlanMap, PlanRoom, RoomPlan
 from rose2_logs.model.rooms import Doorway, RoomMap
-from rose2_logs.runs.run import Run
+from rose2_logs.runs.stored_run import StoredRun
 from rose2_logs.tracking.back_projection import BackProjector
 
 
-def back_projected_plan(run: Run, snapshot: int) -> RoomPlan:
+def back_projected_plan(run: StoredRun, snapshot: int) -> RoomPlan:
     """Find what a map shows of the last map's rooms; their shapes are those of the last map.
 
     Parameters
     ----------
-    run : Run
+    run : StoredRun
         It need not have been projected back when it was analyzed.
     snapshot : int
         Number of the map.

@@ -26,7 +26,7 @@ from rose2_logs.runs.codec import Codec
 from rose2_logs.system.files import writing
 from rose2_logs.system.workers import Workers
 
-Found = tuple[SnapshotAnalysis, RoomQuality] | InvalidMapError
+Found = SnapshotAnalysis | InvalidMapError
 """What comes of one map, or why nothing does."""
 
 MAGIC = b"rose2_logs journal 1\n"

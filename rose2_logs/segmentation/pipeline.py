@@ -12,6 +12,7 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
+from rose2_logs.config.baselines import METHODS
 from rose2_logs.config.parameters import FloorPlanParameters, Parameters, TopologyParameters
 from rose2_logs.errors import ParameterError
 from rose2_logs.model.analysis import FloorPlan, SnapshotAnalysis, Structure, Walls
@@ -21,7 +22,7 @@ from rose2_logs.model.occupancy import FloatArray, OccupancySnapshot
 from rose2_logs.model.outlines import room_outlines
 from rose2_logs.model.room_quality import room_quality
 from rose2_logs.model.rooms import Doorway, RoomMap
-from rose2_logs.segmentation.baselines.stage import BASELINES, segment_by_baseline
+from rose2_logs.segmentation.baselines.stage import segment_by_baseline
 from rose2_logs.segmentation.floor_plan.stage import FloorPlanResult, make_floor_plan
 from rose2_logs.segmentation.rooms.doorways import find_doorways
 from rose2_logs.segmentation.rooms.stage import make_rooms
@@ -30,8 +31,7 @@ from rose2_logs.segmentation.topology.splitting import split_rooms
 from rose2_logs.segmentation.topology.voronoi import voronoi_lines
 from rose2_logs.segmentation.walls.stage import WallCounter, WallResult, find_walls
 
-METHODS = ("rose2", *BASELINES)
-"""Names of the segmentation methods: the paper's, and those that it compares with."""
+__all__ = ["METHODS", "analyze"]
 
 
 def analyze(
@@ -66,7 +66,7 @@ def analyze(
     """
     parameters = Parameters.from_any(parameters)
     if method not in METHODS:
-        raise ParameterError(f"no method {method!r}; there are: {', '.join(METHODS)}")
+        raise ParameterError(f"method={method!r}: it must be one of {', '.join(METHODS)}")
     watch = _StopWatch()
     explored = ExploredPart.of(snapshot.cells, snapshot.geometry, parameters.occupancy)
     watch.lap("prepare")

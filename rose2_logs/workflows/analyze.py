@@ -11,13 +11,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from rose2_logs.config.parameters import ReadingParameters
-from rose2_logs.config.run_options import NOT_IN_JOURNAL, RunOptions
-from rose2_logs.errors import InvalidMapError, ParameterError
-from rose2_logs.io import inspect_log, open_log
+from rose2_logs.config.run_options import RunOptions
+from rose2_logs.errors import InvalidMapError
+from rose2_logs.io import open_log
 from rose2_logs.io.discovery import stem_of
 from rose2_logs.io.log import LogReader
-from rose2_logs.io.log_file import LATEST_NS
 from rose2_logs.outputs.mcap.viewer_layouts import bag_metadata_path, foxglove_path, rviz_path
 from rose2_logs.runs.history import RunHistory, RunSummary
 from rose2_logs.runs.journal import JournaledWorkers
@@ -38,7 +36,6 @@ __all__ = [
     "RunResult",
     "analyze_log",
     "log_stem",
-    "seconds_into_log",
 ]
 
 logger = logging.getLogger(__name__)
@@ -71,29 +68,6 @@ def log_stem(path: Path) -> str:
     is_pattern = glob.has_magic(path.name) and not path.exists()
     name = stem_of(path.parent.name if is_pattern else path.name)
     return name if name.strip(".") else NAMELESS
-
-
-def seconds_into_log(
-    path: Path, start_s: float | None, end_s: float | None, limits: ReadingParameters
-) -> tuple[int | None, int | None]:
-    """Convert seconds since a log's first message to log times in nanoseconds; None stays None.
-
-    Raises
-    ------
-    LogError
-        If the log cannot be opened.
-    ParameterError
-        If a time is no number that a log can hold.
-    """
-    for seconds in (start_s, end_s):
-        if seconds is not None and not abs(seconds) <= LATEST_NS / 1e9:
-            raise ParameterError(f"{seconds:g} s is not a valid time offset into a log")
-    if start_s is None and end_s is None:
-        return None, None
-    with muted():  # these warnings come again when the log is analyzed
-        first_ns = inspect_log(path, limits).start_ns or 0
-    start_ns = None if start_s is None else first_ns + round(start_s * 1e9)
-    return start_ns, None if end_s is None else first_ns + round(end_s * 1e9)
 
 
 def analyze_log(
@@ -261,15 +235,13 @@ def _run_info(path: Path, folder: Path, reader: LogReader, options: RunOptions) 
 
 def _facts(info: RunInfo, options: RunOptions) -> dict[str, Any]:
     """Tell what the analysis of the maps depends on; what also stands in the summary, as it stands there."""
-    others = {each.name for each in dataclasses.fields(options)}.difference(NOT_IN_JOURNAL)
     return {
+        **options.deciding(),
         "input": info.provenance,
         "topic": info.topic,
         "selection": dataclasses.asdict(options.selection),
-        "parameters": info.parameters.resolved(),
         "versions": info.versions,
         "voronoi": "voronoi" in options.shown_layers,
-        **{name: getattr(options, name) for name in sorted(others)},
     }
 
 

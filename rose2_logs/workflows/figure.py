@@ -12,9 +12,8 @@ from rose2_logs.errors import ParameterError
 from rose2_logs.outputs.exports.formats import planned_files, write_plan
 from rose2_logs.runs.run import Run
 from rose2_logs.system.files import refuse_existing, replacing
+from rose2_logs.workflows import FIGURE_WIDTH_PX
 
-FIGURE_WIDTH_PX = 1800
-"""Width of a figure as PNG: 15 cm, a text's width, at 300 dots an inch."""
 PICTURE_ENDINGS = (".png", ".svg")
 
 

@@ -29,9 +29,9 @@ from commands import is_running, wait_for
 from saved_maps import save_run
 
 from rose2_logs.batch import driver
-from rose2_logs.batch.driver import BatchOptions
 from rose2_logs.batch.folders import locked
-from rose2_logs.batch.record import RECORD, BatchSettings
+from rose2_logs.batch.options import BatchOptions
+from rose2_logs.batch.record import RECORD
 from rose2_logs.batch.task import Progress
 from rose2_logs.errors import OutputError
 from rose2_logs.runs.tables import TABLES
@@ -139,7 +139,7 @@ def test_a_killed_worker_takes_only_its_try_with_it(tmp_path):
     logs, out = make_logs(tmp_path / "logs"), tmp_path / "out"
     save_run(logs / "doomed")
     heard = Killer(out)
-    options = BatchOptions(BatchSettings(recording=False, annotated_log=False), workers=2, retries=1)
+    options = BatchOptions(RunOptions(recording=False, annotated_log=False), workers=2, retries=1)
     result = driver.run_batch([str(logs)], out, options, heard)
     assert {state.name for state in result.failed} == {"doomed"}
     assert sorted(name for name, _ in heard.retries) == ["doomed", "slow"]
@@ -166,7 +166,7 @@ def test_a_batch_that_is_killed_leaves_whole_results_and_goes_on(tmp_path, monke
         assert all((out / "logs" / name / f"{table}.parquet").exists() for table in TABLES)
     assert list(out.glob(".batch/unfinished/*/slow/*"))
     monkeypatch.setattr(driver, "LocalWorkers", WorkersHere)
-    options = BatchOptions(BatchSettings(recording=False, annotated_log=False))
+    options = BatchOptions(RunOptions(recording=False, annotated_log=False))
     result = driver.run_batch([str(logs)], out, options, Heard())
     assert {state.name for state in result.states if state.status == "up to date"} == done
     assert len(summary(out)) == 3

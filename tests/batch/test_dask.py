@@ -28,13 +28,14 @@ from saved_maps import save_run
 
 from rose2_logs.batch import dask_workers, driver
 from rose2_logs.batch.dask_workers import DaskWorkers
-from rose2_logs.batch.driver import BatchOptions, run_batch
-from rose2_logs.batch.record import BatchSettings
+from rose2_logs.batch.driver import run_batch
+from rose2_logs.batch.options import BatchOptions
 from rose2_logs.batch.task import Progress
+from rose2_logs.config.run_options import RunOptions
 from rose2_logs.errors import ParameterError
 
 DASK = Path(sys.executable).with_name("dask")
-QUIET = BatchSettings(recording=False, annotated_log=False)
+QUIET = RunOptions(recording=False, annotated_log=False)
 
 
 @contextmanager

@@ -12,13 +12,14 @@ import pytest
 from rose2_logs.batch.record import (
     RECORD,
     SETTLED_S,
-    BatchSettings,
     Record,
     Signature,
+    deciding_settings,
     local_signature,
     read_record,
 )
 from rose2_logs.config.parameters import Parameters
+from rose2_logs.config.run_options import RunOptions
 from rose2_logs.errors import LogError
 
 
@@ -77,7 +78,7 @@ def test_a_log_that_is_not_there_has_no_signature(tmp_path: Path):
 
 def test_a_record_comes_back_as_it_was_written(log: Path, tmp_path: Path):
     """Settings and all; what is not a record is none."""
-    settings = BatchSettings(max_snapshots=3).determining()
+    settings = deciding_settings(RunOptions(max_snapshots=3))
     record = Record("/data/run.mcap", local_signature(log), "abc", settings)
     record.write(tmp_path)
     kept = read_record(tmp_path)
@@ -92,23 +93,23 @@ def test_a_record_comes_back_as_it_was_written(log: Path, tmp_path: Path):
 @pytest.mark.parametrize(
     ("now", "told"),
     [
-        (BatchSettings(method="distance"), "method rose2, now distance"),
-        (BatchSettings(max_snapshots=5), "max_snapshots unset, now 5"),
+        (RunOptions(method="distance"), "method rose2, now distance"),
+        (RunOptions(max_snapshots=5), "max_snapshots unset, now 5"),
         (
-            BatchSettings(parameters=Parameters().replaced({"tracking": {"match_min_iou": 0.3}})),
+            RunOptions(parameters=Parameters().replaced({"tracking": {"match_min_iou": 0.3}})),
             "tracking.match_min_iou 0.2, now 0.3",
         ),
-        (BatchSettings(recording=False), ""),
+        (RunOptions(recording=False), ""),
     ],
 )
-def test_a_difference_is_told_by_name_and_values(now: BatchSettings, told: str):
+def test_a_difference_is_told_by_name_and_values(now: RunOptions, told: str):
     """Of what the tables depend on; which files are written beside them is another matter."""
-    record = Record("", Signature((), True), "", BatchSettings().determining())
-    assert record.difference(now.determining()) == told
+    record = Record("", Signature((), True), "", deciding_settings(RunOptions()))
+    assert record.difference(deciding_settings(now)) == told
 
 
 def test_the_version_counts(monkeypatch):
     """Results of another version are other results."""
-    record = Record("", Signature((), True), "", BatchSettings().determining())
+    record = Record("", Signature((), True), "", deciding_settings(RunOptions()))
     monkeypatch.setattr("rose2_logs.batch.record.__version__", "99.0")
-    assert record.difference(BatchSettings().determining()) == "rose2-logs 0.1.0, now 99.0"
+    assert record.difference(deciding_settings(RunOptions())) == "rose2-logs 0.1.0, now 99.0"

@@ -15,14 +15,16 @@ from batches import Heard, WorkersHere, summary, table_bytes
 from saved_maps import save_run
 
 from rose2_logs.batch import driver, remote, task
-from rose2_logs.batch.driver import BatchOptions, run_batch
+from rose2_logs.batch.driver import run_batch
 from rose2_logs.batch.finding import find_logs
 from rose2_logs.batch.location import Location
-from rose2_logs.batch.record import BatchSettings, signature_of
+from rose2_logs.batch.options import BatchOptions
+from rose2_logs.batch.record import signature_of
+from rose2_logs.config.run_options import RunOptions
 from rose2_logs.errors import LogError
 
 PROJECT = Path(__file__).parents[2]
-SETTINGS = BatchSettings(recording=False, annotated_log=False, max_snapshots=2, method="morphological")
+SETTINGS = RunOptions(recording=False, annotated_log=False, max_snapshots=2, method="morphological")
 
 
 class Handler(SimpleHTTPRequestHandler):

@@ -15,14 +15,15 @@ from rosbags import rosbag2
 from saved_maps import save_run
 
 from rose2_logs.batch import driver, task
-from rose2_logs.batch.driver import BatchOptions, BatchResult, run_batch
+from rose2_logs.batch.driver import BatchResult, run_batch
 from rose2_logs.batch.folders import LOGS_FOLDER, REPLACED, WORK_FOLDER, put_in_place
-from rose2_logs.batch.record import RECORD, BatchSettings
+from rose2_logs.batch.options import BatchOptions
+from rose2_logs.batch.record import RECORD
 from rose2_logs.config.parameters import Parameters
-from rose2_logs.config.run_options import RECORDING_LAYERS
+from rose2_logs.config.run_options import RECORDING_LAYERS, RunOptions
 from rose2_logs.errors import LogError, OutputError, ParameterError
 
-QUIET = BatchSettings(recording=False, annotated_log=False)
+QUIET = RunOptions(recording=False, annotated_log=False)
 
 
 class Batches:
@@ -34,7 +35,7 @@ class Batches:
         save_run(self.logs / "two" / "run", (150, 240))
         self.heard = Heard()
 
-    def run(self, *logs: str, settings: BatchSettings = QUIET, **options: object) -> dict[str, str]:
+    def run(self, *logs: str, settings: RunOptions = QUIET, **options: object) -> dict[str, str]:
         """Run a batch over these folders of logs, or all; return what became of each log."""
         self.heard = Heard()
         self.result: BatchResult = run_batch(
@@ -120,7 +121,7 @@ def test_a_log_that_cannot_be_replaced_keeps_its_results(batches):
 def test_other_settings_need_leave_too_and_nothing_is_begun_without(batches, caplog):
     """A data set of two kinds of results would be a trap."""
     before = tree(batches.out)
-    other = BatchSettings(
+    other = RunOptions(
         parameters=Parameters().replaced({"tracking": {"match_min_iou": 0.3}}),
         recording=False,
         annotated_log=False,
@@ -142,7 +143,7 @@ def test_rerun_does_everything_again(batches):
 
 def test_results_that_lack_a_file_are_made_again(batches):
     """As when a recording is wanted after all, or a table was removed; no leave is needed."""
-    assert batches.run("one", settings=BatchSettings(annotated_log=False)) == {"one_run": "done"}
+    assert batches.run("one", settings=RunOptions(annotated_log=False)) == {"one_run": "done"}
     assert (batches.out / "logs" / "one_run" / "run.rrd").exists()
     assert batches.run("one") == {"one_run": "up to date"}
     (batches.out / "logs" / "one_run" / "rooms.parquet").unlink()
@@ -151,7 +152,7 @@ def test_results_that_lack_a_file_are_made_again(batches):
 
 def test_a_recording_of_other_layers_is_made_again(batches):
     """Only where it is asked for; what was written before is remembered."""
-    plain, full = (BatchSettings(annotated_log=False, layers=layers) for layers in ((), RECORDING_LAYERS))
+    plain, full = (RunOptions(annotated_log=False, layers=layers) for layers in ((), RECORDING_LAYERS))
     recording = batches.out / "logs" / "one_run" / "run.rrd"
     assert batches.run("one", settings=plain) == {"one_run": "done"}
     small = recording.stat().st_size
@@ -164,7 +165,7 @@ def test_a_recording_of_other_layers_is_made_again(batches):
 def test_each_folder_becomes_a_bag(batches):
     """Of results that stand without a description, too."""
     described = [batches.out / "logs" / name / "metadata.yaml" for name in ("one_run", "two_run")]
-    settings = BatchSettings(recording=False, bag=True)
+    settings = RunOptions(recording=False, bag=True)
     assert batches.run("one", settings=dataclasses.replace(settings, bag=False)) == {"one_run": "done"}
     assert not described[0].exists()
     assert batches.run(settings=settings) == {"one_run": "done", "two_run": "done"}
@@ -176,7 +177,7 @@ def test_each_folder_becomes_a_bag(batches):
 def test_what_is_to_be_back_projected_joins_the_data_set(batches):
     """Of results that stand without it, too; it stays until a log is analyzed without it."""
     partition = batches.out / "tables" / "back_projected" / "log=one_run"
-    back_projected = BatchSettings(recording=False, annotated_log=False, back_project=True)
+    back_projected = RunOptions(recording=False, annotated_log=False, back_project=True)
     plain = dataclasses.replace(back_projected, back_project=False)
     assert not partition.exists()
     assert batches.run("one", settings=back_projected) == {"one_run": "done"}

@@ -12,12 +12,12 @@ from saved_maps import save_run
 
 from rose2_logs.batch import task
 from rose2_logs.batch.location import Location
-from rose2_logs.batch.record import BatchSettings
 from rose2_logs.batch.remote import TransferError
 from rose2_logs.batch.task import MOST_WARNINGS, RUNNING, LogTask, Progress, analyze_task, is_transient
+from rose2_logs.config.run_options import RunOptions
 from rose2_logs.errors import LogError
 
-QUIET = BatchSettings(recording=False, annotated_log=False)
+QUIET = RunOptions(recording=False, annotated_log=False)
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from rose2_logs.cli.main import main
-from rose2_logs.cli.options import state
+from rose2_logs.cli.messages import style
 
 
 @pytest.fixture
@@ -16,7 +16,7 @@ def cli(monkeypatch, capfd):
 
     def run(*arguments: object) -> tuple[int, str, str]:
         monkeypatch.setattr(sys, "argv", ["rose2-logs", *map(str, arguments)])
-        monkeypatch.setitem(state, "debug", False)
+        monkeypatch.setattr(style, "debug", False)
         with pytest.raises(SystemExit) as ended:
             main()
         out, err = capfd.readouterr()

@@ -20,12 +20,11 @@ import yaml
 from faulty_logs import SEEN, START_NS, grid, room, write_mcap
 from finished_runs import SAMPLE_LOGS
 from mcap.reader import make_reader
+from rose2_logs.runs.folder import RunResults
 
-from rose2_logs.config.selection import Selection
 from rose2_logs.errors import OutputError
 from rose2_logs.outputs.exports.formats import FORMATS
 from rose2_logs.outputs.report.page import write_report
-from rose2_logs.runs.folder import RunResults
 from rose2_logs.workflows.analyze import NAMELESS, RunOptions, analyze_log, log_stem
 from rose2_logs.workflows.figure import export_plan, write_figure
 
@@ -216,7 +215,7 @@ def test_a_file_in_a_bag_whose_name_is_not_utf8_is_no_trouble(tmp_path: Path):
     shutil.copytree(SAMPLE_LOGS / "ring", bag)
     Path(os.fsdecode(os.fsencode(bag) + b"/caf\xe9.txt")).write_text("")
     out = tmp_path / "out"
-    options = RunOptions(selection=Selection(max_snapshots=1), recording=False, annotated_log=False)
+    options = RunOptions(max_snapshots=1, recording=False, annotated_log=False)
     analyze_log(bag, out, options)
     names = [file["name"] for file in json.loads((out / "summary.json").read_text())["input"]["files"]]
     assert r"caf\xe9.txt" in names

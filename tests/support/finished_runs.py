@@ -7,7 +7,6 @@ from pathlib import Path
 from mcap.reader import make_reader
 from mcap.writer import Writer
 
-from rose2_logs.config.selection import Selection
 from rose2_logs.workflows.analyze import RunOptions, analyze_log
 
 SAMPLE_LOGS = Path(__file__).parents[2] / "sample_logs"
@@ -15,8 +14,7 @@ SAMPLE_LOGS = Path(__file__).parents[2] / "sample_logs"
 
 def run_of(log: Path, folder: Path, snapshots: int = 6, **options) -> Path:
     """Analyze some maps of a log; return the folder of its results."""
-    selection = Selection(max_snapshots=snapshots)
-    return analyze_log(log, folder, RunOptions(selection=selection, recording=False, **options)).folder
+    return analyze_log(log, folder, RunOptions(max_snapshots=snapshots, recording=False, **options)).folder
 
 
 def renamed_topic(log: Path, topic: str, to: Path) -> Path:

@@ -14,11 +14,10 @@ from finished_runs import SAMPLE_LOGS
 from saved_maps import FREE, WALL, save_map, save_run, two_rooms
 
 from rose2_logs.config.parameters import Parameters
-from rose2_logs.config.selection import Selection
-from rose2_logs.errors import LogError, OutputError, ParameterError
+from rose2_logs.errors import LogError, OutputError
 from rose2_logs.runs.provenance import fingerprint, log_files
 from rose2_logs.runs.tables import TABLES
-from rose2_logs.workflows.analyze import RunOptions, analyze_log, log_stem, seconds_into_log
+from rose2_logs.workflows.analyze import RunOptions, analyze_log, log_stem
 
 SHARED_BAGS = Path(__file__).parents[3] / "shared" / "bags"
 TABLES_ONLY = RunOptions(recording=False, annotated_log=False)
@@ -142,7 +141,7 @@ def test_earlier_results_are_not_replaced_unasked(run: Path):
 
 def test_a_selection_is_written_into_the_summary(run: Path, tmp_path: Path):
     """What was left out can be seen later."""
-    options = RunOptions(recording=False, annotated_log=False, selection=Selection(max_snapshots=2))
+    options = RunOptions(recording=False, annotated_log=False, max_snapshots=2)
     analyze_log(run / "maps", tmp_path, options)
     summary = json.loads((tmp_path / "summary.json").read_text())
     assert summary["selection"]["max_snapshots"] == 2
@@ -163,23 +162,15 @@ def test_a_log_whose_name_looks_like_a_pattern_gives_its_results_its_own_name(tm
         assert log_stem(tmp_path / f"{name}.mcap") == name
 
 
-def test_seconds_into_a_log_are_counted_within_the_limits_of_the_run(tmp_path: Path):
-    """A log without an index is counted when it is opened, also to look when it began."""
+def test_seconds_into_a_log_are_counted_from_its_first_message(tmp_path: Path):
+    """Also in a log without an index, which is counted within the limits of the run when it is opened."""
     log = save_run(tmp_path / "maps")
-    few, many = Parameters().reading, dataclasses.replace(Parameters().reading, map_max_messages=2)
-    assert seconds_into_log(log, 1.0, None, few) == (10**9, None)
+    options = dataclasses.replace(TABLES_ONLY, start_s=1.0, end_s=1.5)
+    assert analyze_log(log, tmp_path / "out", options).totals.snapshots == 1
+    many = Parameters().replaced({"reading": {"map_max_messages": 2}})
     office = cut_off(SAMPLE_LOGS / "office.mcap", tmp_path)
     with pytest.raises(LogError, match="more than 2 map messages"):
-        seconds_into_log(office, 1.0, None, many)
-    assert seconds_into_log(office, 1.0, None, few)[0] > 0
-
-
-@pytest.mark.parametrize("seconds", [float("nan"), float("inf"), -float("inf"), 1e300])
-def test_seconds_that_are_no_time_are_refused(tmp_path: Path, seconds: float):
-    log = save_run(tmp_path / "maps")
-    for start_s, end_s in ((seconds, None), (None, seconds)):
-        with pytest.raises(ParameterError, match="no number of seconds"):
-            seconds_into_log(log, start_s, end_s, Parameters().reading)
+        analyze_log(office, tmp_path / "office", dataclasses.replace(options, parameters=many))
 
 
 def cut_off(log: Path, folder: Path) -> Path:
@@ -202,7 +193,7 @@ def test_the_fingerprint_of_one_file_is_its_sha256(tmp_path: Path):
 @pytest.mark.skipif(not SHARED_BAGS.exists(), reason="the shared logs are not beside the project")
 def test_one_run_in_three_formats_gives_the_same_tables(tmp_path: Path):
     """A bag, an MCAP and a compressed sqlite3 bag of the same maps cannot be told apart by the tables."""
-    options = RunOptions(recording=False, annotated_log=False, selection=Selection(max_snapshots=3))
+    options = RunOptions(recording=False, annotated_log=False, max_snapshots=3)
     written = []
     for name in ("fr79.bag", "fr79.ros2_mcap", "fr79.ros2_sqlite3_zstd"):
         analyze_log(SHARED_BAGS / name, tmp_path / name, options)

@@ -65,16 +65,19 @@ def has_screen() -> bool:
     return sys.platform != "linux" or any(os.environ.get(name) for name in SCREENS)
 
 
-def find_recording(path: Path) -> Path:
-    """Return a recording, or the only one in a folder.
+def find_recording(named: Path | str) -> str:
+    """Return a recording, the only one in a folder, or an address as it is.
 
     Raises
     ------
     LogError
         If there is none, or there are several.
     """
+    if "://" in str(named):
+        return str(named)
+    path = Path(named)
     if path.is_file():
-        return path
+        return str(path)
     if not path.is_dir():
         raise LogError(f"{path}: there is no such file; rose2-logs analyze writes recordings")
     found = sorted(path.glob("*.rrd"))
@@ -84,7 +87,7 @@ def find_recording(path: Path) -> Path:
         raise LogError(f"{path}: holds no recording{hint}")
     if len(found) > 1:
         raise LogError(f"{path}: holds several recordings: name one, or show all with rose2-logs serve")
-    return found[0]
+    return str(found[0])
 
 
 def show(recording: str) -> int:

@@ -85,7 +85,11 @@ def _add(one: Border, other: Border) -> Border:
 
 
 def _borders(
-    edge_faces: NDArray[np.int32], evidence: EdgeEvidence, seen: FloatArray, takes_part: BoolArray, power: float
+    edge_faces: NDArray[np.int32],
+    evidence: EdgeEvidence,
+    seen: FloatArray,
+    takes_part: BoolArray,
+    power: float,
 ) -> dict[tuple[int, int], Border]:
     """Border of each pair of neighboring faces that take part."""
     use = np.all(edge_faces >= 0, axis=1)

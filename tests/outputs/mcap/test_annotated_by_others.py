@@ -18,7 +18,6 @@ from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import Reader
 from saved_maps import save_run
 
-from rose2_logs.config.selection import Selection
 from rose2_logs.errors import OutputError
 from rose2_logs.io import open_log
 from rose2_logs.outputs.mcap.annotated import ADDED
@@ -39,7 +38,7 @@ INSTALL_S = 240
 
 def analyzed(log: Path, folder: Path, **changes) -> Path:
     """Folder with an annotated log of three maps, as a bag."""
-    options = RunOptions(selection=Selection(max_snapshots=3), recording=False, bag=True, **changes)
+    options = RunOptions(max_snapshots=3, recording=False, bag=True, **changes)
     return analyze_log(log, folder / log.stem, options).folder
 
 

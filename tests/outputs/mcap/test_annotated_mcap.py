@@ -42,9 +42,8 @@ LOGS = {
 
 
 def annotate(log: Path, folder: Path, **changes) -> Path:
-    from rose2_logs.config.selection import Selection
 
-    options = RunOptions(selection=Selection(max_snapshots=3), recording=False, **changes)
+    options = RunOptions(max_snapshots=3, recording=False, **changes)
     result = analyze_log(log, folder, options)
     (path,) = [file for file in result.files if file.suffix == ".mcap"]
     return path

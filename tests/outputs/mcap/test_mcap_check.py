@@ -107,9 +107,8 @@ def test_a_chunk_that_is_damaged_is_not_looked_into():
 
 def test_the_summary_tells_what_was_copied(tmp_path: Path):
     """Numbers as another reader counts them in the log; the added ones are one a map."""
-    from rose2_logs.config.selection import Selection
 
-    options = RunOptions(recording=False, selection=Selection(max_snapshots=2))
+    options = RunOptions(recording=False, max_snapshots=2)
     analyze_log(OFFICE, tmp_path / "out", options)
     told = json.loads((tmp_path / "out" / "summary.json").read_text())["annotated_log"]
     with OFFICE.open("rb") as file:

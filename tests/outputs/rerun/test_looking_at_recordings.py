@@ -18,7 +18,6 @@ from looking import CHROMIUM, colored_share, free_port, needs_chromium, needs_vu
 from numpy.typing import NDArray
 from PIL import Image
 
-from rose2_logs.config.selection import Selection
 from rose2_logs.workflows.analyze import RunOptions, analyze_log
 
 PROJECT = Path(__file__).parents[3]
@@ -49,7 +48,7 @@ FROM_OUTSIDE = ("Failed to load resource", "Failed to fetch")
 
 
 def record(folder: Path) -> Path:
-    options = RunOptions(selection=Selection(max_snapshots=8), annotated_log=False, back_project=True)
+    options = RunOptions(max_snapshots=8, annotated_log=False, back_project=True)
     log = PROJECT / "sample_logs" / "office.mcap"
     return analyze_log(log, folder, options).folder / "office.rrd"
 

@@ -14,7 +14,6 @@ from drawn_rooms import drawn
 from finished_runs import SAMPLE_LOGS
 from rerun.chunk import RrdReader
 
-from rose2_logs.config.selection import Selection
 from rose2_logs.drawing.palette import track_color
 from rose2_logs.outputs.rerun.back_projected import BackProjectedWorld
 from rose2_logs.outputs.rerun.layers import Layers
@@ -30,9 +29,7 @@ CELL_M2 = 0.05**2
 
 @pytest.fixture(scope="module")
 def result(tmp_path_factory: pytest.TempPathFactory) -> RunResult:
-    options = RunOptions(
-        selection=Selection(max_snapshots=6), annotated_log=False, layers=(), back_project=True
-    )
+    options = RunOptions(max_snapshots=6, annotated_log=False, layers=(), back_project=True)
     return analyze_log(
         SAMPLE_LOGS / "office.mcap", tmp_path_factory.mktemp("back_projected") / "office", options
     )
@@ -107,8 +104,8 @@ def test_the_outlines_are_those_of_the_last_map_from_the_first_on(result):
 
 
 def test_there_is_a_tab_for_them(result, tmp_path: Path):
-    assert {"Rooms projected back", "Seen share"} < names_of_views(result.folder / "office.rrd")
-    options = RunOptions(selection=Selection(max_snapshots=2), annotated_log=False, layers=())
+    assert {"Smoothed rooms", "Seen share"} < names_of_views(result.folder / "office.rrd")
+    options = RunOptions(max_snapshots=2, annotated_log=False, layers=())
     plain = analyze_log(SAMPLE_LOGS / "office.mcap", tmp_path / "office", options).folder / "office.rrd"
     assert not {"Rooms projected back", "Seen share"} & names_of_views(plain)
     paths = {str(chunk.entity_path) for chunk in RrdReader(str(plain)).stream()}

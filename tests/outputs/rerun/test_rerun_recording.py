@@ -14,7 +14,6 @@ import pytest
 from looking import free_port, needs_vulkan
 from saved_maps import save_run
 
-from rose2_logs.config.selection import Selection
 from rose2_logs.errors import OutputError
 from rose2_logs.outputs.rerun.world import room_label
 from rose2_logs.tracking.registration import RigidMotion
@@ -27,7 +26,7 @@ BIN = Path(sys.executable).parent
 
 @pytest.fixture(scope="module")
 def result(tmp_path_factory):
-    options = RunOptions(selection=Selection(max_snapshots=8), annotated_log=False)
+    options = RunOptions(max_snapshots=8, annotated_log=False)
     return analyze_log(PROJECT / "sample_logs" / "office.mcap", tmp_path_factory.mktemp("out"), options)
 
 
@@ -83,7 +82,7 @@ def test_layers_that_were_not_asked_for_are_not_written(tmp_path):
     from rerun.chunk import RrdReader
 
     layers = ("path", "lines")
-    options = RunOptions(selection=Selection(max_snapshots=2), annotated_log=False, layers=layers)
+    options = RunOptions(max_snapshots=2, annotated_log=False, layers=layers)
     done = analyze_log(PROJECT / "sample_logs" / "office.mcap", tmp_path, options)
     logged = {
         str(chunk.entity_path)
@@ -116,7 +115,7 @@ def test_a_run_is_shown_in_the_viewer_that_is_open_and_stored_too(tmp_path, monk
     monkeypatch.setenv("PATH", f"{BIN}:/usr/bin:/bin")
     monkeypatch.setenv("HOME", str(tmp_path))
     with ViewerClient.spawn(headless=True, port=port, detach_process=False) as viewer:
-        options = RunOptions(selection=Selection(max_snapshots=3), annotated_log=False, live=True)
+        options = RunOptions(max_snapshots=3, annotated_log=False, live=True)
         log = PROJECT / "sample_logs" / "office.mcap"
         done = analyze_log(log, tmp_path / "out", options)
         end = time.monotonic() + 60
@@ -143,7 +142,7 @@ def test_a_viewer_that_is_closed_along_the_way_does_not_stop_the_run(tmp_path, m
             if len(seen) == 2:
                 stack.close()
 
-        options = RunOptions(selection=Selection(max_snapshots=4), annotated_log=False, live=True)
+        options = RunOptions(max_snapshots=4, annotated_log=False, live=True)
         log = PROJECT / "sample_logs" / "office.mcap"
         done = analyze_log(log, tmp_path / "out", options, close_after_two)
     assert seen == [0, 1, 2, 3]
@@ -156,7 +155,7 @@ def test_live_without_a_viewer_or_a_screen_says_what_to_do(tmp_path, monkeypatch
         monkeypatch.delenv(name, raising=False)
     # A port of its own: the one of the viewers may be in use by another test.
     monkeypatch.setattr("rose2_logs.outputs.rerun.viewer.VIEWER_PORT", free_port())
-    options = RunOptions(selection=Selection(max_snapshots=1), annotated_log=False, live=True)
+    options = RunOptions(max_snapshots=1, annotated_log=False, live=True)
     with pytest.raises(OutputError, match="no Rerun viewer is open"):
         analyze_log(PROJECT / "sample_logs" / "office.mcap", tmp_path / "out", options)
     assert not list((tmp_path / "out").glob("*.rrd"))

@@ -1,13 +1,17 @@
-"""What the command line shows of a batch: bars, a line for each log, a table at the end."""
+"""``batch``: many logs into one folder, with a bar for each log in work."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Annotated, Self
 
+import typer
 from rich.markup import escape
 
-from rose2_logs.cli.messages import error, warning
+from rose2_logs.batch.options import BatchOptions
+from rose2_logs.cli.messages import error, style, warning
+from rose2_logs.cli.options import EXIT_KNOWN
 from rose2_logs.cli.printing import print_line, print_table, progress_bar
 
 if TYPE_CHECKING:
@@ -16,22 +20,52 @@ if TYPE_CHECKING:
     from rose2_logs.batch.driver import BatchResult, LogState
     from rose2_logs.batch.task import Progress
 
+EXAMPLE = (
+    "Example: [bold]rose2-logs batch /data/robots 'old/*.bag' -o results --workers 8[/bold]\n\n"
+    "On a cluster: [bold]dask scheduler[/bold] on one machine prints its address, "
+    "[bold]dask worker tcp://HOST:8786 --nworkers 8 --nthreads 1[/bold] on each, then "
+    "[bold]rose2-logs batch /data/robots -o /data/results --scheduler tcp://HOST:8786[/bold]\n\n"
+    "The same command again continues where it was stopped, and adds logs that are new."
+)
 MOST_BARS = 10
 """Logs in work that have a bar of their own; a cluster may have hundreds."""
 COLORS = {"done": "green", "up to date": "green", "failed": "bold red"}
 
 
+def batch(
+    logs: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="LOG",
+            help="Logs, folders that are searched at any depth, quoted patterns, or URLs of these (s3://, "
+            "https://, ...).",
+        ),
+    ],
+    out: Annotated[
+        Path,
+        typer.Option(
+            "--out",
+            "-o",
+            help="Folder for results: those of a log go to OUT/logs/NAME/, the tables of all logs to "
+            "OUT/tables/, one row per log to OUT/summary.csv and OUT/summary.parquet.",
+        ),
+    ],
+    options: BatchOptions,
+) -> None:
+    """Analyze many logs, each to a folder of its own, with one data set and one summary of all."""
+    from rose2_logs.batch.driver import run_batch
+
+    with BatchDisplay() as display:
+        result = run_batch(logs, out, options, display)
+    print_batch(result)
+    if result.failed:
+        raise typer.Exit(EXIT_KNOWN)
+
+
 class BatchDisplay:
-    """Shows how a batch goes on: a bar over all logs, one for each log in work, a line for each that ends.
+    """Shows how a batch goes on: a bar over all logs, one for each log in work, a line for each that ends."""
 
-    Parameters
-    ----------
-    debug : bool
-        Whether to show the tracebacks of failures.
-    """
-
-    def __init__(self, debug: bool = False) -> None:
-        self._debug = debug
+    def __init__(self) -> None:
         self._bar = progress_bar("{task.fields[note]}")
         self._all: TaskID | None = None
         self._running: dict[str, TaskID] = {}
@@ -79,7 +113,7 @@ class BatchDisplay:
         row = state.row
         if state.status == "failed":
             self._failed += 1
-            if self._debug and state.outcome and state.outcome.details:
+            if style.debug and state.outcome and state.outcome.details:
                 print_line(escape(state.outcome.details), to_error=True)
             error(f"{state.name}: {row['reason']}")
         else:

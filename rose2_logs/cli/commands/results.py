@@ -1,4 +1,4 @@
-"""The commands for results that are there: ``report``, ``figure`` and ``export``."""
+"""``report``, ``figure`` and ``export``: from the results of a run to pages, pictures and plans."""
 
 from __future__ import annotations
 
@@ -7,33 +7,50 @@ from typing import Annotated
 
 import typer
 
-from rose2_logs.cli.options import EXIT_KNOWN, Debug, Overwrite
+from rose2_logs.cli.messages import show_error
+from rose2_logs.cli.options import EXIT_KNOWN
+from rose2_logs.cli.printing import print_file
 from rose2_logs.outputs.report import PANELS
-from rose2_logs.workflows.figure import FIGURE_WIDTH_PX
+from rose2_logs.workflows import FIGURE_WIDTH_PX
 
 REPORT_EXAMPLE = (
     "Example: [bold]rose2-logs report results/run[/bold], then open results/run/report.html in a browser. "
-    "[bold]rose2-logs report results[/bold] writes one for each log below, and a page that lists them."
+    "[bold]rose2-logs report results[/bold] writes a page for each log in results, and one that lists them."
 )
 FIGURE_EXAMPLE = "Example: [bold]rose2-logs figure results/run --coverage 0.5 -o half.svg[/bold]"
 EXPORT_EXAMPLE = "Example: [bold]rose2-logs export results/run --format dxf --format geojson -o plans[/bold]"
+WHICH_MAP, WHAT = "Which map", "What to write"
 
-Results = Annotated[Path, typer.Argument(metavar="DIR", help="Folder of one log that analyze has written.")]
+Results = Annotated[
+    Path, typer.Argument(metavar="DIR", help="Folder of results of one log, as analyze writes it.")
+]
 Snapshot = Annotated[
     int | None,
-    typer.Option(metavar="N", help="The map of this number, from 0 on.", show_default=False),
+    typer.Option(
+        metavar="N", help="Map number N, counted from 0.", show_default=False, rich_help_panel=WHICH_MAP
+    ),
 ]
 Coverage = Annotated[
     float | None,
-    typer.Option(metavar="SHARE", help="The first map with this coverage, 0 to 1.", show_default=False),
+    typer.Option(
+        metavar="SHARE",
+        help="The first map with at least this coverage: 0.5 for half of the area that the last map shows.",
+        show_default=False,
+        rich_help_panel=WHICH_MAP,
+    ),
 ]
-Last = Annotated[bool, typer.Option("--last", help="The last map: what is taken by default.")]
+Last = Annotated[
+    bool, typer.Option("--last", help="The last map, which is the default.", rich_help_panel=WHICH_MAP)
+]
+Overwrite = Annotated[
+    bool, typer.Option("--overwrite", help="Replace files that exist already.", rich_help_panel=WHAT)
+]
 
 
 def report(
     folder: Annotated[
         Path,
-        typer.Argument(metavar="DIR", help="Folder that analyze or batch has written, of one log or many."),
+        typer.Argument(metavar="DIR", help="Results of one log or of many, as analyze and batch write them."),
     ],
     out: Annotated[
         Path | None,
@@ -41,26 +58,30 @@ def report(
             "--out",
             "-o",
             metavar="PATH",
-            help="The page; of many logs a folder. By default report.html beside the results.",
+            help="File for the page; for many logs, folder for the pages. By default report.html in the "
+            "folder of results.",
             show_default=False,
+            rich_help_panel=WHAT,
         ),
     ] = None,
     panels: Annotated[
-        int, typer.Option(min=1, help="Small pictures of the layout, evenly along coverage.")
+        int,
+        typer.Option(
+            min=1,
+            help="Number of small pictures of the layout, evenly spaced over the coverage.",
+            rich_help_panel=WHAT,
+        ),
     ] = PANELS,
     overwrite: Overwrite = False,
-    debug: Debug = False,
 ) -> None:
-    """Write what a run found as one HTML page: pictures, curves, tables; needs no network."""
-    from rose2_logs.cli import messages as reporting_messages
-    from rose2_logs.cli import printing as reporting
+    """Write the results of a run as one HTML page with pictures, curves and tables. It needs no network."""
     from rose2_logs.outputs.report.overview import write_reports
 
     written = write_reports(folder, out, panels=panels, overwrite=overwrite)
     for page in written.pages:
-        reporting.print_file(page)
+        print_file(page)
     for error in written.failed:
-        reporting_messages.error(str(error))
+        show_error(error)
     if written.failed:
         raise typer.Exit(EXIT_KNOWN)
 
@@ -73,7 +94,9 @@ def figure(
     back_projected: Annotated[
         bool,
         typer.Option(
-            "--back-projected", help="The rooms of the last map as far as this one shows them, not its own."
+            "--back-projected",
+            help="Draw the rooms of the last map, as far as the chosen map shows them, instead of its own.",
+            rich_help_panel=WHICH_MAP,
         ),
     ] = False,
     out: Annotated[
@@ -82,25 +105,31 @@ def figure(
             "--out",
             "-o",
             metavar="FILE",
-            help="The picture, .png or .svg. By default DIR/<name>.figure.png.",
+            help="File for the picture, .png or .svg. By default DIR/<name>.figure.png.",
             show_default=False,
+            rich_help_panel=WHAT,
         ),
     ] = None,
     width: Annotated[
-        int, typer.Option(metavar="PX", min=100, max=20000, help="Width of a PNG; 1800 are 15 cm at 300 dpi.")
+        int,
+        typer.Option(
+            metavar="PX",
+            min=100,
+            max=20000,
+            help="Width of a PNG in pixels; 1800 pixels are 15 cm at 300 dpi.",
+            rich_help_panel=WHAT,
+        ),
     ] = FIGURE_WIDTH_PX,
     overwrite: Overwrite = False,
-    debug: Debug = False,
 ) -> None:
-    """Draw the layout of one map for print: map, rooms, predicted parts, doorways, scale bar."""
-    from rose2_logs.cli import printing as reporting
+    """Draw the layout of one map for print: rooms, predicted parts, doorways, scale bar."""
     from rose2_logs.workflows.figure import write_figure
 
     choice = _choice(snapshot, coverage, last)
     picture = write_figure(
         folder, out, *choice, back_projected=back_projected, width_px=width, overwrite=overwrite
     )
-    reporting.print_file(picture)
+    print_file(picture)
 
 
 def export(
@@ -111,7 +140,8 @@ def export(
             "--format",
             "-f",
             metavar="FORMAT",
-            help="geojson, svg, dxf, map_server or graph; may be repeated.",
+            help="geojson (GIS), dxf (CAD), svg, map_server (Nav2) or graph (networkx); may be repeated.",
+            rich_help_panel=WHAT,
         ),
     ],
     snapshot: Snapshot = None,
@@ -123,20 +153,19 @@ def export(
             "--out",
             "-o",
             metavar="DIR",
-            help="Folder for the files; by default that of the results.",
+            help="Folder for the files. By default the folder of results.",
             show_default=False,
+            rich_help_panel=WHAT,
         ),
     ] = None,
     overwrite: Overwrite = False,
-    debug: Debug = False,
 ) -> None:
     """Write the floor plan of one map for other programs: GIS, CAD, Nav2, networkx."""
-    from rose2_logs.cli import printing as reporting
     from rose2_logs.workflows.figure import export_plan
 
     choice = _choice(snapshot, coverage, last)
     for file in export_plan(folder, formats, out, *choice, overwrite=overwrite):
-        reporting.print_file(file)
+        print_file(file)
 
 
 def _choice(snapshot: int | None, coverage: float | None, last: bool) -> tuple[int | None, float | None]:

@@ -1,10 +1,12 @@
-"""What the command line shows of a comparison of two runs."""
+"""``compare``: what differs between two runs."""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
+import typer
 from rich.markup import escape
 
 from rose2_logs.cli.messages import warning
@@ -14,8 +16,30 @@ if TYPE_CHECKING:
     from rose2_logs.comparison.layouts import LayoutComparison
     from rose2_logs.workflows.compare import ComparisonResult
 
+EXAMPLE = (
+    "Example: [bold]rose2-logs compare results/monday results/friday -o changes[/bold]\n\n"
+    "The robot may have started anywhere in the building: B is aligned with A by its walls. Coordinates in "
+    "the results are in A's frame."
+)
 WALLS_SHOWN = 12
 """Walls that are printed, the longest of each kind first; the table holds all."""
+
+
+def compare(
+    a: Annotated[
+        Path, typer.Argument(metavar="A", help="Results of analyze: the layout as it was, the reference.")
+    ],
+    b: Annotated[Path, typer.Argument(metavar="B", help="Results of analyze: the layout as it is now.")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the results of the comparison.")],
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace the results of an earlier comparison.")
+    ] = False,
+    no_rrd: Annotated[bool, typer.Option("--no-rrd", help="Write no Rerun recording.")] = False,
+) -> None:
+    """Compare the last layouts of two runs: rooms and walls that are new, missing or moved."""
+    from rose2_logs.workflows.compare import compare_runs
+
+    print_comparison(compare_runs(a, b, out, recording=not no_rrd, overwrite=overwrite))
 
 
 def print_comparison(result: ComparisonResult) -> None:

@@ -1,0 +1,121 @@
+"""``analyze``: one log or a few, each to a folder of results."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.markup import escape
+
+from rose2_logs.cli.messages import show_error
+from rose2_logs.cli.options import EXIT_KNOWN
+from rose2_logs.cli.printing import (
+    duration,
+    megabytes,
+    print_line,
+    print_table,
+    print_text,
+    progress_bar,
+)
+from rose2_logs.config.run_options import RunOptions
+from rose2_logs.errors import AlreadyWholeError, ParameterError, Rose2LogsError
+
+if TYPE_CHECKING:
+    from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot
+    from rose2_logs.workflows.analyze import OnSnapshot, RunResult
+
+EXAMPLE = (
+    "Example: [bold]rose2-logs analyze run.mcap -o results --workers 4[/bold]\n\n"
+    "A first look at a long log: [bold]rose2-logs analyze run.mcap -o look --max-snapshots 20[/bold]"
+)
+
+
+def analyze(
+    logs: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="LOG", help="One or several logs: whatever [bold]rose2-logs info[/bold] reads."
+        ),
+    ],
+    out: Annotated[
+        Path,
+        typer.Option("--out", "-o", help="Folder for results; those of a log go to OUT/<name of the log>/."),
+    ],
+    options: RunOptions,
+) -> None:
+    """Find and track the rooms in all maps of a log; write a recording, an annotated MCAP, and tables."""
+    from rose2_logs.system.workers import keep_freed_memory
+    from rose2_logs.workflows.analyze import analyze_log, log_stem
+
+    keep_freed_memory()
+    names = [log_stem(log) for log in logs]
+    if twice := {name for name in names if names.count(name) > 1}:
+        raise ParameterError(f"several logs are named {min(twice)}: analyze them to different folders")
+    failed = False
+    for log, name in zip(logs, names, strict=True):
+        try:
+            with run_progress(name) as on_snapshot:
+                result = analyze_log(log, out / name, options, on_snapshot)
+            print_run(result)
+        except AlreadyWholeError as whole:
+            print_text(str(whole))
+        except Rose2LogsError as error:
+            if len(logs) == 1:
+                raise
+            failed = True
+            show_error(error)
+    if failed:
+        raise typer.Exit(EXIT_KNOWN)
+
+
+@contextmanager
+def run_progress(name: str) -> Iterator[OnSnapshot]:
+    """Show a bar over the time of a log, with the rate, the time left and the rooms so far."""
+    with progress_bar("{task.fields[note]}") as progress:
+        task = progress.add_task(name, total=1.0, note="opening")
+        seen = 0
+
+        def on_snapshot(step: TrackedSnapshot, share: float) -> None:
+            nonlocal seen
+            seen += 1
+            elapsed = progress.tasks[task].elapsed or 0.0
+            rate = f"{seen / elapsed:.2f} maps/s" if elapsed > 0 else ""
+            note = f"map {seen}, {rate}, {len(step.track_ids)} rooms"
+            progress.update(task, completed=share, note=note)
+
+        yield on_snapshot
+
+
+def print_run(result: RunResult) -> None:
+    """Print where the results are and what a run found."""
+    from rich.table import Table
+
+    totals = result.summary.totals
+    events = totals.events
+    table = Table(box=None, show_header=False, pad_edge=False)
+    left_out = f" ({totals.invalid} could not be analyzed)" if totals.invalid else ""
+    table.add_row("maps", f"{totals.snapshots}{left_out}")
+    table.add_row("coverage", f"{totals.coverage_first:.1%} to {totals.coverage_last:.1%}")
+    table.add_row("rooms at the end", f"{totals.rooms_last} ({totals.tracks} over the run)")
+    changes = ", ".join(f"{events[kind]} {kind}" for kind in ("split", "merged", "lost", "returned"))
+    table.add_row("changes", changes)
+    if events["shifted"]:
+        table.add_row("shifts of the map", f"{events['shifted']}; see shifted in events.parquet")
+    if result.summary.layout_final is not None:
+        since = result.summary.layout_final
+        in_the_end = f"from {since.coverage:.1%} coverage on, {duration(since.time_s)}"
+        span_ns = (totals.last_log_time_ns or 0) - (totals.first_log_time_ns or 0)
+        if totals.snapshots > 1 and since.time_s == span_ns / 1e9:
+            in_the_end = "only in the last map: take the rooms as preliminary"
+        table.add_row("layout as in the end", in_the_end)
+    if result.warnings.count:
+        kinds = ", ".join(f"{found.count} {kind}" for kind, found in result.warnings.kinds.items())
+        table.add_row("warnings", f"{kinds}; see warnings in summary.json")
+    table.add_row("time", f"{result.seconds:.1f} s, {totals.snapshots / result.seconds:.2f} maps/s")
+    print_table(table)
+    print_line(f"results in [bold]{escape(str(result.folder))}[/]")
+    for file in result.files:
+        print_line(f"  {escape(file.name)}  {megabytes(file.stat().st_size)}")

@@ -1,0 +1,71 @@
+"""``segment``: one saved map."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.markup import escape
+
+from rose2_logs.cli.options import option_of
+from rose2_logs.cli.printing import print_line, print_table
+from rose2_logs.config.parameters import Parameters
+
+if TYPE_CHECKING:
+    from rose2_logs.workflows.segment import StaticMapResult
+
+EXAMPLE = "Example: [bold]rose2-logs segment map.png --resolution 0.05 -o rooms[/bold]"
+METHOD = option_of("method")
+
+
+def segment(
+    map_file: Annotated[
+        Path, typer.Argument(metavar="MAP", help="Saved map: the .yaml of map_server, or a .png or .pgm.")
+    ],
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the results.")],
+    parameters: Parameters,
+    resolution: Annotated[
+        float | None,
+        typer.Option(
+            metavar="M",
+            help="Side of a cell in meters, for an image without a .yaml beside it.",
+            show_default=False,
+        ),
+    ] = None,
+    formats: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--format",
+            metavar="FORMAT",
+            help="Also write the floor plan as svg, dxf, map_server or graph, like export; may be repeated.",
+            show_default=False,
+        ),
+    ] = None,
+    method: str = METHOD,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace files that exist already.")] = False,
+) -> None:
+    """Segment one map: label image, floor plan as GeoJSON, picture."""
+    from rose2_logs.workflows.segment import segment_map
+
+    result = segment_map(
+        map_file, out, parameters, method, formats=formats or (), resolution_m=resolution, overwrite=overwrite
+    )
+    print_static_map(result)
+
+
+def print_static_map(result: StaticMapResult) -> None:
+    """Print the rooms of one map and where the results are."""
+    from rich.table import Table
+
+    rooms = result.rooms
+    table = Table("room", "area m2", "with predicted m2", "behind doors", box=None, pad_edge=False)
+    for number, (area, predicted) in enumerate(
+        zip(rooms.areas_m2, rooms.predicted_areas_m2, strict=True), start=1
+    ):
+        neighbors = ", ".join(str(other) for other in rooms.neighbors(number))
+        table.add_row(str(number), f"{area:.1f}", f"{predicted:.1f}", neighbors)
+    print_table(table)
+    print_line(f"results in [bold]{escape(str(result.folder))}[/]")
+    for file in result.files:
+        print_line(f"  {escape(file.name)}")

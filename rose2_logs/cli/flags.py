@@ -1,0 +1,46 @@
+"""From the names that options have in Python to their flags, in the options themselves and in messages."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+
+from rose2_logs.batch.options import BatchOptions
+from rose2_logs.config.run_options import Option, RunOptions, options_of
+
+OTHERS = {"web=True": "--web", "resolution_m=": "--resolution "}
+"""Options of single commands that messages of the library name."""
+
+
+def flag_of(name: str, about: Option) -> str:
+    """Return the flag of an option."""
+    return about.flag or f"--{name.replace('_', '-')}"
+
+
+def _flags() -> dict[str, str]:
+    flags = dict(OTHERS)
+    for kind in (RunOptions, BatchOptions):
+        defaults = {each.name: each.default for each in dataclasses.fields(kind)}
+        for name, about in options_of(kind).items():
+            default = defaults[name]
+            if not about.commands:
+                continue
+            if isinstance(default, bool):
+                flags[f"{name}={not default}"] = flag_of(name, about)
+            else:
+                flags[f"{name}="] = f"{flag_of(name, about)} "
+    return flags
+
+
+FLAGS = _flags()
+"""Options as messages of the library write them, and as the command line does."""
+_OPTION = re.compile(r"(?<![\w/])(?:" + "|".join(map(re.escape, FLAGS)) + ")")
+_PARAMETER = re.compile(r"\bthe parameter (\w+\.\w+)")
+
+
+def with_flags(message: str) -> str:
+    """Return a message of the library with options and parameters as the command line has them.
+
+    The library knows no flags: its messages name options as Python writes them, ``overwrite=True``.
+    """
+    return _PARAMETER.sub(r"--set \1", _OPTION.sub(lambda found: FLAGS[found[0]], message))
