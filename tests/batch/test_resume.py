@@ -196,7 +196,7 @@ def test_strict_makes_a_warning_about_a_log_its_failure(batches):
     described.write_text(described.read_text().replace("resolution: 0.05", "resolution: 0"))
     settings = dataclasses.replace(QUIET, strict=True)
     assert batches.run(settings=settings, rerun=True) == {"one_run": "done", "two_run": "failed"}
-    assert "an error because of --strict" in summary(batches.out)["two_run"]["reason"]
+    assert "warnings are treated as errors" in summary(batches.out)["two_run"]["reason"]
 
 
 def test_a_log_that_moved_is_known_by_its_content(batches):

@@ -1,6 +1,6 @@
 """What comes of every fault in every kind of log, as the table in docs/faults.md.
 
-PYTHONPATH=tests:tests/readers:tests/faults python tests/faults/fault_table.py  # writes it anew
+PYTHONPATH=tests:tests/io:tests/faults python tests/faults/fault_table.py  # writes it anew
 """
 
 from __future__ import annotations

@@ -121,7 +121,7 @@ def test_an_error_of_the_work_arrives_as_it_is():
 
 def test_a_killed_worker_is_one_clear_line():
     """A process that dies is told with what to do, and nothing hangs."""
-    with pytest.raises(WorkerError, match="fewer --workers"):
+    with pytest.raises(WorkerError, match="use fewer workers"):
         list(ordered_map(die_at_three, range(8), 2))
 
 

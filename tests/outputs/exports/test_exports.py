@@ -224,7 +224,7 @@ def test_a_real_plan_is_read_back(real_plan, tmp_path: Path):
 
 
 def test_an_unknown_format_is_named(plan, tmp_path: Path):
-    with pytest.raises(ParameterError, match="there are: geojson, svg, dxf, map_server, graph"):
+    with pytest.raises(ParameterError, match="choose one of geojson, svg, dxf, map_server, graph"):
         planned_files(["pdf"], tmp_path, "two")
 
 
