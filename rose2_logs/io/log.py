@@ -232,7 +232,7 @@ def choose_topic(info: LogInfo, asked: str | None = None) -> str:
     NoMapTopicError
         If there is none, or there are several and none was asked for; the message lists them.
     """
-    where = str(info.path) if info.whole else f"{info.path}: is damaged; in its readable part"
+    where = f"{info.path}:" if info.whole else f"{info.path}: is damaged; in its readable part"
     maps = {topic.name: topic for topic in info.topics if topic.is_map}
     listed = ", ".join(maps)
     if asked is not None:
@@ -242,14 +242,15 @@ def choose_topic(info: LogInfo, asked: str | None = None) -> str:
         has = f"its map topics are {listed}" if maps else "it has no map topics"
         raise NoMapTopicError(f"{info.path}: {asked} is not a topic with occupancy grids; {has}")
     if not maps:
-        others = ", ".join(sorted({topic.message_type for topic in info.topics})[:MOST_LISTED]) or "nothing"
+        others = ", ".join(sorted({topic.message_type for topic in info.topics})[:MOST_LISTED])
+        found = f", only {others}" if others else ""
         raise NoMapTopicError(
-            f"{where}: no topic has occupancy grids (nav_msgs/OccupancyGrid), only {others}; "
+            f"{where} no topic has occupancy grids (nav_msgs/OccupancyGrid){found}; "
             "record the mapping node's topic too, usually /map"
         )
     filled = {name: topic for name, topic in maps.items() if topic.message_count != 0}
     if not filled:
-        raise NoMapTopicError(f"{where}: no messages were recorded on the map topics {listed}")
+        raise NoMapTopicError(f"{where} no messages were recorded on the map topics {listed}")
     for name in filled:
         if name.lstrip("/") == PREFERRED_TOPIC:
             return name
