@@ -1,4 +1,4 @@
-"""Log to stream of occupancy snapshots; nothing outside this package knows a file format."""
+"""Readers: from a log to its occupancy snapshots. Nothing outside this package knows a file format."""
 
 from rose2_logs.config.selection import Selection
 from rose2_logs.io.log import LogReader

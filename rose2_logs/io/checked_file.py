@@ -1,4 +1,4 @@
-"""A file whose lost sectors are damage of the log, while other faults of the storage stay what they are."""
+"""A file whose bad sectors count as damage to the log, while other storage errors are passed on."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from contextlib import contextmanager
 from typing import Any
 
 DAMAGE = (errno.EIO, errno.EINVAL)
-"""A sector that cannot be read, and a place that cannot be, which an index may name. Others, as a lost
-network, may pass: whoever reads may try again."""
+"""An unreadable sector, and an impossible offset as a damaged index may give. Other errors, such as a lost
+network, may be temporary: the caller can retry."""
 
 
 @contextmanager
@@ -20,16 +20,16 @@ def _as_damage() -> Iterator[None]:
     except OSError as error:
         if error.errno not in DAMAGE:
             raise
-        raise ValueError(f"the storage cannot read it: {error.strerror}") from error
+        raise ValueError(f"the storage device cannot read it: {error.strerror}") from error
     except OverflowError as error:
-        raise ValueError("it lies beyond the end of the file") from error
+        raise ValueError("it is beyond the end of the file") from error
 
 
 class CheckedFile(io.FileIO):
-    """A file for reading that raises ValueError where it is damaged."""
+    """A file opened for reading that raises ValueError where it is damaged."""
 
     def read(self, size: int | None = -1, /) -> bytes:
-        """Read up to so many bytes."""
+        """Read up to `size` bytes."""
         with _as_damage():
             return super().read(-1 if size is None else size) or b""
 
@@ -39,6 +39,6 @@ class CheckedFile(io.FileIO):
             return super().readinto(buffer) or 0
 
     def seek(self, offset: int, whence: int = io.SEEK_SET, /) -> int:
-        """Go to a place."""
+        """Move to an offset."""
         with _as_damage():
             return super().seek(offset, whence)

@@ -1,4 +1,4 @@
-"""Decompression that ends at a limit, whatever a header claims and however much comes out."""
+"""Decompression up to a limit, whatever size a header claims and however large the data really are."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from typing import Any
 import zstandard
 
 COPIED_AT_ONCE = 1 << 20
-"""Bytes that are in memory while a file is decompressed into another."""
+"""Bytes that are in memory while a file is decompressed into another one."""
 
 
-REMEDY = "if it is real, raise the parameter reading.chunk_max_bytes"
+REMEDY = "if that is correct, raise the parameter reading.chunk_max_bytes"
 
 
 class TooLargeError(ValueError):
-    """Something is, or claims to be, larger than it may be."""
+    """Something is, or claims to be, larger than the limit."""
 
 
 def decompress(
@@ -28,57 +28,55 @@ def decompress(
     *,
     is_cut: bool = False,
 ) -> bytes | memoryview:
-    """Decompress what must fit into memory.
+    """Decompress data in memory.
 
     Parameters
     ----------
     compression : str
-        ``zstd``, ``lz4`` (frames), ``bz2``; empty or ``none`` gives the data back.
+        ``zstd``, ``lz4`` (frames) or ``bz2``; empty or ``none`` returns the data unchanged.
     data : bytes
         The compressed data.
     claimed_bytes : int, optional
-        How much comes out, by a header around the data.
+        The decompressed size that a header around the data claims.
     most_bytes : int
-        How much may come out.
+        The largest decompressed size that is accepted.
     is_cut : bool
-        Whether the data are but a beginning: as much comes out as can.
+        Whether the data are only the beginning: then whatever can be decompressed is returned.
 
     Raises
     ------
     TooLargeError
-        If more is claimed, or comes out, than may.
+        If the claimed or the real size exceeds the limit.
     ValueError
-        If the data are damaged, or not of the claimed length.
+        If the data are damaged, or their size is not the claimed one.
     """
     if claimed_bytes is not None and claimed_bytes > most_bytes:
-        raise TooLargeError(
-            f"it claims {claimed_bytes} bytes; the most that are read is {most_bytes}; {REMEDY}"
-        )
+        raise TooLargeError(f"it claims {claimed_bytes} bytes, more than the limit of {most_bytes}; {REMEDY}")
     if compression in ("", "none"):
         if len(data) > most_bytes:
-            raise TooLargeError(f"it has {len(data)} bytes; the most that are read is {most_bytes}; {REMEDY}")
+            raise TooLargeError(f"it has {len(data)} bytes, more than the limit of {most_bytes}; {REMEDY}")
         return data
     if compression not in _BY_NAME:
-        raise ValueError(f"the compression {compression!r} is unknown")
+        raise ValueError(f"unknown compression {compression!r}")
     limit = most_bytes if claimed_bytes is None else claimed_bytes
     try:
         plain = _BY_NAME[compression](data, limit, is_cut)
     except (zstandard.ZstdError, OSError, EOFError, RuntimeError, MemoryError) as error:
         raise ValueError(f"the {compression} data are damaged: {error}") from error
     if len(plain) > limit:
-        raise TooLargeError(f"more than {limit} bytes come out of {len(data)}; {REMEDY}")
+        raise TooLargeError(f"{len(data)} bytes decompress to more than {limit} bytes; {REMEDY}")
     if claimed_bytes is not None and len(plain) != claimed_bytes and not is_cut:
-        raise ValueError(f"{len(plain)} bytes come out where {claimed_bytes} are claimed")
+        raise ValueError(f"it decompresses to {len(plain)} bytes instead of the claimed {claimed_bytes}")
     return plain
 
 
 def _zstd(data: bytes | memoryview, limit: int, is_cut: bool) -> bytes:
     claimed = zstandard.frame_content_size(data)
     if claimed > limit:
-        raise TooLargeError(f"it claims {claimed} bytes; the most that are read is {limit}; {REMEDY}")
+        raise TooLargeError(f"it claims {claimed} bytes, more than the limit of {limit}; {REMEDY}")
     if claimed >= 0 and not is_cut:
         return zstandard.ZstdDecompressor().decompress(data)
-    # One more than may be, so that it shows.
+    # One byte more than the limit, so that exceeding it is noticed.
     return zstandard.ZstdDecompressor().stream_reader(data).read(limit + 1)
 
 
@@ -108,7 +106,7 @@ _BY_NAME: dict[str, Callable[[bytes | memoryview, int, bool], bytes]] = {
 
 
 def decompress_file(packed: Path, plain: Path, most_bytes: int) -> None:
-    """Decompress a zstd file into another.
+    """Decompress a zstd file into another file.
 
     Raises
     ------
@@ -123,5 +121,5 @@ def decompress_file(packed: Path, plain: Path, most_bytes: int) -> None:
         while part := stream.read(COPIED_AT_ONCE):
             left -= len(part)
             if left < 0:
-                raise TooLargeError(f"more than {most_bytes} bytes come out of it")
+                raise TooLargeError(f"it decompresses to more than {most_bytes} bytes; free some disk space")
             target.write(part)

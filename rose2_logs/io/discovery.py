@@ -1,4 +1,4 @@
-"""Which of a folder's files make up logs: told by their names alone, so that a listing is enough."""
+"""Which files of a folder make up logs, decided by their names alone, so that a listing is enough."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from rose2_logs.errors import InvalidMapError, LogError
 MAP_ENDINGS = (".yaml", ".yml")
 IMAGE_ENDINGS = (".pgm", ".png", ".bmp")
 STORAGE_ENDINGS = (".mcap", ".db3", ".bag", ".bag.active")
-"""The last one is of a bag that its recorder did not close."""
+"""``.bag.active`` is a bag that its recorder did not close."""
 COMPRESSED_ENDING = ".zstd"
-"""Of the files of a ROS 2 bag that was compressed file by file."""
+"""Ending of the files of a ROS 2 bag that was compressed file by file."""
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
-"""First bytes of what zstd compressed. No CDR message begins so: its first byte is 0."""
+"""First bytes of zstd data. No CDR message starts like this: its first byte is 0."""
 ANNOTATED_ENDING = ".rose2.mcap"
-"""Of our own annotated logs, which are results and no new logs."""
+"""Ending of annotated logs, which are results and not logs to analyze."""
 BAG_DESCRIPTION = "metadata.yaml"
 
 
@@ -32,21 +32,21 @@ def stem_of(name: str) -> str:
 def logs_among(files: Iterable[str], folder_name: str) -> list[str]:
     """Find the logs in a folder by the names of its files.
 
-    A folder is one log if it is a ROS 2 bag, see `is_bag`, or if it holds saved maps and no bags: those are
-    the maps of one run. Each other MCAP file, bag or database is a log. Hidden files and annotated logs are
-    left out.
+    A folder is one log if it is a ROS 2 bag, see `is_bag`, or if it contains saved maps and no bags: these
+    are the maps of one run. Every other MCAP file, bag or database is a log of its own. Hidden files and
+    annotated logs are ignored.
 
     Parameters
     ----------
     files : iterable of str
-        Paths relative to the folder, with ``/`` between their parts; from any depth.
+        Paths relative to the folder, with ``/`` between their parts, at any depth.
     folder_name : str
         The folder's own name.
 
     Returns
     -------
     list of str
-        Paths of the logs relative to the folder, sorted; ``""`` is the folder itself.
+        Paths of the logs relative to the folder, sorted; ``""`` stands for the folder itself.
     """
     names_in: dict[str, list[str]] = defaultdict(list)
     for file in files:
@@ -72,8 +72,8 @@ def logs_among(files: Iterable[str], folder_name: str) -> list[str]:
 def is_bag(names: Sequence[str], folder_name: str) -> bool:
     """Whether the files of a folder make up a ROS 2 bag.
 
-    It holds ``metadata.yaml`` beside its storage files, or, of a recording that was not closed, storage files
-    ``FOLDER_0``, ``FOLDER_1`` .. and no others.
+    A bag has ``metadata.yaml`` next to its storage files. A recording that was not closed has only the
+    storage files ``FOLDER_0``, ``FOLDER_1``, and so on.
     """
     stored = [name for name in names if is_storage(name.removesuffix(COMPRESSED_ENDING))]
     if not stored or BAG_DESCRIPTION in names:
@@ -83,7 +83,7 @@ def is_bag(names: Sequence[str], folder_name: str) -> bool:
 
 
 def is_storage(name: str) -> bool:
-    """Whether a name is that of an MCAP file, bag or database, and not of an annotated log."""
+    """Whether a name belongs to an MCAP file, a bag or a database that is not an annotated log."""
     return name.lower().endswith(STORAGE_ENDINGS) and not name.endswith(ANNOTATED_ENDING)
 
 
@@ -97,7 +97,7 @@ def _holds_maps(names: Sequence[str]) -> bool:
 
 
 LARGEST_BYTES = 1 << 22
-"""Descriptions are some kilobytes; those of bags with thousands of files a megabyte."""
+"""Descriptions take a few kilobytes; those of bags with thousands of files take a megabyte."""
 
 
 def load_yaml(path: Path) -> dict[str, Any]:
@@ -114,17 +114,17 @@ def load_yaml(path: Path) -> dict[str, Any]:
 
     try:
         if path.stat().st_size > LARGEST_BYTES:
-            raise LogError(f"{path}: is no description of a map or a bag, it is too large", file=path)
-        # In C where there is one: the one in Python takes time with the square of what is nested.
+            raise LogError(f"{path}: is too large to describe a map or a bag", file=path)
+        # The loader in C where available: the one in Python takes quadratic time for deep nesting.
         loader = yaml.CSafeLoader if yaml.__with_libyaml__ else yaml.SafeLoader
         described = yaml.load(path.read_text(encoding="utf-8"), loader)  # noqa: S506 (both are safe)
     except (OSError, UnicodeDecodeError) as error:
         raise LogError(f"{path}: cannot be read: {error}", file=path) from error
-    # Nesting without end, and numbers and dates that Python does not take.
+    # RecursionError: endless nesting. ValueError: numbers and dates that Python does not accept.
     except (yaml.YAMLError, ValueError, RecursionError) as error:
         raise InvalidMapError(f"{path}: is not YAML: {' '.join(str(error).split())}", file=path) from error
     if not isinstance(described, dict):
         raise InvalidMapError(
-            f"{path}: does not describe a map; it needs image, resolution and origin", file=path
+            f"{path}: does not describe a map; it needs the fields image, resolution and origin", file=path
         )
     return described

@@ -21,8 +21,8 @@ from rose2_logs.system.warnings import log_warning
 logger = logging.getLogger(__name__)
 
 CLOCK_SET_BACK_NS = 10**9
-"""Messages of a topic lie out of order by milliseconds where several threads write; by more than a second,
-the recorder's clock was set."""
+"""Recorders with several threads write messages out of order by milliseconds; if the log time goes back by
+more than this, the recorder's clock was set back."""
 
 OpenFile = Callable[[Path, ReadingParameters], LogFile]
 
@@ -35,13 +35,13 @@ class FileLog(MessageSource):
     path : Path
         Name of the log.
     files : sequence of Path
-        Its files. One that cannot be opened is left out, if another can.
+        Its files. A file that cannot be opened is skipped with a warning as long as another one can.
     open_file : callable
         Opens one of them.
     limits : ReadingParameters
-        How much they may claim.
+        The largest sizes that are accepted.
     format_name : str
-        What the log is in words.
+        The log's format in words.
     size_bytes : int, optional
         Size of the log on disk; by default that of the files.
     on_close : callable, optional
@@ -68,7 +68,7 @@ class FileLog(MessageSource):
         self._on_close = on_close
         self._limits = limits
         self._decoders: dict[tuple[int, int], Decoder] = {}
-        # Sorted places with the number of their file, by topic; filled when a topic is first asked for.
+        # By topic: sorted places with the number of their file; filled when a topic is first asked for.
         self._places: dict[str, list[tuple[Place, int]]] = {}
         try:
             self._open(files, open_file)
@@ -95,7 +95,7 @@ class FileLog(MessageSource):
                 self._files.append(open_file(file, self._limits))
             except LogError as error:
                 if isinstance(error.__cause__, OSError):
-                    raise  # of the storage, not of the log: it may pass
+                    raise  # the storage failed, not the log: a retry may succeed
                 failures.append(error)
         if failures and not self._files:
             raise failures[0]
@@ -108,7 +108,7 @@ class FileLog(MessageSource):
         return tuple(self._files)
 
     def close(self) -> None:
-        """Release the files; may be called twice."""
+        """Release the files; may be called more than once."""
         for file in self._files:
             file.close()
         self._on_close()
@@ -119,7 +119,7 @@ class FileLog(MessageSource):
         return np.array([place.log_time_ns for place, _ in self._topic_places(topic)], np.int64)
 
     def read(self, topics: Sequence[str], times: Times) -> Iterator[LoggedMap]:
-        """Yield, in the order of log time, the messages of `topics` logged at `times` (sorted, distinct)."""
+        """Yield the messages of `topics` logged at `times` (sorted, distinct), in log time order."""
         chosen = []
         for topic in topics:
             places = self._topic_places(topic)
@@ -131,7 +131,7 @@ class FileLog(MessageSource):
             yield LoggedMap(time, topic, index, self._files[number].path, decode)
 
     def stream(self, topics: Sequence[str]) -> Iterator[LoggedBytes]:
-        """Yield all messages of `topics` about in the order of log time, none of them held."""
+        """Yield all messages of `topics` one at a time, roughly in log time order."""
         for file in sorted(self._files, key=lambda each: each.start_ns or 0):
             wanted = [each.id for each in file.channels.values() if each.topic in topics]
             for message in file.messages(wanted) if wanted else ():
@@ -149,7 +149,7 @@ class FileLog(MessageSource):
                     if not channel.is_wanted and (count := file.message_counts[channel.id]):
                         text = (
                             f"{file.path}: {topic} also has {count} messages of type {channel.schema_name} "
-                            f"({channel.message_encoding}), which are no maps that can be read"
+                            f"({channel.message_encoding}), which are not readable maps; skipped"
                         )
                         log_warning(logger, "type_changes", text, file=file.path, topic=topic)
                 places = file.places([channel.id for channel in channels if channel.is_wanted])
@@ -159,7 +159,7 @@ class FileLog(MessageSource):
         return self._places[topic]
 
     def _look_at_clock(self, file: LogFile, topic: str, places: list[Place]) -> None:
-        """Say where the log time of a topic goes back along the file."""
+        """Warn where the log time of a topic goes backwards in the file."""
         order = np.array([place[1:3] for place in places], np.int64).reshape(-1, 2)
         times = np.array([place.log_time_ns for place in places], np.int64)
         along_file = times[np.lexsort((order[:, 1], order[:, 0]))]
@@ -171,7 +171,7 @@ class FileLog(MessageSource):
             seconds = (int(along_file[k]) - int(along_file[k + 1])) / 1e9
             text = (
                 f"{file.path}: the log time on {topic} goes back by {seconds:.1f} s at message {k + 2} of "
-                "the file; messages are taken in the order of log time"
+                "the file; messages are read in log time order"
             )
             log_warning(logger, "clock_set_back", text, file=file.path, topic=topic, index=int(k) + 2)
 

@@ -1,4 +1,4 @@
-"""Occupancy from ``foxglove.Grid`` protobuf messages, by the schema that the log carries."""
+"""Occupancy from ``foxglove.Grid`` protobuf messages, decoded by the schema stored in the log."""
 
 from __future__ import annotations
 
@@ -31,20 +31,20 @@ _OCCUPANCY_FIELD = "occupancy"
 def grid_decoder(schema: bytes, most_cells: int = MOST_CELLS) -> Decoder:
     """Return the decoder of ``foxglove.Grid`` messages.
 
-    Integers are percent with -1 (unsigned: all bits set) as unknown, like in a ROS occupancy grid; floating
-    point numbers are probabilities in 0..1 with NaN or a negative number as unknown.
+    Integers are percent, with -1 (unsigned: all bits set) for unknown, as in a ROS occupancy grid. Floating
+    point numbers are probabilities in 0..1, with NaN or a negative number for unknown.
 
     Parameters
     ----------
     schema : bytes
         A serialized google.protobuf.FileDescriptorSet.
     most_cells : int
-        Cells of the largest map that is read.
+        Number of cells of the largest map that is accepted.
 
     Raises
     ------
     InvalidMapError
-        If the schema cannot be read; the returned function raises it where a message is no occupancy grid.
+        If the schema cannot be read. The returned function raises it if a message is not an occupancy grid.
     """
     from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
     from google.protobuf.message import DecodeError
@@ -66,14 +66,14 @@ def grid_decoder(schema: bytes, most_cells: int = MOST_CELLS) -> Decoder:
         except DecodeError as error:
             raise InvalidMapError(f"it cannot be decoded as {FOXGLOVE_GRID_TYPE}: {error}") from error
         except (AttributeError, TypeError, ValueError, OverflowError) as error:
-            # By a schema of that name, but with other fields.
+            # The schema has the right name but other fields.
             raise InvalidMapError(f"its schema is not that of {FOXGLOVE_GRID_TYPE}: {error}") from error
 
     return decode
 
 
 def _add_with_imports(pool: Any, files: dict[str, Any], name: str) -> None:
-    """Add one file of the schema to the pool after those it imports; each one once."""
+    """Add one file of the schema to the pool, after the files it imports; each file once."""
     file = files.pop(name, None)
     if file is not None:
         for imported in file.dependency:
@@ -85,10 +85,10 @@ def _grid(message: Any, most_cells: int) -> Grid | None:
     map_warnings: list[MapWarning] = []
     if len(message.frame_id) > LONGEST_NAME_BYTES:
         raise InvalidMapError(f"its frame_id is longer than {LONGEST_NAME_BYTES} bytes")
-    # Of one that is no number neither equals the other; that is told below.
+    # NaN never equals anything; GridGeometry reports it below.
     if message.cell_size.x != message.cell_size.y and not math.isnan(message.cell_size.x):
         raise InvalidMapError(
-            f"its cells are {message.cell_size.x} x {message.cell_size.y} m; only square ones can be read"
+            f"its cells are {message.cell_size.x} x {message.cell_size.y} m; only square cells are supported"
         )
     position, turn = message.pose.position, message.pose.orientation
     pose = (position.x, position.y, position.z, turn.x, turn.y, turn.z, turn.w)
@@ -100,14 +100,14 @@ def _grid(message: Any, most_cells: int) -> Grid | None:
 
 
 def _channel(message: Any) -> NDArray[Any]:
-    """View the occupancy channel (H, W) in the packed cells."""
+    """View of the occupancy channel (H, W) in the packed cells."""
     fields = {field.name: field for field in message.fields}
     if len(fields) > 1:
         fields = {name: field for name, field in fields.items() if name == _OCCUPANCY_FIELD}
     if len(fields) != 1:
         names = ", ".join(field.name for field in message.fields) or "none"
         raise InvalidMapError(
-            f"its channels are {names}; one channel, or one named {_OCCUPANCY_FIELD}, is needed"
+            f"its channels are {names}; it needs a single channel, or one named {_OCCUPANCY_FIELD}"
         )
     (field,) = fields.values()
     if field.type not in _NUMERIC_TYPES:
@@ -115,15 +115,15 @@ def _channel(message: Any) -> NDArray[Any]:
     dtype = np.dtype(_NUMERIC_TYPES[field.type])
     data, columns, cell = message.data, message.column_count, message.cell_stride
     rows = len(data) // message.row_stride if message.row_stride else 0
-    # The last bytes that the strides reach must exist; ndarray checks the same, but says it less clearly.
+    # The strides must stay inside the data; ndarray checks the same, with a less clear message.
     if (
         rows * message.row_stride != len(data)
         or columns * cell > message.row_stride
         or field.offset + dtype.itemsize > max(cell, 1)
     ):
         raise InvalidMapError(
-            f"{columns} columns of {cell} bytes in rows of {message.row_stride} bytes, channel at "
-            f"{field.offset}, do not fit its {len(data)} bytes of data"
+            f"{columns} columns of {cell} bytes in rows of {message.row_stride} bytes, with the channel at "
+            f"offset {field.offset}, do not fit its {len(data)} bytes of data"
         )
     return np.ndarray((rows, columns), dtype, data, field.offset, (message.row_stride, cell))
 
@@ -132,7 +132,7 @@ def _occupancy(values: NDArray[Any], map_warnings: list[MapWarning]) -> Cells:
     if values.dtype.kind == "f":
         if values.size and np.nanmax(values, initial=0) > 1:
             raise InvalidMapError(
-                "its occupancy is floating point but exceeds 1; probabilities 0..1 are expected"
+                "its occupancy is floating point but exceeds 1; expected are probabilities in 0..1"
             )
         known = values >= 0
         return np.where(known, np.round(np.where(known, values, 0) * 100), UNKNOWN).astype(np.int8)

@@ -1,4 +1,4 @@
-"""Maps and patches as messages hold them, checked; whatever the message's format."""
+"""Maps and patches as decoded from messages of any format, and the checks that they pass."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ MOST_CELLS = ReadingParameters().map_max_cells
 
 
 MOST_TILT_RAD = math.radians(5.0)
-"""A map that is tilted less out of the plane has its lengths right to half a percent."""
+"""A map tilted out of the plane by less than this has lengths correct to half a percent."""
 
 
 UNIT_TOLERANCE = 0.01
-"""Quaternions whose length differs by less from 1 were rounded."""
+"""Quaternions whose length differs from 1 by less than this are taken as rounded."""
 
 
 LONGEST_NAME_BYTES = 1024
-"""Of frames; more is damage."""
+"""Longest name of a frame; anything longer is treated as damage."""
 
 
 class MapWarning(NamedTuple):
-    """What is odd about a map that can be read all the same: kind and text."""
+    """What is unusual about a map that can be read anyway: kind and text."""
 
     kind: str
     text: str
@@ -42,7 +42,7 @@ class MapWarning(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """A whole map: stamp in nanoseconds, geometry, cells (H, W) int8 in {-1, 0..100}, what is odd."""
+    """A whole map: stamp in nanoseconds, geometry, cells (H, W) int8 in {-1, 0..100}, and warnings."""
 
     stamp_ns: int
     geometry: GridGeometry
@@ -52,7 +52,7 @@ class Grid:
 
 @dataclass(frozen=True, eq=False)
 class Patch:
-    """New values of a rectangle of the map before: stamp, first row and column, cells (h, w) int8."""
+    """New values for a rectangle of the previous map: stamp, first row and column, cells (h, w) int8."""
 
     stamp_ns: int
     row: int
@@ -65,49 +65,49 @@ Decoder = Callable[[memoryview], Grid | Patch | None]
 
 
 def check_cells(rows: int, columns: int, most_cells: int) -> None:
-    """Refuse a map of more cells than may be.
+    """Check that a map does not have more cells than the limit.
 
     Raises
     ------
     InvalidMapError
-        With the remedy.
+        If it has; the message says which parameter sets the limit.
     """
     if rows * columns > most_cells:
         raise InvalidMapError(
-            f"it has {columns} x {rows} cells, the most that are read is {most_cells}; if it is real, "
+            f"it has {columns} x {rows} cells, more than the limit of {most_cells}; if that is correct, "
             "raise the parameter reading.map_max_cells"
         )
 
 
 def percent(values: Cells, map_warnings: list[MapWarning]) -> Cells:
-    """Occupancy as -1, 0..100; any other value counts as unknown, as map savers take it, with a remark."""
+    """Occupancy as -1, 0..100; any other value becomes unknown, as in map savers, with a warning."""
     if values.size == 0 or (values.min() >= UNKNOWN and values.max() <= 100):
         return values
     odd = (values < UNKNOWN) | (values > 100)
     count = np.count_nonzero(odd)
     map_warnings.append(
-        MapWarning("odd_values", f"{count} cells hold values outside -1..100 and count as unknown")
+        MapWarning("odd_values", f"{count} cells have values outside -1..100; they are read as unknown")
     )
     return np.where(odd, np.int8(UNKNOWN), values)
 
 
 def flat_yaw_of(quaternion: tuple[float, float, float, float], map_warnings: list[MapWarning]) -> float:
-    """Rotation about z, in radians, of a quaternion x, y, z, w; one of another length than 1 gets a remark.
+    """Rotation about z, in radians, of a quaternion x, y, z, w; warns if its length is not 1.
 
     Raises
     ------
     InvalidMapError
-        If it is not made of finite numbers, or tilts the map out of the plane.
+        If it contains NaN or infinity, or tilts the map out of the plane.
     """
     x, y, z, w = quaternion
     if not all(math.isfinite(part) for part in quaternion):
         raise InvalidMapError(
-            f"the orientation of its origin ({x}, {y}, {z}, {w}) is not made of finite numbers"
+            f"the orientation of its origin ({x}, {y}, {z}, {w}) must consist of finite numbers"
         )
     length = math.hypot(*quaternion)
     if abs(length - 1) > UNIT_TOLERANCE:
         map_warnings.append(
-            MapWarning("quaternion", f"the orientation of its origin has the length {length:g}, not 1")
+            MapWarning("quaternion", f"the orientation of its origin has length {length:g} instead of 1")
         )
     if length == 0 or math.isinf(length):
         return 0.0
@@ -115,15 +115,15 @@ def flat_yaw_of(quaternion: tuple[float, float, float, float], map_warnings: lis
     tilt = math.acos(min(max(w * w + z * z - x * x - y * y, -1.0), 1.0))
     if tilt > MOST_TILT_RAD:
         raise InvalidMapError(
-            f"its origin is tilted by {math.degrees(tilt):.0f} degrees out of the plane; only flat maps can "
-            "be read"
+            f"its origin is tilted by {math.degrees(tilt):.0f} degrees out of the plane; only flat maps are "
+            "supported"
         )
     return yaw_of(x, y, z, w)
 
 
 def yaw_of(x: float, y: float, z: float, w: float) -> float:
-    """Rotation about z, in radians, of a quaternion of any length; all zeros, as left unset, mean none."""
-    # No division by the length: it drops out of the two arguments.
+    """Rotation about z, in radians, of a quaternion of any length; 0 for an unset one (all zeros)."""
+    # The length need not be divided out: it cancels in the ratio of the two arguments.
     return math.atan2(2 * (w * z + x * y), w * w + x * x - y * y - z * z)
 
 
@@ -140,7 +140,7 @@ def make_grid(
     cells: Cells,
     map_warnings: list[MapWarning],
 ) -> Grid | None:
-    """Put a grid together; `pose` is x, y, z and the quaternion x, y, z, w. None if there are no cells."""
+    """Build a grid; `pose` is x, y, z and the quaternion x, y, z, w. None if there are no cells."""
     if cells.size == 0:
         return None
     x, y, _, *quaternion = pose

@@ -1,4 +1,4 @@
-"""A log as the rest of the tool sees it: what it holds, and its distinct maps in the order of log time."""
+"""A log as the rest of the program sees it: what it contains, and its distinct maps in log time order."""
 
 from __future__ import annotations
 
@@ -25,27 +25,27 @@ __all__ = ["LogInfo", "LogReader", "ReadCounts", "Selection", "TopicInfo", "choo
 
 logger = logging.getLogger(__name__)
 
-# Compared without the leading slash, which old ROS 1 bags leave out.
+# Compared without the leading slash, which old ROS 1 bags omit.
 PREFERRED_TOPIC = "map"
-# Patches of a map travel on the map's topic with this suffix: the convention of costmap_2d and nav2.
+# Patches are published on the map's topic with this suffix: the convention of costmap_2d and nav2.
 PATCH_SUFFIX = "_updates"
-# Message types named in the error about a log without maps: it stays one readable line.
+# Number of message types named in the error about a log without maps, so that it stays one readable line.
 MOST_LISTED = 6
 
 
 class LogReader:
-    """The distinct maps of one topic of a log; a context manager that closes its files.
+    """The distinct maps of one topic of a log; a context manager that closes the log's files.
 
     Attributes
     ----------
     info : LogInfo
-        What the log holds.
+        What the log contains.
     topic : str
         The map topic that is read.
     source : MessageSource
         The open log.
     counts : ReadCounts
-        About the latest call of `snapshots`.
+        Message counts of the latest call of `snapshots`.
     """
 
     def __init__(self, source: MessageSource, topic: str | None, selection: Selection) -> None:
@@ -74,33 +74,33 @@ class LogReader:
         self.source.close()
 
     def snapshots(self) -> Iterator[OccupancySnapshot]:
-        """Yield the selected maps in the order of log time.
+        """Yield the selected maps in log time order.
 
-        A map equal to the one before is dropped and counted, one that is damaged or contradicts itself told,
-        left out and counted. One map at a time is held, and the times of the topic's messages.
+        A map equal to the previous one is dropped and counted. A damaged or inconsistent map is skipped with
+        a warning and counted. Only one map is in memory at a time, plus the times of the topic's messages.
 
         Raises
         ------
         LogError
-            If no map of the topic lies in the time range, or none can be read.
+            If the topic has no map in the time range, or none can be read.
         """
         times = self._times_in_range()
         chosen = self._selection.thin(np.unique(times))
         taken = int(np.isin(times, chosen).sum())
         self.counts = ReadCounts(messages=len(times), skipped=len(times) - taken)
         snapshot = None
-        for snapshot in self._read(chosen, self.counts, self._selection.min_change_m2, tell=True):
+        for snapshot in self._read(chosen, self.counts, self._selection.min_change_m2, warn=True):
             yield snapshot
         if snapshot is None:
             raise self._no_map(self.counts)
 
     def first(self) -> OccupancySnapshot:
-        """Return the first map in the time range (index 0), whatever else is selected.
+        """Return the first map in the time range (index 0), regardless of the rest of the selection.
 
         Raises
         ------
         LogError
-            As `snapshots`.
+            As for `snapshots`.
         """
         counts = ReadCounts()
         snapshot = next(self._read(np.unique(self._times_in_range()), counts), None)
@@ -109,38 +109,38 @@ class LogReader:
         return snapshot
 
     def last(self) -> OccupancySnapshot:
-        """Return the last map in the time range, whatever else is selected.
+        """Return the last map in the time range, regardless of the rest of the selection.
 
         Its index is -1, counted from the end, because the maps before it are not read.
 
         Raises
         ------
         LogError
-            As `snapshots`.
+            As for `snapshots`.
         """
         counts = ReadCounts()
-        # From the end back: a log may end with messages that are damaged or hold no cells.
+        # Search backwards: a log may end with messages that are damaged or have no cells.
         for time in np.unique(self._times_in_range())[::-1]:
-            # Of several of one time, as in logs without times, it is the last one too.
+            # Several messages may share a log time, as in logs without times: take the last of them.
             latest = deque(self._read(np.array([time]), counts), maxlen=1)
             if latest:
                 return dataclasses.replace(latest[0], index=-1)
         raise self._no_map(counts)
 
     def robot_path(self, frame_id: str) -> RobotPath:
-        """Follow the robot through the selected time.
+        """Return the robot's path over the selected time range.
 
         Parameters
         ----------
         frame_id : str
-            Frame of the map, in which its poses are wanted.
+            Frame of the map; the poses are given in it.
         """
         return RobotPath(self.source, frame_id, self._selection.start_ns)
 
     def _read(
-        self, chosen: Times, counts: ReadCounts, min_change_m2: float | None = None, *, tell: bool = False
+        self, chosen: Times, counts: ReadCounts, min_change_m2: float | None = None, *, warn: bool = False
     ) -> Iterator[OccupancySnapshot]:
-        """Yield the distinct maps as they stand at the `chosen` times (sorted); `tell` what is odd."""
+        """Yield the distinct maps as they are at the `chosen` times (sorted); log warnings if `warn`."""
         wanted = set(chosen.tolist())
         stream = MapStream(self.topic, counts, min_change_m2)
         map_checks = MapChecks()
@@ -151,7 +151,7 @@ class LogReader:
                 decoded = message.decode()
                 if isinstance(decoded, Patch) and stream.is_empty:
                     map_warnings = (
-                        MapWarning("patch_without_map", "a patch without a map before it; left out"),
+                        MapWarning("patch_without_map", "a patch with no map before it; skipped"),
                     )
                 else:
                     map_warnings = map_checks.of(decoded, message.log_time_ns)
@@ -164,10 +164,11 @@ class LogReader:
                     stream.forget()
                 self._first_failure = self._first_failure or f"{self._place(message)}: {error}"
                 kind = "damaged_message" if is_damaged else "invalid_map"
-                self._tell(message, MapWarning(kind, f"{error}; it is left out"), tell)
+                if warn:
+                    self._warn(message, MapWarning(kind, f"{error}; skipped"))
                 continue
-            for remark in map_warnings:
-                self._tell(message, remark, tell)
+            for map_warning in map_warnings if warn else ():
+                self._warn(message, map_warning)
             if is_wanted and (snapshot := stream.snapshot(message.log_time_ns)) is not None:
                 yield snapshot
 
@@ -175,24 +176,23 @@ class LogReader:
         total = len(self.source.log_times(message.topic))
         return f"{self.info.path}: message {message.number} of {total} on {message.topic}"
 
-    def _tell(self, message: LoggedMap, remark: MapWarning, tell: bool) -> None:
-        if tell:
-            text = f"{self._place(message)}: {remark.text}"
-            log_warning(
-                logger, remark.kind, text, file=message.file, topic=message.topic, index=message.number
-            )
+    def _warn(self, message: LoggedMap, map_warning: MapWarning) -> None:
+        text = f"{self._place(message)}: {map_warning.text}"
+        log_warning(
+            logger, map_warning.kind, text, file=message.file, topic=message.topic, index=message.number
+        )
 
     def _needed(self, chosen: Times) -> Times:
-        """Times of the messages that the maps at the `chosen` times are made of.
+        """Log times of the messages needed to build the maps at the `chosen` times.
 
-        Without patches each map is a message. With patches it is the last grid and all patches since.
+        Without patches each map is one message. With patches it is the last full grid and all patches since.
         """
         if len(self._topics) == 1 or not len(chosen):
             return chosen
         grids, patches = (np.unique(self.source.log_times(topic)) for topic in self._topics)
         last_grid = np.searchsorted(grids, chosen, "right") - 1
         begins = np.where(last_grid >= 0, grids[last_grid], chosen) if len(grids) else chosen
-        # A patch is needed if some chosen map is made of it: its grid began before, the map stands after it.
+        # A patch is needed if it lies between the full grid that a chosen map starts from and that map.
         following = np.searchsorted(chosen, patches, "left")
         inside = following < len(chosen)
         patches, following = patches[inside], following[inside]
@@ -201,24 +201,24 @@ class LogReader:
     def _times_in_range(self) -> Times:
         times = np.sort(np.concatenate([self.source.log_times(topic) for topic in self._topics]))
         if not len(times):
-            raise LogError(f"{self.info.path}: there is no message on {self.topic}; choose another topic")
+            raise LogError(f"{self.info.path}: no messages on {self.topic}; choose another topic")
         in_range = self._selection.in_range(times)
         if not len(in_range):
             begin_ns = times[0] if self.info.start_ns is None else self.info.start_ns
             first_s, last_s = ((int(each) - int(begin_ns)) / 1e9 for each in (times[0], times[-1]))
             raise LogError(
-                f"{self.info.path}: no message on {self.topic} lies in the time range; "
-                f"they lie from {first_s:.1f} to {last_s:.1f} s into the log"
+                f"{self.info.path}: no messages on {self.topic} in the time range; "
+                f"its messages are {first_s:.1f} to {last_s:.1f} s after the start of the log"
             )
         return in_range
 
     def _no_map(self, counts: ReadCounts) -> LogError:
-        where = f"no message on {self.topic} in the time range holds a map"
+        where = f"no message on {self.topic} in the time range contains a usable map"
         if self._first_failure is None:
             text = f"{self.info.path}: {where}; choose another topic or time range"
             return LogError(text, file=self.info.path, topic=self.topic)
         why = [f"{counts.damaged} messages are damaged"] if counts.damaged else []
-        why += [f"{counts.invalid} maps contradict themselves"] if counts.invalid else []
+        why += [f"{counts.invalid} maps are inconsistent"] if counts.invalid else []
         kind = InvalidMapError if counts.invalid else LogError
         text = f"{self._first_failure}; {where}: {', '.join(why)}"
         return kind(text, file=self.info.path, topic=self.topic)
@@ -230,9 +230,9 @@ def choose_topic(info: LogInfo, asked: str | None = None) -> str:
     Raises
     ------
     NoMapTopicError
-        If there is none, or there are several and none was asked for; the text lists them.
+        If there is none, or there are several and none was asked for; the message lists them.
     """
-    where = str(info.path) if info.whole else f"{info.path}: is damaged; of what can be read of it"
+    where = f"{info.path}:" if info.whole else f"{info.path}: is damaged; in its readable part"
     maps = {topic.name: topic for topic in info.topics if topic.is_map}
     listed = ", ".join(maps)
     if asked is not None:
@@ -242,14 +242,15 @@ def choose_topic(info: LogInfo, asked: str | None = None) -> str:
         has = f"its map topics are {listed}" if maps else "it has no map topics"
         raise NoMapTopicError(f"{info.path}: {asked} is not a topic with occupancy grids; {has}")
     if not maps:
-        others = ", ".join(sorted({topic.message_type for topic in info.topics})[:MOST_LISTED]) or "nothing"
+        others = ", ".join(sorted({topic.message_type for topic in info.topics})[:MOST_LISTED])
+        found = f", only {others}" if others else ""
         raise NoMapTopicError(
-            f"{where}: no topic holds occupancy grids (nav_msgs/OccupancyGrid); it holds {others}; "
-            "record the topic of the mapping node, often /map, as well"
+            f"{where} no topic has occupancy grids (nav_msgs/OccupancyGrid){found}; "
+            "record the mapping node's topic too, usually /map"
         )
     filled = {name: topic for name, topic in maps.items() if topic.message_count != 0}
     if not filled:
-        raise NoMapTopicError(f"{where}: no message was recorded on the map topics {listed}")
+        raise NoMapTopicError(f"{where} no messages were recorded on the map topics {listed}")
     for name in filled:
         if name.lstrip("/") == PREFERRED_TOPIC:
             return name

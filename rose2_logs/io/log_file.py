@@ -1,4 +1,4 @@
-"""What one file of a log offers, whatever its format: channels, where messages lie, and their bytes."""
+"""The interface of one log file of any format: its channels, where their messages are, and their bytes."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from rose2_logs.io.messages import is_map_type, is_patch_type
 from rose2_logs.io.source import DamagedMessageError
 
 LATEST_NS = 2**63 - 1
-"""A later log time is damage: it lies beyond the year 2262."""
+"""A later log time (after the year 2262) is treated as damage."""
 
 
 class Place(NamedTuple):
-    """Where a message lies; the order of the fields is the order of reading.
+    """Where a message is stored; places sort in reading order.
 
-    `record` is the file offset of the chunk that holds it, or of the message itself outside chunks; `offset`
-    that of the message in the uncompressed chunk, or -1 outside chunks. In a database `record` is its row.
+    `record` is the file offset of the message's chunk, or of the message itself outside chunks. `offset` is
+    the message's offset in the uncompressed chunk, or -1 outside chunks. In a database, `record` is the row.
     """
 
     log_time_ns: int
@@ -35,23 +35,23 @@ class Place(NamedTuple):
 
 @dataclass(frozen=True)
 class Channel:
-    """Messages of one topic and type, with the type's definition; channels are equal by `id`.
+    """Messages of one topic and type, with the definition of the type.
 
     Attributes
     ----------
     id : int
-        In the file.
+        Number of the channel in the file.
     topic : str
     message_encoding : str
         ``cdr``, ``ros1``, ``protobuf`` ...
     schema_id : int
-        Of the definition, in the file; 0 if there is none.
+        Number of the definition in the file; 0 if there is none.
     schema_name, schema_encoding : str
-        Name and language of the type.
+        Name of the type and language of its definition.
     schema_data : bytes
-        Its definition.
+        The definition.
     metadata : dict of str
-        Whatever else the file tells of it, as the quality of service.
+        Whatever else the file says about the channel, such as the quality of service.
     """
 
     id: int
@@ -65,17 +65,17 @@ class Channel:
 
     @property
     def is_map(self) -> bool:
-        """Whether it holds whole maps that can be read."""
+        """Whether it carries whole maps that can be read."""
         return is_map_type(self.schema_name, self.message_encoding)
 
     @property
     def is_wanted(self) -> bool:
-        """Whether it holds maps, or patches of maps, that can be read."""
+        """Whether it carries maps, or patches of maps, that can be read."""
         return self.is_map or (is_patch_type(self.schema_name) and self.message_encoding in ("cdr", "ros1"))
 
 
 class StoredMessage(NamedTuple):
-    """A message with what stands around it."""
+    """A message with its channel, times and sequence number."""
 
     channel: Channel
     log_time_ns: int
@@ -85,13 +85,13 @@ class StoredMessage(NamedTuple):
 
 
 class LogFile(ABC):
-    """An open file of a log; of a damaged one as much as is whole.
+    """An open file of a log; of a damaged file, the readable part.
 
     Attributes
     ----------
     path : Path
     limits : ReadingParameters
-        How much it may claim.
+        The largest sizes that are accepted.
     channels : dict of int to Channel
         By id.
     message_counts : Counter
@@ -99,9 +99,9 @@ class LogFile(ABC):
     start_ns, end_ns : int or None
         Log times of the first and the last message.
     indexed : bool
-        Whether the file's own index serves; otherwise the file was scanned.
+        Whether the file's own index is used; otherwise the file was scanned.
     whole : bool
-        Whether nothing was found to be missing when it was opened.
+        Whether the file was complete and undamaged as far as opening it could show.
     """
 
     path: Path
@@ -115,7 +115,7 @@ class LogFile(ABC):
 
     @abstractmethod
     def places(self, channel_ids: Collection[int]) -> list[Place]:
-        """Where the messages of some wanted channels lie, in the order of log time."""
+        """Where the messages of some wanted channels are stored, in log time order."""
 
     @abstractmethod
     def payload(self, place: Place) -> memoryview:
@@ -124,20 +124,20 @@ class LogFile(ABC):
         Raises
         ------
         DamagedMessageError
-            If it cannot be read any more.
+            If it cannot be read.
         """
 
     @abstractmethod
     def messages(self, channel_ids: Collection[int] | None = None) -> Iterator[StoredMessage]:
-        """Yield every message that is whole, of some channels or of all, without holding them."""
+        """Yield every readable message of some channels, or of all, one at a time."""
 
     def decompressed(self, data: bytes | memoryview) -> memoryview:
-        """Return a message of a ROS 2 bag that may have been compressed message by message.
+        """Return a message of a ROS 2 bag, decompressed if the bag compressed its messages one by one.
 
         Raises
         ------
         DamagedMessageError
-            If it is damaged, or larger than may be.
+            If it is damaged, or larger than the limit.
         """
         if data[:4] != ZSTD_MAGIC:
             return memoryview(data)
@@ -148,20 +148,20 @@ class LogFile(ABC):
 
     @abstractmethod
     def close(self) -> None:
-        """Close the file; may be called twice."""
+        """Close the file; may be called more than once."""
 
 
 def check_count(path: Path, count: int, most: int) -> None:
-    """Refuse a log with more map messages than may be.
+    """Check that a log does not have more map messages than the limit.
 
     Raises
     ------
     LogError
-        With the remedy.
+        If it has; the message says which parameter sets the limit.
     """
     if count > most:
         raise LogError(
-            f"{path}: holds more than {most} map messages; if they are real, "
+            f"{path}: has more than {most} map messages; if that is correct, "
             "raise the parameter reading.map_max_messages",
             file=path,
         )

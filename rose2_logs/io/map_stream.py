@@ -1,4 +1,4 @@
-"""Successive map messages to distinct maps: patches applied, repeats and small changes dropped."""
+"""From successive map messages to distinct maps: patches applied, repeats and small changes dropped."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from rose2_logs.model.occupancy import UNKNOWN, BoolArray, OccupancySnapshot
 
 @dataclass
 class ReadCounts:
-    """What became of the map messages in the time range; filled while the snapshots are read.
+    """What happened to the map messages in the time range; updated while the snapshots are read.
 
     Once all are read, `messages` is the number of snapshots plus repeats, skipped, damaged and invalid.
 
     Attributes
     ----------
     messages : int
-        Map messages, grids and patches, of the topic in the time range.
+        Map messages (grids and patches) on the topic in the time range.
     repeats : int
-        Read, but equal to the map before.
+        Messages that leave the map as it was.
     skipped : int
-        Not taken by the selection, or without a map: a grid of no cells, a patch before any grid.
+        Messages not selected, or without a map: a grid without cells, a patch before any grid.
     updates_applied : int
-        Patches written into the grid before them, taken or not.
+        Patches applied to the grid before them, whether selected or not.
     damaged : int
-        Cannot be read any more: checksum or compression wrong.
+        Messages that cannot be read: wrong checksum or damaged compression.
     invalid : int
-        Contradict themselves, or reach out of the map before them.
+        Messages that are inconsistent, or patches that extend beyond their map.
     """
 
     messages: int = 0
@@ -42,16 +42,16 @@ class ReadCounts:
 
 
 class MapStream:
-    """The map as it stands after each message, and what of it is new.
+    """The map after each message, and whether it has changed enough to be a new snapshot.
 
     Parameters
     ----------
     topic : str
-        Name for the snapshots.
+        Topic name that the snapshots get.
     counts : ReadCounts
-        Filled along the way.
+        Updated along the way.
     min_change_m2 : float, optional
-        Least change of the known area since the last snapshot.
+        Minimum change of the known area since the previous snapshot.
     """
 
     def __init__(self, topic: str, counts: ReadCounts, min_change_m2: float | None = None) -> None:
@@ -67,20 +67,20 @@ class MapStream:
 
     @property
     def is_empty(self) -> bool:
-        """Whether there is no map: none came yet, or the last one was lost."""
+        """Whether there is no map: none has arrived yet, or the last one was unreadable."""
         return self._map is None
 
     def forget(self) -> None:
-        """Have no map until the next whole one: the one that came was lost, and patches are for it."""
+        """Drop the map until the next full one: the last one was unreadable, and patches refer to it."""
         self._map = None
 
     def apply(self, message: Grid | Patch | None) -> None:
-        """Bring the map up to date; None and a patch without a grid before it leave no map.
+        """Update the map; None clears it, and a patch without a grid before it is ignored.
 
         Raises
         ------
         InvalidMapError
-            If a patch reaches out of the grid.
+            If a patch extends beyond the grid.
         """
         if not isinstance(message, Patch):
             self._map = message
@@ -94,9 +94,9 @@ class MapStream:
         if top < 0 or left < 0 or top + height > rows or left + width > columns:
             raise InvalidMapError(
                 f"the patch of {width} x {height} cells at column {left}, row {top} "
-                f"reaches out of the map of {columns} x {rows}"
+                f"extends beyond the map of {columns} x {rows} cells"
             )
-        # Cells that came from a message or went out in a snapshot are left as they are.
+        # Cells that belong to a message or a snapshot are not modified.
         cells = self._map.cells.copy() if self._cells_are_shared else self._map.cells
         cells[top : top + height, left : left + width] = message.cells
         self._map = Grid(message.stamp_ns, self._map.geometry, cells)
@@ -104,7 +104,7 @@ class MapStream:
         self._counts.updates_applied += 1
 
     def snapshot(self, log_time_ns: int) -> OccupancySnapshot | None:
-        """Return the map as it stands, or None (and count why) if there is none or it is not new enough."""
+        """Return the current map, or None (and count why) if there is none or it changed too little."""
         now = self._map
         if now is None:
             self._counts.skipped += 1
@@ -136,10 +136,10 @@ def _equal(one: Grid, other: Grid) -> bool:
 
 
 def known_area_change_m2(before: Grid, now: Grid) -> float:
-    """Area that is known in one of two maps only, in square meters.
+    """Area that is known in only one of two maps, in square meters.
 
-    Grids of equal resolution, yaw and frame are laid over each other to the nearest cell; between others
-    nothing can be compared and the change is infinite.
+    Grids with the same resolution, yaw and frame are aligned to the nearest cell; other grids cannot be
+    compared, and the change is infinite.
     """
     old, new = before.geometry, now.geometry
     if (old.resolution_m, old.yaw_rad, old.frame_id) != (new.resolution_m, new.yaw_rad, new.frame_id):
@@ -153,7 +153,7 @@ def known_area_change_m2(before: Grid, now: Grid) -> float:
 
 
 def _overlap(cells: Cells, row: int, column: int, shape: tuple[int, int]) -> BoolArray:
-    """Known cells in that part of a grid that a grid of `shape` covers from (row, column) on."""
+    """Known cells in the part of a grid that another grid of `shape`, placed at (row, column), covers."""
     top, left = max(row, 0), max(column, 0)
     bottom, right = max(row + shape[0], top), max(column + shape[1], left)
     known: BoolArray = cells[top:bottom, left:right] != UNKNOWN
@@ -161,25 +161,25 @@ def _overlap(cells: Cells, row: int, column: int, shape: tuple[int, int]) -> Boo
 
 
 BACK_NS = 10**9
-"""Stamps may go back by the time that maps wait for each other; by more, a clock was set."""
+"""Concurrently published maps may have stamps out of order by up to this; more means a clock was set back."""
 
 
 class MapChecks:
-    """Looks at the maps of a topic as they come."""
+    """Checks the maps of a topic as they arrive."""
 
     def __init__(self) -> None:
         self._stamp_ns: int | None = None
         self._frame: str | None = None
 
     def of(self, message: Grid | Patch | None, log_time_ns: int) -> tuple[MapWarning, ...]:
-        """Tell what is odd about a map or a patch with its log time, and what changed since the last one."""
+        """Return warnings about a map or a patch, by itself and compared with the previous one."""
         if message is None:
-            return (MapWarning("no_cells", "a map without cells; left out"),)
+            return (MapWarning("no_cells", "a map without cells; skipped"),)
         map_warnings = list(message.map_warnings)
         before, self._stamp_ns = self._stamp_ns, message.stamp_ns
-        # Of what carries no time at all, as saved maps, that is known.
+        # Sources without times, such as saved maps, have a log time of 0 too.
         if message.stamp_ns == 0 and log_time_ns != 0:
-            map_warnings.append(MapWarning("stamp_zero", "its stamp is zero; only its log time is known"))
+            map_warnings.append(MapWarning("stamp_zero", "its stamp is zero; only its log time is valid"))
         elif before is not None and message.stamp_ns < before - BACK_NS:
             map_warnings.append(
                 MapWarning("stamp_back", f"its stamp goes back by {(before - message.stamp_ns) / 1e9:.1f} s")
@@ -188,7 +188,7 @@ class MapChecks:
             frame, self._frame = self._frame, message.geometry.frame_id
             if frame is not None and frame != self._frame:
                 text = (
-                    f"its frame changes from {frame!r} to {self._frame!r}; rooms are followed by coordinates"
+                    f"its frame changes from {frame!r} to {self._frame!r}; rooms are tracked by coordinates"
                 )
                 map_warnings.append(MapWarning("frame_changes", text))
         return tuple(map_warnings)

@@ -1,7 +1,7 @@
-"""Occupancy grids and their patches from message bytes: CDR of ROS 2, the serialization of ROS 1, protobuf.
+"""Occupancy grids and their patches from message bytes: ROS 2 CDR, ROS 1 serialization, protobuf.
 
-Generic deserializers make Python objects of the cells one by one, which takes seconds for a large map. Here
-the few fields before the cells are unpacked by hand and the cells stay a view of the message's bytes.
+Generic deserializers turn every cell into a Python object, which takes seconds for a large map. Here the few
+fields before the cells are unpacked by hand, and the cells remain a view of the message's bytes.
 """
 
 from __future__ import annotations
@@ -31,11 +31,11 @@ from rose2_logs.model.occupancy import UNKNOWN
 GRID_TYPES = ("nav_msgs/OccupancyGrid", "nav2_msgs/Costmap")
 PATCH_TYPES = ("map_msgs/OccupancyGridUpdate", "nav2_msgs/CostmapUpdate")
 PADDING_BYTES = 8
-"""Less than this may follow the last field: some writers fill up to the largest alignment."""
+"""Fewer bytes than this may follow the last field: some writers pad to the largest alignment."""
 
 
 def ros_type(name: str) -> str:
-    """Give a ROS message type the one spelling used here: ``package/Type``, without ``/msg/``."""
+    """Normalize the name of a ROS message type to ``package/Type``, without ``/msg/``."""
     return name.replace("/msg/", "/")
 
 
@@ -59,19 +59,19 @@ def decoder(
     Parameters
     ----------
     message_type : str
-        ROS message type in either spelling, or protobuf message name.
+        ROS message type, with or without ``/msg/``, or protobuf message name.
     encoding : str
         ``cdr``, ``ros1`` or ``protobuf``.
     schema : bytes
         The schema stored in the log; needed for protobuf only.
     most_cells : int
-        Cells of the largest map that is read.
+        Number of cells of the largest map that is accepted.
 
     Returns
     -------
     callable or None
-        From the message's bytes to a Grid, a Patch, or None for a grid of no cells; raises InvalidMapError.
-        None if such messages are neither maps nor patches, or cannot be read.
+        Turns the bytes of a message into a Grid, a Patch, or None for a grid without cells; raises
+        InvalidMapError. None if such messages are neither maps nor patches, or cannot be read.
     """
     if is_map_type(message_type, encoding) and encoding == "protobuf":
         from rose2_logs.io.foxglove_grid import grid_decoder
@@ -90,9 +90,9 @@ def decoder(
 
 
 class Fields:
-    """The fields of a serialized message, taken one after the other; strings and arrays have a 4-byte count.
+    """Reads the fields of a serialized message in order; strings and arrays start with a 4-byte count.
 
-    Raises InvalidMapError where the message ends before its fields do.
+    Every method raises InvalidMapError if the message ends before the field does.
     """
 
     byte_order = "<"
@@ -106,7 +106,7 @@ class Fields:
         self.map_warnings: list[MapWarning] = []
 
     def numbers(self, code: str, count: int = 1) -> tuple[float, ...]:
-        """Take `count` numbers of one `struct` type."""
+        """Read `count` numbers of one `struct` type."""
         alignment = min(struct.calcsize(code), self.largest_alignment)
         self._place += -(self._place - self.start) % alignment
         layout = f"{self.byte_order}{count}{code}"
@@ -114,47 +114,47 @@ class Fields:
             values = struct.unpack_from(layout, self._data, self._place)
         except struct.error as error:
             raise InvalidMapError(
-                f"the message ends after {len(self._data)} bytes, before its fields"
+                f"the message ends after {len(self._data)} bytes, before its last field"
             ) from error
         self._place += struct.calcsize(layout)
         return values
 
     def integers(self, code: str, count: int = 1) -> tuple[int, ...]:
-        """Take `count` integers of one `struct` type."""
+        """Read `count` integers of one `struct` type."""
         return tuple(int(value) for value in self.numbers(code, count))
 
     def octets(self, what: str) -> memoryview:
-        """Take a string or an array of bytes, without a copy."""
+        """Read a string or an array of bytes, without a copy."""
         (count,) = self.integers("I")
         left = len(self._data) - self._place
         if count > left:
-            raise InvalidMapError(f"its {what} says {count} bytes, but the message has only {left} more")
+            raise InvalidMapError(f"its {what} claims {count} bytes, but only {left} bytes are left")
         self._place += count
         return self._data[self._place - count : self._place]
 
     def string(self, what: str) -> str:
-        """Take a string; CDR ends it with a zero byte, which goes."""
+        """Read a string, without the zero byte that ends it in CDR."""
         octets = self.octets(what)
         if len(octets) > LONGEST_NAME_BYTES:
             raise InvalidMapError(f"its {what} is {len(octets)} bytes long, more than {LONGEST_NAME_BYTES}")
         return bytes(octets).rstrip(b"\0").decode("utf-8", errors="replace")
 
     def cells(self, rows: int, columns: int) -> NDArray[np.uint8]:
-        """Take the last field: the cells (rows, columns), a byte each."""
+        """Read the last field: the cells (rows, columns), one byte each."""
         data = self.octets("data")
         if rows * columns != len(data):
-            raise InvalidMapError(f"it says {columns} x {rows} cells, but its data has {len(data)}")
+            raise InvalidMapError(f"it claims {columns} x {rows} cells, but its data has {len(data)}")
         check_cells(rows, columns, self._most_cells)
         if (left := len(self._data) - self._place) >= PADDING_BYTES:
             self.map_warnings.append(
                 MapWarning(
-                    "more_bytes", f"{left} bytes follow its last field; is its definition another one?"
+                    "more_bytes", f"{left} bytes follow its last field; is its message definition different?"
                 )
             )
         return np.frombuffer(data, np.uint8).reshape(rows, columns)
 
     def occupancy(self, rows: int, columns: int) -> Cells:
-        """Take the last field as occupancy: -1, 0..100."""
+        """Read the last field as occupancy: -1, 0..100."""
         return percent(self.cells(rows, columns).view(np.int8), self.map_warnings)
 
     def time_ns(self) -> int:
@@ -172,21 +172,19 @@ _CDR_KINDS = {0: (">", 8), 1: ("<", 8), 6: (">", 4), 7: ("<", 4)}
 
 
 class CdrFields(Fields):
-    """CDR as ROS 2 writes it: four bytes that tell the byte order, then fields aligned to their own size."""
+    """CDR as ROS 2 writes it: a 4-byte header with the byte order, then fields aligned to their own size."""
 
     start = 4
 
     def __init__(self, data: memoryview, most_cells: int = MOST_CELLS) -> None:
         super().__init__(data, most_cells)
         if len(data) < self.start or data[0] != 0 or data[1] not in _CDR_KINDS:
-            raise InvalidMapError(
-                f"it does not begin as CDR, but with the bytes {bytes(data[:4]).hex(' ')!r}"
-            )
+            raise InvalidMapError(f"it is not CDR: it starts with the bytes {bytes(data[:4]).hex(' ')!r}")
         self.byte_order, self.largest_alignment = _CDR_KINDS[data[1]]
 
 
 class Ros1Fields(Fields):
-    """ROS 1: little endian, without gaps; the header has a sequence number, times are unsigned."""
+    """ROS 1: little endian, without padding; the header has a sequence number, times are unsigned."""
 
     def time_ns(self) -> int:
         """Take a time as nanoseconds."""

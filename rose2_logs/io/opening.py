@@ -1,4 +1,4 @@
-"""From a path to what reads it: told by how a file begins, else by its name."""
+"""From a path to its reader: the format is recognized by a file's first bytes, else by its name."""
 
 from __future__ import annotations
 
@@ -39,9 +39,9 @@ LogPath = str | Path | Sequence[str | Path]
 EVERYTHING = Selection()
 DEFAULT_LIMITS = ReadingParameters()
 DISK_LEFT_BYTES = 1 << 30
-"""Of the disk with the temporary folder, left free when a bag is decompressed there."""
+"""Disk space left free where the temporary folder is when a bag is decompressed there."""
 _MOST_NAMED = 3
-"""Files that a warning names."""
+"""Number of files that a warning names."""
 _FORMATS = (
     "an .mcap file, a ROS 1 .bag, a ROS 2 bag directory or .db3, a map_server .yaml or a folder of those"
 )
@@ -55,25 +55,25 @@ def open_log(
     selection: Selection = EVERYTHING,
     limits: ReadingParameters = DEFAULT_LIMITS,
 ) -> LogReader:
-    """Open a log for reading its maps.
+    """Open a log to read its maps.
 
     Parameters
     ----------
     path : str, Path or a sequence of them
         An ``.mcap`` file, a ROS 1 ``.bag``, a ROS 2 bag directory, a ``.db3`` file, a map_server ``.yaml``
-        (one snapshot), a folder of such maps, a pattern like ``maps/*.yaml`` (natural order), or several
+        (one snapshot), a folder of such maps, a pattern such as ``maps/*.yaml`` (natural order), or several
         files of one kind, which are read as one log.
     topic : str, optional
         The map topic; by default ``/map``, else the only one.
     selection : Selection
-        Which of its maps to take.
+        Which maps to read.
     limits : ReadingParameters
-        How much it may claim before it is refused.
+        The largest sizes that are accepted.
 
     Returns
     -------
     LogReader
-        To be closed, or used as a context manager.
+        Close it, or use it as a context manager.
 
     Raises
     ------
@@ -91,7 +91,7 @@ def open_log(
 
 
 def inspect_log(path: LogPath, limits: ReadingParameters = DEFAULT_LIMITS) -> LogInfo:
-    """Tell what a log holds, also one without any map.
+    """Describe what a log contains, even one without maps.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ def inspect_log(path: LogPath, limits: ReadingParameters = DEFAULT_LIMITS) -> Lo
 
 
 def open_source(path: LogPath, limits: ReadingParameters = DEFAULT_LIMITS) -> MessageSource:
-    """Open a log for looking at several of its topics; to be closed.
+    """Open a log to read several of its topics; the caller closes it.
 
     Parameters
     ----------
@@ -132,7 +132,7 @@ def _open_source(path: LogPath, limits: ReadingParameters) -> MessageSource:
     if not isinstance(path, (str, Path)):
         files = [Path(each) for each in path]
         if not files:
-            raise LogError("no log was given")
+            raise LogError("no log given; pass at least one file")
         return _open_files(files[0], files, limits) if len(files) > 1 else _open_source(files[0], limits)
     log = Path(path)
     if log.is_dir():
@@ -140,7 +140,7 @@ def _open_source(path: LogPath, limits: ReadingParameters) -> MessageSource:
     if not log.exists():
         found = [Path(each) for each in glob.glob(str(path))]  # noqa: PTH207 (may be absolute)
         if not found:
-            raise LogError(f"{path}: there is no such file or directory", file=str(path))
+            raise LogError(f"{path}: no such file or directory", file=str(path))
         return _open_files(log, _in_natural_order(found), limits)
     return _open_files(log, [log], limits)
 
@@ -214,12 +214,12 @@ def _formats() -> dict[str, tuple[OpenFile, str, str]]:
 
 
 def _kinds(files: list[Path]) -> set[str]:
-    """Kinds of files by how they begin, else by their names; of several, those that tell none do not count.
+    """Kinds of the files; files whose kind cannot be recognized are ignored as long as another one can.
 
     Raises
     ------
     LogError
-        If none tells its kind.
+        If no kind can be recognized.
     """
     kinds, failures = set(), []
     for file in files:
@@ -233,7 +233,7 @@ def _kinds(files: list[Path]) -> set[str]:
 
 
 def _kind(file: Path) -> str:
-    """Kind of a file by how it begins, else by its name."""
+    """Kind of a file by its first bytes, else by its name."""
     with file.open("rb") as stream:
         begin = stream.read(8)
     if begin in _MAGIC:
@@ -247,13 +247,13 @@ def _kind(file: Path) -> str:
     if suffix in IMAGE_ENDINGS:
         return "image"
     if _is_packed(file) or name.endswith(STORAGE_ENDINGS):
-        what = "is empty" if not begin else f"does not begin as {suffix} files do"
-        raise LogError(f"{file}: {what}; was it copied whole?", file=file)
-    raise LogError(f"{file}: is not a kind of log that can be read; give {_FORMATS}", file=file)
+        what = "is empty" if not begin else f"does not start like a {suffix} file"
+        raise LogError(f"{file}: {what}; was it copied completely?", file=file)
+    raise LogError(f"{file}: is not a supported kind of log; give {_FORMATS}", file=file)
 
 
 def _is_packed(file: Path) -> bool:
-    """Whether a file is that of a ROS 2 bag compressed file by file."""
+    """Whether a file belongs to a ROS 2 bag that was compressed file by file."""
     name = file.name.lower()
     return name.endswith(COMPRESSED_ENDING) and name.removesuffix(COMPRESSED_ENDING).endswith(STORAGE_ENDINGS)
 
@@ -263,7 +263,7 @@ def _yaml_beside(image: Path) -> Path:
         if (beside := image.with_suffix(suffix)).exists():
             return beside
     raise LogError(
-        f"{image}: needs {image.stem}.yaml beside it with its resolution and origin (map_server's format)",
+        f"{image}: needs {image.stem}.yaml next to it with resolution and origin (map_server format)",
         file=image,
     )
 
@@ -275,29 +275,29 @@ def _in_natural_order(files: list[Path]) -> list[Path]:
 
 
 def _open_directory(log: Path, limits: ReadingParameters) -> MessageSource:
-    """Open a ROS 2 bag, also one whose recorder died before it was described, or a folder of saved maps."""
+    """Open a ROS 2 bag, even one without a description (its recorder crashed), or a folder of saved maps."""
     from rose2_logs.io.saved_maps import is_map_file
 
     if (log / BAG_DESCRIPTION).exists():
         return _open_files(log, _files_of_bag(log), limits, is_bag=True)
     if files := _stored_in(log):
-        _tell_what_is_one_log(log, files)
+        _warn_files_as_one(log, files)
         return _open_files(log, files, limits)
     inside = sorted(each for each in log.iterdir() if each.is_file())
-    # One with an image of its name is a map even if it cannot be read, which is told then.
+    # A YAML file with an image of the same name counts as a map even if unreadable; reading it then warns.
     images = {each.stem for each in inside if each.suffix.lower() in IMAGE_ENDINGS}
     described = [each for each in inside if each.suffix.lower() in MAP_ENDINGS]
     if maps := [each for each in described if each.stem in images or is_map_file(each)]:
         return _open_files(log, _in_natural_order(maps), limits)
     raise LogError(
-        f"{log}: holds neither a bag ({BAG_DESCRIPTION}) nor saved maps; give {_FORMATS}; "
-        "rose2-logs batch takes folders of many logs",
+        f"{log}: contains neither a bag ({BAG_DESCRIPTION}) nor saved maps; give {_FORMATS}; "
+        "for a folder of many logs use rose2-logs batch",
         file=log,
     )
 
 
 def _stored_in(log: Path) -> list[Path]:
-    """Files of the first kind of storage that a folder holds; annotated logs only if there are no others."""
+    """A folder's files of the first storage kind found; annotated logs only if there are no others."""
     inside = [each for each in log.iterdir() if each.is_file()]
     inside = [each for each in inside if not each.name.endswith(ANNOTATED_ENDING)] or inside
     for suffix in STORAGE_ENDINGS:
@@ -307,40 +307,40 @@ def _stored_in(log: Path) -> list[Path]:
     return []
 
 
-def _tell_what_is_one_log(log: Path, files: list[Path]) -> None:
-    """Say what is taken for one run where no description says so: it may be several, or not all of it."""
+def _warn_files_as_one(log: Path, files: list[Path]) -> None:
+    """Warn that files without a description are read as one run: they may be several, or incomplete."""
     names = [file.name for file in files]
     inside = [each.name for each in log.iterdir() if each.is_file()]
     stored = {name for name in inside if is_storage(name.removesuffix(COMPRESSED_ENDING))}
     others = sorted(stored.difference(names))
     if not others and (len(names) == 1 or is_bag(names, log.resolve().name)):
         return
-    told = f"{names[0]} is" if len(names) == 1 else f"{len(names)} files from {names[0]} on are"
-    left_out = f", {', '.join(others[:_MOST_NAMED])} left out" if others else ""
+    read = f"{names[0]} is" if len(names) == 1 else f"{len(names)} files from {names[0]} on are"
+    ignored = f", {', '.join(others[:_MOST_NAMED])} ignored" if others else ""
     text = (
-        f"{log}: has no {BAG_DESCRIPTION}; its {told} read as one log{left_out}: name the file that is meant"
+        f"{log}: has no {BAG_DESCRIPTION}; {read} read as one log{ignored}; if that is wrong, name the file"
     )
     log_warning(logger, "files_as_one", text, file=log)
 
 
 def _files_of_bag(log: Path) -> list[Path]:
-    """Files of a ROS 2 bag by its description; those that are missing are said to be."""
+    """Files of a ROS 2 bag according to its description; warns about missing ones."""
     path = log / BAG_DESCRIPTION
     try:
         named = [log / PurePosixPath(name).name for name in _described_files(path)]
     except LogError as error:
         if not (files := _stored_in(log)):
             raise
-        log_warning(logger, "description", f"{error}; the files beside it are read", file=path)
+        log_warning(logger, "description", f"{error}; the files next to it are read", file=path)
         return files
     files = [file for file in named if file.is_file()]
     for missing in [file for file in named if not file.is_file()]:
-        text = f"{missing}: is missing, but {path} names it"
+        text = f"{missing}: is missing although {path} lists it"
         if not files:
             raise LogError(text, file=missing)
         log_warning(logger, "file_missing", f"{text}; the other files are read", file=missing)
     if not files:
-        raise LogError(f"{path}: names no file; run `ros2 bag reindex` on {log}", file=path)
+        raise LogError(f"{path}: lists no files; run `ros2 bag reindex` on {log}", file=path)
     return files
 
 
@@ -359,7 +359,7 @@ def _decompressed(file: Path, directory: Path) -> Path:
 
     from rose2_logs.io.decompression import TooLargeError, decompress_file
 
-    # A folder of its own: files of one name may come from several places.
+    # One folder per file: files from different folders may have the same name.
     directory.mkdir()
     target = directory / file.stem
     try:
@@ -368,5 +368,5 @@ def _decompressed(file: Path, directory: Path) -> Path:
         text = f"{file}: cannot be decompressed: {error}"
         if not target.exists() or not target.stat().st_size or isinstance(error, TooLargeError):
             raise LogError(text, file=file) from error
-        log_warning(logger, "cut_off", f"{text}; what is whole before is read", file=file)
+        log_warning(logger, "cut_off", f"{text}; everything before the damage is read", file=file)
     return target

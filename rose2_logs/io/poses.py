@@ -1,4 +1,4 @@
-"""Where the robot was along a log: from its transforms, else its odometry, else its poses."""
+"""The robot's path over a log: from its transforms, else its odometry, else its poses."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ TRANSFORM_TYPES = ("tf2_msgs/TFMessage", "tf/tfMessage")
 ODOMETRY_TYPES = ("nav_msgs/Odometry",)
 POSE_TYPES = ("geometry_msgs/PoseStamped", "geometry_msgs/PoseWithCovarianceStamped")
 BASE_FRAMES = ("base_link", "base_footprint", "base", "base_frame")
-"""Frames of a mobile base (REP 105, REP 120, and what drivers use), the most usual first."""
-WISHES = ("goal", "initial")
-"""Topics with this in their name hold poses that somebody asked for, not where the robot was."""
+"""Frames of a mobile base (REP 105, REP 120, and common drivers), the most common first."""
+REQUESTED_POSES = ("goal", "initial")
+"""Topics with this in their name carry requested poses, not where the robot was."""
 POSE_STEP_S = 0.25
-"""Least time between two poses: a robot of 0.8 m/s is looked at every `POSE_STEP_M`."""
+"""Minimum time between two poses: at 0.8 m/s a robot moves `POSE_STEP_M` in this time."""
 POSE_STEP_M = 0.2
-"""Least way between two poses: well below the width of a door."""
+"""Minimum distance between two poses: well below the width of a door."""
 LEAD_NS = 10 * 10**9
-"""Transforms from this long before the first pose are taken in: slow ones come every second."""
+"""Transforms are read from this long before the first pose on: slow ones are published every second."""
 TRIED_MESSAGES = 3000
-"""Within so many of its first messages a log's transforms lead from the map to the robot, or never do."""
+"""If a log's transforms connect the map to the robot, they do so within this many of its first messages."""
 
 Pose = tuple[float, float, float]
 """x, y in meters, yaw in radians."""
@@ -37,14 +37,14 @@ Pose = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class _Edge:
-    """A frame's parent, and its pose in it."""
+    """A frame's parent, and the frame's pose in its parent."""
 
     parent: str
     pose: Pose
 
 
 class RobotPath:
-    """The robot's poses in the frame of the map, in the order of log time; a cursor that goes forward once.
+    """The robot's poses in the frame of the map, read once in log time order.
 
     Parameters
     ----------
@@ -53,12 +53,12 @@ class RobotPath:
     frame_id : str
         Frame of the map.
     start_ns : int, optional
-        Poses logged before are left out.
+        Earlier poses are skipped.
 
     Attributes
     ----------
     origin : str
-        Topics that the poses come from; empty where the log tells nothing of the robot.
+        Topics that the poses come from; empty if the log does not say where the robot was.
     """
 
     def __init__(self, source: MessageSource, frame_id: str, start_ns: int | None = None) -> None:
@@ -70,12 +70,12 @@ class RobotPath:
         self._last: Pose | None = None
 
     def until(self, log_time_ns: int) -> FloatArray:
-        """Take the poses since the call before.
+        """Return the poses since the previous call.
 
         Returns
         -------
         (K, 3) float
-            x, y in meters and yaw in radians, at least `POSE_STEP_M` from one to the next.
+            x, y in meters and yaw in radians; consecutive poses are at least `POSE_STEP_M` apart.
         """
         taken = []
         while self._next is not None and self._next[0] <= log_time_ns:
@@ -92,14 +92,14 @@ class RobotPath:
 def _choose(
     source: MessageSource, frame: str, start_ns: int
 ) -> tuple[tuple[str, ...], Iterator[tuple[int, Pose]]]:
-    """Topics that tell where the robot was, and its poses."""
+    """Topics that say where the robot was, and its poses."""
     transforms = _topics(source.info, TRANSFORM_TYPES)
     tried = _transformed(islice(source.stream(transforms), TRIED_MESSAGES), frame, 0)
     if transforms and next(tried, None) is not None:
         return transforms, _transformed(source.stream(transforms), frame, start_ns)
     for types, read in ((ODOMETRY_TYPES, _odometry), (POSE_TYPES, _pose)):
         topics = _topics(source.info, types)
-        # The one with the most messages is the robot's own.
+        # The topic with the most messages is the robot's own.
         counts = {item.name: item.message_count or 0 for item in source.info.topics}
         if topics := tuple(sorted(topics, key=lambda name: (-counts[name], name))[:1]):
             return topics, _posed(source.stream(topics), read, start_ns)
@@ -113,21 +113,21 @@ def _topics(info: LogInfo, types: tuple[str, ...]) -> tuple[str, ...]:
         if ros_type(topic.message_type) in types
         and topic.encoding in ("cdr", "ros1")
         and topic.message_count != 0
-        and not any(wish in topic.name for wish in WISHES)
+        and not any(word in topic.name for word in REQUESTED_POSES)
     )
 
 
 def _transformed(messages: Iterator[LoggedBytes], frame: str, start_ns: int) -> Iterator[tuple[int, Pose]]:
     """Follow the transforms from the map's frame to that of the robot's base."""
     edges: dict[str, _Edge] = {}
-    # What the way from the map to the robot is made of; transforms of joints and sensors are passed over.
-    way: tuple[bytes, ...] = ()
+    # The chain of frames from the map to the robot; other transforms, as of joints and sensors, are skipped.
+    chain: tuple[bytes, ...] = ()
     latest_ns: int | None = None
     for message in messages:
         if message.log_time_ns < start_ns - LEAD_NS and "static" not in message.topic:
             continue
         data = _data(message)
-        if data is None or (way and not any(child in data for child in way)):
+        if data is None or (chain and not any(child in data for child in chain)):
             continue
         try:
             edges |= _transforms(_fields(message, data))
@@ -136,7 +136,7 @@ def _transformed(messages: Iterator[LoggedBytes], frame: str, start_ns: int) -> 
         if latest_ns is not None and message.log_time_ns - latest_ns < POSE_STEP_S * 1e9:
             continue
         pose, children = _base_in(frame, edges)
-        way = tuple(child.encode() for child in children)
+        chain = tuple(child.encode() for child in children)
         if pose is not None:
             latest_ns = message.log_time_ns
             yield message.log_time_ns, pose
@@ -174,7 +174,7 @@ def _fields(message: LoggedBytes, data: bytes) -> Fields:
 
 
 def _transforms(fields: Fields) -> dict[str, _Edge]:
-    """Transforms of a message by the frame that they place."""
+    """Transforms of a message, by child frame."""
     edges = {}
     for _ in range(fields.integers("I")[0]):
         _, parent = fields.header()
@@ -197,15 +197,15 @@ def _pose(fields: Fields) -> Pose:
 
 
 def _planar(fields: Fields) -> Pose:
-    """Take a position and a quaternion, seen from above."""
+    """Read a position and a quaternion, projected to the plane."""
     x, y, _, *quaternion = fields.numbers("d", 7)
     return x, y, yaw_of(*quaternion)
 
 
 def _base_in(frame: str, edges: dict[str, _Edge]) -> tuple[Pose | None, tuple[str, ...]]:
-    """Pose of the robot's base in a frame, and the frames from it up to that one."""
+    """Pose of the robot's base in a frame, and the chain of frames from the base up to it."""
     for base in BASE_FRAMES:
-        # Several robots have their names before those of their frames.
+        # With several robots, frame names start with the robot's name.
         for name in sorted(each for each in edges if each.rsplit("/", 1)[-1] == base):
             pose, children = edges[name].pose, [name]
             while (parent := edges[children[-1]].parent) != frame and parent in edges:
@@ -229,5 +229,5 @@ def _composed(outer: Pose, inner: Pose) -> Pose:
 
 
 def _plain(frame: str) -> str:
-    """Name of a frame without the slash that old logs put before it."""
+    """Name of a frame without the leading slash of old logs."""
     return frame.lstrip("/")

@@ -31,14 +31,14 @@ _repr = reprlib.Repr()
 
 TOPIC = "/map"
 FRAME_ID = "map"
-# Saved maps carry no time; a sequence is taken as one map a second from the epoch on.
+# Saved maps have no time; a sequence is read as one map per second, starting at the epoch.
 STEP_NS = 10**9
-# map_server's defaults, for files that leave them out.
+# map_server's defaults, for files that omit them.
 OCCUPIED_THRESH = 0.65
 FREE_THRESH = 0.196
 MODES = ("trinary", "scale", "raw")
 FORMATS = ("PNG", "PPM", "BMP", "JPEG", "TIFF")
-"""Image formats that are opened, by Pillow's names (PPM is also PGM): what map savers write, and no more."""
+"""Image formats that are opened, by Pillow's names (PPM includes PGM): those that map savers write."""
 # What map savers write in trinary mode for free, unknown and occupied.
 SAVED_FREE, SAVED_UNKNOWN, SAVED_OCCUPIED = 254, 205, 0
 
@@ -51,9 +51,9 @@ class MapFilesSource(MessageSource):
     path : Path
         Name of the log.
     files : sequence of Path
-        The ``.yaml`` files; each is read when its turn comes.
+        The ``.yaml`` files; each is read when it is needed.
     limits : ReadingParameters
-        How large a map may be.
+        The largest sizes that are accepted.
     """
 
     def __init__(self, path: Path, files: Sequence[Path], limits: ReadingParameters = DEFAULT_LIMITS) -> None:
@@ -70,10 +70,10 @@ class MapFilesSource(MessageSource):
         )
 
     def close(self) -> None:
-        """Nothing is open between maps."""
+        """Do nothing: no file stays open between maps."""
 
     def log_times(self, topic: str) -> Times:
-        """One map a second, counted from 0 nanoseconds."""
+        """One map per second, starting at 0 nanoseconds."""
         return np.arange(len(self._files), dtype=np.int64) * STEP_NS
 
     def read(self, topics: Sequence[str], times: Times) -> Iterator[LoggedMap]:
@@ -109,9 +109,9 @@ def read_map(path: Path, stamp_ns: int = 0, most_cells: int = MOST_CELLS) -> Gri
     path : Path
         The ``.yaml`` file: image, resolution, origin (x, y, yaw), negate, occupied_thresh, free_thresh, mode.
     stamp_ns : int
-        Stamp to give to the map.
+        Stamp that the map gets.
     most_cells : int
-        Pixels of the largest image that is read, by what it claims.
+        Number of pixels of the largest image that is accepted, according to its header.
 
     Returns
     -------
@@ -128,7 +128,7 @@ def read_map(path: Path, stamp_ns: int = 0, most_cells: int = MOST_CELLS) -> Gri
     origin = described.get("origin")
     if not (isinstance(origin, Sequence) and len(origin) == 3 and all(_is_finite(part) for part in origin)):
         raise InvalidMapError(
-            f"{path}: origin is {_short(origin)}; it must be three finite numbers: x, y, yaw", file=path
+            f"{path}: origin is {_short(origin)}; it must be three finite numbers (x, y, yaw)", file=path
         )
     x, y, yaw = (float(part) for part in origin)
     shade, opaque = _load_image(_image_path(path, described), most_cells)
@@ -143,7 +143,7 @@ def read_map(path: Path, stamp_ns: int = 0, most_cells: int = MOST_CELLS) -> Gri
 def _cells(
     path: Path, described: Mapping[str, Any], shade: NDArray[np.float32], opaque: NDArray[np.bool_] | None
 ) -> Cells:
-    """Occupancy of pixels of brightness `shade` in 0..1, by the mode and the thresholds of the file."""
+    """Occupancy of pixels with brightness `shade` in 0..1, by the mode and the thresholds of the file."""
     mode = str(described.get("mode", "trinary")).lower()
     if mode not in MODES:
         raise InvalidMapError(f"{path}: mode is {_short(mode)}; it must be one of {', '.join(MODES)}")
@@ -157,9 +157,9 @@ def _cells(
     free_below = _number(path, described, "free_thresh", FREE_THRESH)
     if not 0 <= free_below < occupied_above <= 1:
         raise InvalidMapError(
-            f"{path}: free_thresh {free_below} must lie below occupied_thresh {occupied_above}, both in 0..1"
+            f"{path}: free_thresh {free_below} must be below occupied_thresh {occupied_above}, both in 0..1"
         )
-    # Rounded, so that a pixel that stands for a threshold exactly is found on it.
+    # Rounded, so that a pixel at a threshold compares equal to it.
     occupancy: NDArray[np.float64] = np.round((shade if negate else 1 - shade).astype(float), 6)
     if mode == "scale":
         percent = np.round((occupancy - free_below) / (occupied_above - free_below) * 100)
@@ -173,10 +173,10 @@ def _cells(
         and _is_saved_trinary(shade)
         and saved_as_unknown.any()
     ):
-        # nav2 before mid 2025 saved free_thresh 0.25 with such images, by which unknown cells load as free.
+        # Until mid 2025, nav2 saved such images with free_thresh 0.25, by which unknown cells load as free.
         text = (
-            f"{path}: by its free_thresh {free_below:g} unknown pixels ({SAVED_UNKNOWN}) would be free; they "
-            "are read as unknown"
+            f"{path}: its free_thresh of {free_below:g} would make unknown pixels ({SAVED_UNKNOWN}) free; "
+            "they are read as unknown"
         )
         log_warning(logger, "free_thresh", text, file=path)
         unknown |= saved_as_unknown
@@ -187,17 +187,17 @@ def _cells(
 
 
 def _is_saved_trinary(shade: NDArray[np.float32]) -> bool:
-    """Whether an image holds only the three values that map savers write."""
+    """Whether an image contains only the three values that map savers write."""
     return bool(np.isin(np.round(shade * 255), (SAVED_FREE, SAVED_UNKNOWN, SAVED_OCCUPIED)).all())
 
 
 def _load_image(path: Path, most_cells: int) -> tuple[NDArray[np.float32], NDArray[np.bool_] | None]:
-    """Brightness (H, W) in 0..1, the mean of the colors, and which pixels are opaque if the image tells."""
+    """Brightness (H, W) in 0..1, the mean of the colors, and which pixels are opaque if it has alpha."""
     from PIL import Image
 
     try:
         with warnings.catch_warnings():
-            # Large maps are wanted; Pillow still refuses those of more than 180 million pixels.
+            # Large maps are fine; Pillow still refuses images of more than 180 million pixels.
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)
             with Image.open(path, formats=FORMATS) as image:
                 check_cells(image.height, image.width, most_cells)
@@ -209,8 +209,8 @@ def _load_image(path: Path, most_cells: int) -> tuple[NDArray[np.float32], NDArr
                 )
     except InvalidMapError as error:
         raise InvalidMapError(f"{path}: {error}", file=path) from error
-    except Exception as error:  # whatever a decoder raises on bytes that are not what they should be
-        raise InvalidMapError(f"{path}: cannot be read as the image of a map: {error}", file=path) from error
+    except Exception as error:  # whatever a decoder raises on damaged data
+        raise InvalidMapError(f"{path}: cannot be read as a map image: {error}", file=path) from error
     if pixels.ndim == 2:
         return pixels.astype(np.float32) / np.float32(255), None
     shade = pixels[..., :3].mean(axis=-1, dtype=np.float32) / np.float32(255)
@@ -225,14 +225,14 @@ def _image_path(path: Path, described: Mapping[str, Any]) -> Path:
 
 
 def _is_finite(value: object) -> TypeGuard[float]:
-    # Not by conversion: whole numbers have no end in YAML.
+    # Compared, not converted: integers in YAML can be too large for a float.
     if not isinstance(value, (int, float)) or isinstance(value, bool):
         return False
     return -sys.float_info.max <= value <= sys.float_info.max
 
 
 def _short(value: object) -> str:
-    """Show a value from a file, which may be anything, in a line."""
+    """Show any value from a file within one line."""
     return _repr.repr(value)
 
 
@@ -244,7 +244,7 @@ def _number(path: Path, described: Mapping[str, Any], name: str, default: float 
 
 
 def _size(path: Path) -> int:
-    """Bytes of a saved map, as far as its files exist."""
+    """Size of a saved map in bytes, as far as its files exist."""
     try:
         image = _image_path(path, load_yaml(path))
         return path.stat().st_size + (image.stat().st_size if image.exists() else 0)

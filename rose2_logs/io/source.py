@@ -1,4 +1,4 @@
-"""What every log format implements: its topics, and its map messages by topic and log time."""
+"""The interface of every log format: its topics, and its map messages by topic and log time."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class TopicInfo:
     name, message_type, encoding : str
         As stored in the log; the encoding is ``cdr`` (ROS 2), ``ros1``, ``protobuf``, ``json`` ...
     message_count : int or None
-        None where only reading the whole log would tell.
+        None if it is known only after reading the whole log.
     is_map : bool
         Whether the messages are occupancy grids that can be read.
     """
@@ -35,7 +35,7 @@ class TopicInfo:
 
 @dataclass(frozen=True)
 class LogInfo:
-    """What a log holds, from its index where it has one.
+    """What a log contains, from its index if it has one.
 
     Attributes
     ----------
@@ -50,9 +50,9 @@ class LogInfo:
     topics : tuple of TopicInfo
         Sorted by name.
     indexed : bool
-        Whether the log has a usable index; without one it was scanned from the beginning.
+        Whether the log has a usable index; otherwise it was scanned from the beginning.
     whole : bool
-        Whether nothing was found to be missing when it was opened.
+        Whether the log was complete and undamaged as far as opening it could show.
     """
 
     path: Path
@@ -71,7 +71,7 @@ class LogInfo:
 
 
 class DamagedMessageError(LogError):
-    """The bytes of one message are lost; those of others may be whole."""
+    """The bytes of one message are lost; other messages may still be readable."""
 
 
 @dataclass(frozen=True)
@@ -83,14 +83,14 @@ class LoggedMap:
     log_time_ns : int
         When it was recorded.
     topic : str
-        Where it was sent.
+        Topic it was published on.
     number : int
-        Of the message on its topic, from 1, in the order of log time.
+        Number of the message on its topic, from 1, in log time order.
     file : Path
-        Where it lies.
+        File that contains it.
     decode : callable
-        Gives the message, or None if its grid has no cells; raises InvalidMapError where the message
-        contradicts itself and DamagedMessageError where its bytes are lost.
+        Returns the message, or None if its grid has no cells; raises InvalidMapError if the message is
+        inconsistent and DamagedMessageError if its bytes are lost.
     """
 
     log_time_ns: int
@@ -102,16 +102,16 @@ class LoggedMap:
 
 @dataclass(frozen=True)
 class LoggedBytes:
-    """A message of any type, as it stands in the log.
+    """A message of any type, as stored in the log.
 
     Attributes
     ----------
     log_time_ns : int
         When it was recorded.
     topic, encoding : str
-        Where it was sent; ``cdr`` or ``ros1``.
+        Topic it was published on; ``cdr`` or ``ros1``.
     data : callable
-        Gives its bytes; raises DamagedMessageError where they are lost.
+        Returns its bytes; raises DamagedMessageError if they are lost.
     """
 
     log_time_ns: int
@@ -121,7 +121,7 @@ class LoggedBytes:
 
 
 class MessageSource(ABC):
-    """An open log: what it holds, and its map messages by topic and log time."""
+    """An open log: what it contains, and its map messages by topic and log time."""
 
     info: LogInfo
 
@@ -131,16 +131,16 @@ class MessageSource(ABC):
 
     @abstractmethod
     def read(self, topics: Sequence[str], times: Times) -> Iterator[LoggedMap]:
-        """Yield, in the order of log time, the messages of `topics` logged at `times` (sorted, distinct)."""
+        """Yield the messages of `topics` logged at `times` (sorted, distinct), in log time order."""
 
     def stream(self, topics: Sequence[str]) -> Iterator[LoggedBytes]:
-        """Yield all messages of `topics` about in the order of log time, none of them held.
+        """Yield all messages of `topics` one at a time, roughly in log time order.
 
-        Parts of the log that overlap in time may follow one another; what is damaged is passed over. A log
-        that holds nothing but maps yields nothing.
+        Parts of the log that overlap in time may come one after the other; damaged messages are skipped. A
+        log that contains only maps yields nothing.
         """
         return iter(())
 
     @abstractmethod
     def close(self) -> None:
-        """Release the files; may be called twice."""
+        """Release the files; may be called more than once."""

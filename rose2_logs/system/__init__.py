@@ -1,1 +1,1 @@
-"""Files, processes, shared memory and warnings: what any program needs, and no robotics."""
+"""Files, processes, shared memory and warnings: what any program needs, nothing about robots."""

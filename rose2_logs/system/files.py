@@ -1,4 +1,4 @@
-"""Files that are whole or absent: written hidden beside their name and renamed at the end."""
+"""Files that are either complete or absent: written under a hidden name and renamed at the end."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from rose2_logs.errors import OutputError
 logger = logging.getLogger(__name__)
 
 LONGEST_NAME_BYTES = 255 - len("..journal")
-"""File systems take 255; what is hidden beside results while they are made has a dot and an ending more."""
+"""File systems allow 255 bytes; the hidden files of a run in progress add a dot and an ending to the name."""
 
 
 def part_of(path: Path) -> Path:
-    """Return where a file is written until it is whole: hidden, in the folder where it will stand."""
+    """Return the hidden path, in the same folder, at which a file is written until it is complete."""
     return path.with_name(f".{path.name}.part")
 
 
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """Name a file in the error of whatever cannot be written.
+    """Turn an OSError in the context into an error that names the file.
 
     Raises
     ------
     OutputError
-        Instead of an OSError within.
+        In place of an OSError.
     """
     try:
         yield
@@ -38,7 +38,7 @@ def writing(path: Path) -> Iterator[None]:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Give a path to write to, which takes the place of another when all went well; its folder is made.
+    """Yield a path to write to; on success that file replaces `path`. Creates the folder if needed.
 
     Raises
     ------
@@ -56,28 +56,28 @@ def replacing(path: Path) -> Iterator[Path]:
 
 
 def readable(path: Path | str) -> str:
-    """Return a path as text that any file can hold: bytes that are not UTF-8 are written as in Python."""
+    """Return a path as valid text; bytes that are not UTF-8 become backslash escapes."""
     return os.fsencode(path).decode(errors="backslashreplace")
 
 
 def require_utf8(path: Path) -> None:
-    """Refuse a name that results could not hold: tables, recordings and pages are UTF-8.
+    """Check that a path is valid UTF-8, as tables, recordings and pages require.
 
     Raises
     ------
     OutputError
-        If the path has bytes that are not.
+        If it is not.
     """
     try:
         str(path.resolve()).encode()
     except UnicodeEncodeError as error:
         raise OutputError(
-            f"{readable(path)}: its name is not UTF-8, and results could not name it; rename it"
+            f"{readable(path)}: its name is not valid UTF-8, so results cannot refer to it; rename it"
         ) from error
 
 
 def require_short(files: Iterable[Path]) -> None:
-    """Refuse names that are too long for a file system.
+    """Check that no name is too long for a file system.
 
     Raises
     ------
@@ -93,34 +93,34 @@ def require_short(files: Iterable[Path]) -> None:
 
 
 def refuse_existing(files: Iterable[Path], *, overwrite: bool) -> None:
-    """Refuse to replace files unasked.
+    """Check that no file would be replaced, unless `overwrite` is set.
 
     Raises
     ------
     OutputError
-        If one exists and may not be replaced.
+        If one exists and must not be replaced.
     """
     if not overwrite and (existing := [file for file in files if file.exists()]):
         raise OutputError(
-            f"{existing[0]}: exists already; choose another folder or allow overwriting (overwrite=True)"
+            f"{existing[0]}: already exists; choose another folder, or allow overwriting (overwrite=True)"
         )
 
 
 @contextmanager
 def locked(path: Path, refusal: str) -> Iterator[None]:
-    """Hold a lock, whose file goes with it; that of a process that was killed does not hold.
+    """Hold a file lock while the context lasts; the lock of a killed process is released by the system.
 
     Parameters
     ----------
     path : path
-        Of the lock's file; its folder is there.
+        The lock file, removed afterwards; its folder must exist.
     refusal : str
-        Said if another process holds it.
+        Error message if another process holds the lock.
 
     Raises
     ------
     OutputError
-        If another process holds it, or it cannot be made.
+        If another process holds the lock, or the file cannot be created.
     """
     from filelock import FileLock, Timeout
 
@@ -131,14 +131,15 @@ def locked(path: Path, refusal: str) -> Iterator[None]:
         raise OutputError(refusal) from error
     except NotImplementedError:
         logger.warning(
-            "%s: its file system has no locks; let nothing else write there meanwhile", path.parent
+            "%s: this file system has no locks; make sure that nothing else writes here meanwhile",
+            path.parent,
         )
     except OSError as error:
         raise OutputError(f"{path.parent}: cannot be written: {error}") from error
     try:
         yield
     finally:
-        # Windows lets nothing remove a file that is open: there the lock itself does, once it is released.
+        # On Windows an open file cannot be removed: there the lock removes it when it is released.
         with suppress(OSError):
             path.unlink()
         lock.release()

@@ -1,6 +1,6 @@
-"""Values handed from process to process: large arrays through memory that both map, the rest as a pickle.
+"""Values passed between processes: large arrays through shared memory, everything else as a pickle.
 
-Through a pipe, the arrays of one map would be copied four times in pieces of some kilobytes.
+Through a pipe, the arrays of one map would be copied four times in pieces of a few kilobytes.
 """
 
 from __future__ import annotations
@@ -17,29 +17,29 @@ from typing import Any
 from rose2_logs.errors import Rose2LogsError
 
 SHARED_MEMORY = Path("/dev/shm")
-"""Where Linux keeps files in memory; elsewhere they are in the folder for temporary files."""
+"""Where Linux keeps files in memory; other systems use the folder for temporary files."""
 LARGE_BYTES = 1 << 16
-"""Arrays from this size on go through shared memory: the capacity of a pipe."""
+"""Arrays of this size or more go through shared memory: the capacity of a pipe."""
 ALIGNMENT_BYTES = 64
-"""Arrays begin at multiples of it, as numpy and OpenCV like them."""
+"""Arrays start at multiples of this, as NumPy and OpenCV prefer."""
 
 
 class SharedMemoryError(Rose2LogsError):
-    """There is no room for what is handed over."""
+    """There is not enough space for a value to be passed to another process."""
 
 
 @dataclass(frozen=True)
 class Packed:
-    """A value on its way.
+    """A value on its way to another process.
 
     Attributes
     ----------
     pickled : bytes
-        All but the large arrays.
+        Everything but the large arrays.
     file : str, optional
-        Holds the large arrays; it goes when the value is unpacked.
+        File with the large arrays; it is removed when the value is unpacked.
     spans : tuple of (int, int)
-        Where each of them begins and ends in the file.
+        Start and end of each array in the file.
     """
 
     pickled: bytes
@@ -49,7 +49,7 @@ class Packed:
 
 @contextmanager
 def shared_memory_folders() -> Iterator[tuple[str, ...]]:
-    """Give folders for packed values, the best one first; what was not taken out goes with them."""
+    """Yield folders for packed values, the best one first; they are removed afterwards with their content."""
     with ExitStack() as stack:
         places = [str(SHARED_MEMORY)] if SHARED_MEMORY.is_dir() else []
         made = []
@@ -60,12 +60,12 @@ def shared_memory_folders() -> Iterator[tuple[str, ...]]:
 
 
 def pack(value: Any, folders: Sequence[str]) -> Packed:
-    """Pack a picklable value; its large arrays go to the first folder that has room for them.
+    """Pack a picklable value; its large arrays are written to the first folder with enough space.
 
     Raises
     ------
     SharedMemoryError
-        If none has.
+        If no folder has enough space.
     """
     arrays: list[memoryview] = []
 
@@ -90,14 +90,14 @@ def pack(value: Any, folders: Sequence[str]) -> Packed:
         except OSError as error:
             why = error
     raise SharedMemoryError(
-        f"no room for {end / 1e6:.0f} MB in {' or '.join(folders) or tempfile.gettempdir()}: {why}; "
+        f"not enough space for {end / 1e6:.0f} MB in {' or '.join(folders) or tempfile.gettempdir()}: {why}; "
         "free some space or use one worker"
     )
 
 
 def _written(arrays: Sequence[memoryview], spans: Sequence[tuple[int, int]], folder: str) -> str:
     """Write arrays to a new file in a folder and return its name."""
-    # Written, not mapped: where shared memory is full, writing tells so and touching a map would kill.
+    # Written, not mapped: in full shared memory, writing raises an error, but mapping kills the process.
     with tempfile.NamedTemporaryFile(dir=folder, delete=False, buffering=0) as file:
         try:
             for array, (begin, _) in zip(arrays, spans, strict=True):
@@ -112,12 +112,12 @@ def _written(arrays: Sequence[memoryview], spans: Sequence[tuple[int, int]], fol
 
 
 def unpack(packed: Packed) -> Any:
-    """Unpack a value, once; its arrays stay in the mapped memory as long as they live."""
+    """Unpack a value (only once); its arrays keep the mapped memory alive as long as they exist."""
     if packed.file is None:
         return pickle.loads(packed.pickled)  # noqa: S301 (of a worker of this run)
     with Path(packed.file).open("rb") as file:
         mapped = memoryview(mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_COPY))
-    # On Windows a file that is mapped stays; it goes with its folder.
+    # On Windows a mapped file cannot be removed; it is removed with its folder.
     with suppress(OSError):
         Path(packed.file).unlink()
     arrays = [mapped[begin:end] for begin, end in packed.spans]

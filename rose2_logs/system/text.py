@@ -1,17 +1,24 @@
-"""Shares in percent, as people read them."""
+"""Percentages as text."""
 
 from __future__ import annotations
 
 
 def percent(share: float, unit: str = "%") -> str:
-    """Tell a share in whole percent; what is not yet the whole is never told as 100 %.
+    """Format a share in whole percent; anything less than the whole is never shown as 100 %.
 
     Parameters
     ----------
     share : float
         1 is the whole.
     unit : str
-        What stands behind the number.
+        Text after the number.
+
+    Examples
+    --------
+    >>> percent(0.256)
+    '26%'
+    >>> percent(0.9999)
+    '99.9%'
     """
     text = f"{100 * share:.0f}"
     if share < 1 and text == "100":

@@ -1,4 +1,4 @@
-"""Warnings about a log, with what a program needs to know of them; gathered, counted, or taken as errors."""
+"""Warnings about a log, with machine-readable details; collected, counted, or treated as errors."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from typing import Any
 from rose2_logs.errors import Rose2LogsError
 
 PACKAGE = "rose2_logs"
-"""Name of the logger above all those of this package."""
+"""Name of this package's top logger."""
 FIRST_KEPT = 5
-"""Warnings of one kind that are kept word by word; the rest are counted."""
+"""Number of warnings of one kind whose text is kept; the rest are only counted."""
 FIELDS = ("kind", "file", "topic", "index")
-"""What a record of the log tells beside its text: see `notice`."""
+"""Attributes of a log record besides its text, see `log_warning`."""
 
 UNCOUNTED = {"is_counted": False}
-"""Passed as `extra` with what is said of how a run goes on, which does not belong to its results."""
+"""Passed as `extra` with warnings about how a run proceeds, which do not belong to its results."""
 
 _is_muted: ContextVar[bool] = ContextVar("_is_muted", default=False)
 
 
 @contextmanager
 def muted() -> Iterator[None]:
-    """Say nothing while the context lasts: for a second look at what is told elsewhere."""
+    """Suppress warnings while the context lasts, for reading again what has been warned about before."""
     token = _is_muted.set(True)
     try:
         yield
@@ -37,7 +37,7 @@ def muted() -> Iterator[None]:
 
 
 class StrictError(Rose2LogsError):
-    """A warning, where warnings are errors."""
+    """A warning, when warnings are treated as errors."""
 
 
 def log_warning(
@@ -50,24 +50,24 @@ def log_warning(
     index: int | None = None,
     level: int = logging.WARNING,
 ) -> None:
-    """Say that something is not as it should be.
+    """Log a warning with its details.
 
     Parameters
     ----------
     logger : Logger
-        Of the module that found it.
+        Logger of the calling module.
     kind : str
-        Short name of this kind of fault, which it is counted under.
+        Short name of the kind of warning, by which warnings are counted.
     text : str
-        One line for people, complete in itself.
+        One line that makes sense on its own.
     file : path, optional
-        The log or the file of it that is concerned.
+        The log, or the file of it, that the warning is about.
     topic : str, optional
         The topic.
     index : int, optional
         Number of the message on its topic, or of the snapshot, from 1.
     level : int
-        Of the `logging` module.
+        Level of the `logging` module.
     """
     if _is_muted.get():
         return
@@ -77,7 +77,7 @@ def log_warning(
 
 @dataclass
 class WarningsOfKind:
-    """How often a kind of warning came, and the first few of them."""
+    """How often a kind of warning occurred, and the first few of them."""
 
     count: int = 0
     first: list[dict[str, Any]] = field(default_factory=list)
@@ -85,41 +85,41 @@ class WarningsOfKind:
 
 @dataclass
 class WarningLog:
-    """The warnings of a run, by kind in the order in which they first came."""
+    """The warnings of a run by kind, in the order of their first occurrence."""
 
     kinds: dict[str, WarningsOfKind] = field(default_factory=dict)
 
     @property
     def count(self) -> int:
-        """Warnings of all kinds."""
+        """Number of warnings of all kinds."""
         return sum(found.count for found in self.kinds.values())
 
     def add(self, record: logging.LogRecord) -> None:
-        """Take a warning."""
+        """Add a warning."""
         found = self.kinds.setdefault(getattr(record, "kind", "other"), WarningsOfKind())
         found.count += 1
         if len(found.first) < FIRST_KEPT:
-            told = {name: getattr(record, name, None) for name in FIELDS[1:]}
+            details = {name: getattr(record, name, None) for name in FIELDS[1:]}
             found.first.append(
-                {"message": record.getMessage()} | {k: v for k, v in told.items() if v is not None}
+                {"message": record.getMessage()} | {k: v for k, v in details.items() if v is not None}
             )
 
     def rename(self, old: str, new: str) -> None:
-        """Write another name for a log: of one that was copied to be read, where it comes from."""
+        """Replace the name of a log, so that warnings about a local copy refer to the original."""
         for found in self.kinds.values():
-            for told in found.first:
-                told.update({k: v.replace(old, new) for k, v in told.items() if isinstance(v, str)})
+            for entry in found.first:
+                entry.update({k: v.replace(old, new) for k, v in entry.items() if isinstance(v, str)})
 
     def as_json(self) -> dict[str, Any]:
-        """Return the number of warnings, and of each kind the number and the first few."""
+        """Return the number of warnings, and the number and the first few of each kind."""
         kinds = {kind: {"count": found.count, "first": found.first} for kind, found in self.kinds.items()}
         return {"count": self.count, "kinds": kinds}
 
     def texts(self) -> list[str]:
-        """Return the warnings that were kept, and one line for each kind about those that were not."""
+        """Return the texts that were kept, and for each kind a line with the number of the others."""
         lines = []
         for kind, found in self.kinds.items():
-            lines += [told["message"] for told in found.first]
+            lines += [entry["message"] for entry in found.first]
             if found.count > len(found.first):
                 lines.append(f"{found.count - len(found.first)} more warnings of the kind {kind}")
         return lines
@@ -127,17 +127,17 @@ class WarningLog:
 
 @contextmanager
 def collect_warnings(strict: bool = False) -> Iterator[WarningLog]:
-    """Gather the warnings that this thread gives while the context lasts.
+    """Collect the warnings of this thread while the context lasts.
 
     Parameters
     ----------
     strict : bool
-        Whether the first warning ends what gives it.
+        Whether the first warning about the log raises an error.
 
     Raises
     ------
     StrictError
-        Out of the call that gives a warning, if `strict`.
+        From the call that gives the warning, if `strict`.
     """
     warning_log = WarningLog()
     thread = threading.get_ident()
@@ -147,14 +147,14 @@ def collect_warnings(strict: bool = False) -> Iterator[WarningLog]:
             if record.thread != thread or not getattr(record, "is_counted", True):
                 return
             warning_log.add(record)
-            # Others are about this machine, not about the log.
+            # Warnings without a kind are about this machine, not about the log.
             if strict and hasattr(record, "kind"):
                 text = f"{record.getMessage()} (an error because of strict=True)"
                 where = {name: getattr(record, name, None) for name in FIELDS[1:]}
                 raise StrictError(text, **where)
 
     logger, handler = logging.getLogger(PACKAGE), Gather(logging.WARNING)
-    # Before those that show warnings: one that becomes an error is shown as the error alone.
+    # Placed before the handlers that print: a warning that becomes an error is printed only as the error.
     logger.handlers.insert(0, handler)
     try:
         yield warning_log

@@ -1,4 +1,4 @@
-"""One function over a stream of items, by several processes: in order, with bounded memory."""
+"""One function applied to a stream of items by several processes: in order, with bounded memory."""
 
 from __future__ import annotations
 
@@ -29,37 +29,37 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 LOOK_AHEAD_PER_WORKER = 2
-"""Items handed out and not yet taken back, for each worker: one in work and one waiting."""
+"""Items submitted ahead for each worker: one being processed and one waiting."""
 MOST_ON_WINDOWS = 61
 """Processes that one can wait for at once on Windows: 64 objects, less those of the pool itself."""
 START_METHOD = "forkserver" if sys.platform == "linux" else "spawn"
 """How processes start. On Linux they are copies of a fresh process that has imported what the function needs,
 once for all; on other systems libraries do not bear to be copied after their import."""
 THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "RAYON_NUM_THREADS")
-"""Where OpenMP, the linear algebra libraries and Rerun look for the number of threads when loaded."""
+"""Where OpenMP, the linear algebra libraries and Rerun read the number of threads when they are loaded."""
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3
 """Options of the GNU C library's `mallopt` (malloc.h)."""
 KEPT_ARRAY_BYTES, KEPT_BYTES = 32 << 20, 1 << 30
-"""Arrays up to the first size are kept when they are freed, the most that all versions of the library allow;
-all together up to the second, far above what one map takes."""
+"""Freed arrays up to the first size are kept for reuse (the largest value that all versions of the library
+accept), and up to the second size in total, which is far more than one map needs."""
 
 
 class WorkerError(Rose2LogsError):
-    """A worker process ended before its work was done."""
+    """A worker process ended before its work was finished."""
 
 
 class Workers(Generic[Item, Result]):
-    """Calls one function on items in several processes; a context manager that starts them and ends them.
+    """Calls one function on items in several processes; a context manager that starts and ends them.
 
-    Each call runs on a single thread, so that a result does not depend on the number of workers. Items and
-    results go through shared memory.
+    Each call runs on a single thread, so that results do not depend on the number of workers. Items and
+    results are passed through shared memory.
 
     Parameters
     ----------
     function : callable
-        With more than one worker it must be picklable, like its argument and its result.
+        With more than one worker it must be picklable, and so must its argument and its result.
     count : int
-        Processes, see `usable_processes`; with 1 the work is done in this one.
+        Number of processes, see `usable_processes`; with 1 the work is done in this process.
     """
 
     def __init__(self, function: Callable[[Item], Result], count: int = 1) -> None:
@@ -77,7 +77,7 @@ class Workers(Generic[Item, Result]):
                 self._count, context, initializer=_begin, initargs=(self._function, self._folders)
             )
             self._stack.callback(self._pool.shutdown, wait=True, cancel_futures=True)
-            # A task starts a process: they import what they need while this one opens its files.
+            # Submitting a task starts a process: workers import modules while this process opens files.
             for _ in range(self._count):
                 self._pool.submit(_nothing)
         return self
@@ -98,11 +98,11 @@ class Workers(Generic[Item, Result]):
         Parameters
         ----------
         items : iterable
-            Taken as they are needed, never more than `LOOK_AHEAD_PER_WORKER` for each worker ahead.
+            Read as needed, at most `LOOK_AHEAD_PER_WORKER` items per worker ahead.
         is_same : callable, optional
-            Whether an item and the next one have the same result: then the function is not called again.
+            Whether an item and the next one have the same result; then the function is not called again.
         known : callable, optional
-            Gives results that are known already; None where the function is to be called.
+            Returns a result that is already known, or None if the function must be called.
 
         Raises
         ------
@@ -130,7 +130,7 @@ class Workers(Generic[Item, Result]):
                 yield _taken(pending)
         except BrokenProcessPool as error:
             raise WorkerError(
-                f"one of {self._count} worker processes was killed, likely for lack of memory; "
+                f"one of {self._count} worker processes was killed, probably because memory ran out; "
                 "use fewer workers"
             ) from error
 
@@ -145,7 +145,7 @@ class Workers(Generic[Item, Result]):
             if before is not None and is_same is not None and is_same(before[0], item):
                 before = (item, before[1])
             else:
-                before = None  # so that only one result is held
+                before = None  # so that only one result is in memory
                 result = None if known is None else known(item)
                 if result is None:
                     result = _call_on_one_thread(self._function, item)
@@ -154,7 +154,7 @@ class Workers(Generic[Item, Result]):
 
 
 def usable_processes(count: int, platform: str = sys.platform) -> int:
-    """Return how many of so many worker processes the system lets one wait for at once."""
+    """Return the number of worker processes, reduced to what the operating system supports."""
     return min(count, MOST_ON_WINDOWS) if platform == "win32" else count
 
 
@@ -197,7 +197,7 @@ def _context(function: Callable[..., Any]) -> BaseContext:
 
 
 class _Task:
-    """A result that comes once and may be asked for several times."""
+    """A result that is unpacked once and may be read several times."""
 
     def __init__(self, future: Future[Packed] | None = None, result: Any = None) -> None:
         self._future = future
@@ -215,13 +215,13 @@ def _taken(pending: deque[tuple[Item, _Task]]) -> tuple[Item, Any]:
     return item, task.result()
 
 
-# What a worker process calls, and where its results go; set once in each.
+# The function of a worker process, and the folders for its results; set once in each process.
 _function: Callable[[Any], Any]
 _folders: tuple[str, ...]
 
 
 def _begin(function: Callable[[Any], Any], folders: tuple[str, ...]) -> None:
-    """Get a worker process ready, and leave Ctrl-C to the parent, which then ends its workers."""
+    """Initialize a worker process; Ctrl-C is left to the parent, which then ends its workers."""
     global _function, _folders
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     keep_freed_memory()
@@ -230,7 +230,7 @@ def _begin(function: Callable[[Any], Any], folders: tuple[str, ...]) -> None:
 
 
 def _end_with_parent() -> None:
-    """End when the process that this one works for is killed; remove what waits in shared memory."""
+    """End this process when its parent is killed, and remove what is left in shared memory."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         parent.join()
@@ -240,11 +240,11 @@ def _end_with_parent() -> None:
 
 
 def keep_freed_memory() -> None:
-    """Let this process keep the memory of large arrays that it has freed, for those that come next.
+    """Let this process keep the memory of freed large arrays for the next ones.
 
-    The GNU C library gives it back, so that every map's arrays are made of fresh pages again, which the
-    kernel clears: some percent of the time of an analysis. The peak stays what it is. Elsewhere this does
-    nothing.
+    By default the GNU C library returns it to the system, and the arrays of every map need fresh pages that
+    the kernel must clear, which takes a few percent of the time of an analysis. Peak memory does not change.
+    With other C libraries this does nothing.
     """
     import ctypes
 
@@ -255,9 +255,10 @@ def keep_freed_memory() -> None:
 
 
 def give_back_freed_memory() -> None:
-    """Give back what `keep_freed_memory` made this process keep; elsewhere this does nothing.
+    """Return the memory kept by `keep_freed_memory` to the system; with other C libraries this does nothing.
 
-    Over many maps, what is kept falls into pieces that fit no array, so that the process would grow.
+    Over many maps the kept memory becomes fragmented and no longer fits new arrays, so the process would
+    grow.
     """
     import ctypes
 
@@ -280,7 +281,7 @@ def _call_on_one_thread(function: Callable[[Item], Result], item: Item) -> Resul
 
 @contextmanager
 def _one_thread() -> Iterator[None]:
-    """Hold OpenCV and the linear algebra libraries to one thread, and let them go afterwards."""
+    """Limit OpenCV and the linear algebra libraries to one thread while the context lasts."""
     import cv2
 
     threads = cv2.getNumThreads()
@@ -294,16 +295,16 @@ def _one_thread() -> Iterator[None]:
 
 @lru_cache(maxsize=1)
 def _thread_pools(modules: int) -> ThreadpoolController:
-    """Look the thread pools of the loaded libraries up, once for each number of imported modules."""
+    """Find the thread pools of the loaded libraries, again whenever the number of modules has changed."""
     from threadpoolctl import ThreadpoolController
 
     return ThreadpoolController()
 
 
 def limit_process_to_one_thread() -> None:
-    """Hold the numeric libraries of this process to one thread from now on, also those not loaded yet.
+    """Limit the numeric libraries of this process to one thread from now on, including those not loaded yet.
 
-    For worker processes that each do a whole log: several share the processors as it is.
+    For worker processes that each analyze a whole log: several of them already share the processors.
     """
     os.environ.update(dict.fromkeys(THREAD_VARIABLES, "1"))
     import cv2

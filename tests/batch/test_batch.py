@@ -56,10 +56,10 @@ def test_one_bad_log_does_not_stop_the_others(batch):
     assert code == 2
     assert "3 done, 1 failed" in out
     (error,) = [line for line in err.splitlines() if line.startswith("error:")]
-    assert "no topic holds occupancy grids" in error
+    assert "no topic has occupancy grids" in error
     rows = summary(folder / "out")
     assert {name for name, row in rows.items() if row["status"] == "done"} == GOOD
-    assert "no topic holds occupancy grids" in rows["bad"]["reason"]
+    assert "no topic has occupancy grids" in rows["bad"]["reason"]
     assert rows["bad"]["source"] == str(folder / "logs" / "bad.mcap")
     assert (rows["slow"]["snapshots"], rows["slow"]["rooms_last"]) == (str(len(SLOW)), "2")
 

@@ -87,9 +87,9 @@ def test_a_log_whose_worker_is_killed_is_done_by_another(cluster, tmp_path, monk
     assert len(heard.killed) == 1
     status = {state.name: state.status for state in result.states}
     assert status == dict.fromkeys(("one_run", "slow", "two_run"), "done") | {"bad": "failed"}
-    assert "no topic holds occupancy grids" in summary(out)["bad"]["reason"]
+    assert "no topic has occupancy grids" in summary(out)["bad"]["reason"]
     (warning,) = result.failed[0].outcome.warnings
-    assert "cut off or damaged" in warning
+    assert "truncated or damaged" in warning
     assert not [path for path in tree(out) if path.startswith(".batch")]
 
     monkeypatch.setattr(driver, "LocalWorkers", WorkersHere)

@@ -255,7 +255,7 @@ def test_info_takes_the_parameters_that_its_messages_name(cli, tmp_path: Path):
     """A map that is larger than the limit is told with it; the limit can be set as for the other commands."""
     tight = ["--set", "reading.map_max_cells=100000"]
     code, out, _ = cli("info", SAMPLE_LOGS / "office.mcap", *tight)
-    assert (code, "--set reading.map_max_cells" in out) == (0, True)
+    assert (code, "reading.map_max_cells" in out) == (0, True)
     config = tmp_path / "limits.toml"
     config.write_text("[reading]\nmap_max_cells = 100000\n")
     assert cli("info", SAMPLE_LOGS / "office.mcap", "--config", config)[1] == out
@@ -280,7 +280,7 @@ def test_help_shows_flags_as_flags_and_cuts_nothing(cli, command: str):
         (["--set", "floor_plan.room_area_m2=2"], "did you mean floor_plan.room_min_area_m2?"),
         (["--set", "rooms.room_min_area_m2=2"], "did you mean floor_plan.room_min_area_m2?"),
         (["--set", "color=2"], "write it as block.name=value"),
-        (["--start", "9000"], "they lie from 20.0 to 596.7 s into the log"),
+        (["--start", "9000"], "20.0 to 596.7 s after the start of the log"),
     ],
 )
 def test_a_slip_is_told_with_what_may_have_been_meant(cli, tmp_path: Path, arguments: list[str], told: str):
@@ -296,6 +296,6 @@ def test_a_folder_above_is_told_with_the_one_that_may_have_been_meant(cli, tmp_p
     _, _, err = cli("view", tmp_path / "results")
     assert f"did you mean {tmp_path / 'results' / 'run'}?" in err
     _, _, err = cli("analyze", tmp_path / "results", "-o", tmp_path / "out")
-    assert "rose2-logs batch takes folders of many logs" in err
+    assert "for a folder of many logs use rose2-logs batch" in err
     _, _, err = cli("segment", tmp_path / "results", "-o", tmp_path / "out")
     assert "is a folder: name the map in it" in err

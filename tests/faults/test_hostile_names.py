@@ -158,13 +158,13 @@ def test_a_name_that_is_not_utf8_is_refused_in_one_line(tmp_path: Path):
     """Before anything is made: nothing that is written could hold it."""
     log = Path(os.fsdecode(os.fsencode(tmp_path) + b"/run\xff.mcap"))
     write_mcap(log, [("/map", START_NS, grid(room(90)))])
-    with pytest.raises(OutputError, match=r"is not UTF-8.*rename it"):
+    with pytest.raises(OutputError, match=r"is not valid UTF-8.*rename it"):
         analyze_log(log, tmp_path / "out", RunOptions())
     plain = log.rename(tmp_path / "run.mcap")
-    with pytest.raises(OutputError, match=r"is not UTF-8.*rename it"):
+    with pytest.raises(OutputError, match=r"is not valid UTF-8.*rename it"):
         analyze_log(plain, log.with_suffix(""), RunOptions())
     assert list(tmp_path.iterdir()) == [plain]
-    with pytest.raises(OutputError, match=r"is not UTF-8.*rename it"):
+    with pytest.raises(OutputError, match=r"is not valid UTF-8.*rename it"):
         RunResults(log.with_suffix(""))
 
 
@@ -199,7 +199,7 @@ def test_a_batch_goes_on_beside_a_log_whose_name_is_not_utf8(tmp_path: Path):
         errors = [line for line in ran.stderr.splitlines() if line.startswith("error:")]
         assert ran.returncode == 2
         assert len(errors) == 1
-        assert r"caf\xe9.mcap: its name is not UTF-8" in errors[0]
+        assert r"caf\xe9.mcap: its name is not valid UTF-8" in errors[0]
         assert f"1 {good}, 1 failed" in ran.stdout
         with (out / "summary.csv").open(encoding="utf-8", newline="") as file:
             rows = {row["log"]: row for row in csv.DictReader(file)}

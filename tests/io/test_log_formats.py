@@ -206,7 +206,7 @@ def test_a_cut_off_mcap_gives_the_maps_that_are_whole_and_says_so(name, share, t
     assert_are(snapshots, maps[: len(snapshots)])
     assert not inspect_log(path).indexed
     # A cut in the summary costs nothing but the index.
-    assert (len(snapshots) == 8) or f"{path}: cut off" in caplog.text
+    assert (len(snapshots) == 8) or f"{path}: truncated" in caplog.text
 
 
 def flip(path: Path, at: int) -> None:
@@ -428,7 +428,7 @@ def test_a_folder_of_several_logs_is_not_taken_for_one_without_a_word(tmp_path):
     with collect_warnings() as warning_log:
         assert_are(read(one.parent), growing_maps()[:3])
     assert (
-        "its run_0.mcap is read as one log, third.bag left out"
+        "run_0.mcap is read as one log, third.bag ignored"
         in (warning_log.kinds["files_as_one"].first[0]["message"])
     )
 
@@ -465,7 +465,7 @@ def test_the_topic_is_the_one_asked_for_else_map_else_the_only_one(tmp_path):
 def test_a_log_without_maps_can_be_inspected_but_not_opened(tmp_path):
     path = write_mcap(tmp_path / "talk.mcap", [("/chatter", START_NS, Text("hello"))])
     assert [topic.name for topic in inspect_log(path).topics] == ["/chatter"]
-    with pytest.raises(NoMapTopicError, match=r"no topic holds occupancy grids .* std_msgs/msg/String"):
+    with pytest.raises(NoMapTopicError, match=r"no topic has occupancy grids .* std_msgs/msg/String"):
         open_log(path)
     empty = write_mcap(tmp_path / "empty.mcap", [])
     info = inspect_log(empty)
@@ -482,7 +482,7 @@ def test_a_map_topic_on_which_nothing_was_recorded_is_said_to_be_empty(tmp_path)
     path = write_rosbag2(tmp_path / "run", log)
     with sqlite3.connect(path / "run.db3") as database:
         database.execute("DELETE FROM messages")
-    with pytest.raises(NoMapTopicError, match="no message was recorded on the map topics /map"):
+    with pytest.raises(NoMapTopicError, match="no messages were recorded on the map topics /map"):
         open_log(path / "run.db3")
 
 
@@ -491,15 +491,15 @@ def test_a_map_topic_on_which_nothing_was_recorded_is_said_to_be_empty(tmp_path)
     [
         ("missing.bag", None, "no such file"),
         ("empty.mcap", b"", "is empty"),
-        ("text.mcap", b"just some text", "does not begin as .mcap"),
-        ("text.bag", b"just some text", "does not begin as .bag"),
-        ("text.db3", b"just some text", "does not begin as .db3"),
+        ("text.mcap", b"just some text", "does not start like a .mcap"),
+        ("text.bag", b"just some text", "does not start like a .bag"),
+        ("text.db3", b"just some text", "does not start like a .db3"),
         ("short.bag", b"#ROSBAG V2.0\n", "is damaged"),
         ("short.mcap", b"\x89MCAP0\r\n", None),
         ("short.db3", b"SQLite format 3\0", "cannot be read as a bag"),
-        ("laser.log", b"FLASER 1 2 3", "not a kind of log"),
+        ("laser.log", b"FLASER 1 2 3", "not a supported kind of log"),
         ("map.yaml", b"- a list", "does not describe a map"),
-        ("map.pgm", b"P5 1 1 255 \0", "map.yaml beside it"),
+        ("map.pgm", b"P5 1 1 255 \0", "map.yaml next to it"),
     ],
 )
 def test_what_is_no_log_ends_with_one_line_that_names_the_file(name, content, match, tmp_path):
@@ -612,7 +612,7 @@ def test_a_third_party_log_with_two_costmaps_asks_which(name):
 @pytest.mark.parametrize("name", ["grid_map.bag", "no_map_cartographer.bag"])
 def test_a_third_party_log_without_maps_says_so_in_one_line(name):
     path = SHARED / "bags" / "third_party" / name
-    with pytest.raises(NoMapTopicError, match="no topic holds occupancy grids") as caught:
+    with pytest.raises(NoMapTopicError, match="no topic has occupancy grids") as caught:
         open_log(path)
     assert "\n" not in str(caught.value)
     assert inspect_log(path).topics

@@ -104,7 +104,7 @@ def test_colors_count_by_their_mean_and_sixteen_bits_by_their_share(tmp_path):
 def test_unknown_cells_saved_with_too_high_a_free_thresh_stay_unknown(tmp_path, caplog):
     (snapshot,) = read(save(tmp_path / "m", PIXELS, free_thresh=0.25))
     assert snapshot.cells.tolist() == [[0, 0, -1], [100, 0, -1]]
-    assert "free_thresh 0.25" in caplog.text
+    assert "free_thresh of 0.25" in caplog.text
     # An image with other values was not saved that way: its thresholds mean what they say.
     (snapshot,) = read(save(tmp_path / "m", np.where(PIXELS == 0, np.uint8(100), PIXELS), free_thresh=0.25))
     assert (snapshot.cells[:, 2] == 0).all()

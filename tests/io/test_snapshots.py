@@ -118,7 +118,7 @@ def test_a_time_range_without_maps_is_an_error_that_tells_when_there_are_some(tm
     path = write_mcap(tmp_path / "run.mcap", log_at([0, 1]))
     with open_log(path, selection=Selection(end_ns=5)) as log:
         for reading in (lambda: next(log.snapshots()), log.first, log.last):
-            with pytest.raises(LogError, match=r"from 0\.0 to 1\.0 s into the log"):
+            with pytest.raises(LogError, match=r"0\.0 to 1\.0 s after the start of the log"):
                 reading()
 
 
@@ -277,7 +277,7 @@ def test_a_patch_that_reaches_out_of_the_map_is_left_out_and_told(place, tmp_pat
     assert not snapshots[0].cells.any()
     text = warning_log.kinds["invalid_map"].first[0]["message"]
     assert "message 1 of 1 on /map_updates: the patch of 2 x 1 cells" in text
-    assert "reaches out of the map of 8 x 6" in text
+    assert "extends beyond the map of 8 x 6" in text
 
 
 def test_patches_of_another_topic_are_not_applied(tmp_path):

@@ -78,7 +78,7 @@ def test_the_next_folder_is_taken_where_the_first_has_no_room(tmp_path: Path):
     packed = pack(value, [str(tmp_path / "nowhere"), str(tmp_path)])
     assert Path(str(packed.file)).parent == tmp_path
     np.testing.assert_array_equal(unpack(packed), value)
-    with pytest.raises(SharedMemoryError, match=r"no room for 0 MB in .*nowhere"):
+    with pytest.raises(SharedMemoryError, match=r"not enough space for 0 MB in .*nowhere"):
         pack(value, [str(tmp_path / "nowhere")])
 
 
@@ -94,7 +94,7 @@ except SharedMemoryError as error:
     print(error)
 """
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    assert "no room for 8 MB" in done.stdout
+    assert "not enough space for 8 MB" in done.stdout
     assert not list(tmp_path.iterdir())
 
 

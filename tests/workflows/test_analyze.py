@@ -134,7 +134,7 @@ def test_progress_ends_at_one(run: Path, tmp_path: Path):
 def test_earlier_results_are_not_replaced_unasked(run: Path):
     """The file that is in the way is named, and the option."""
     before = table_bytes(run / "out")
-    with pytest.raises(OutputError, match=r"snapshots\.parquet: exists already.*overwrite=True"):
+    with pytest.raises(OutputError, match=r"snapshots\.parquet: already exists.*overwrite=True"):
         analyze_log(run / "maps", run / "out", TABLES_ONLY)
     assert table_bytes(run / "out") == before
 

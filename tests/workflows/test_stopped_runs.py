@@ -209,7 +209,7 @@ def test_results_that_are_being_replaced_have_no_summary_until_they_are_whole(
     analyze_log(log, out, RunOptions(**OPTIONS, parameters=Parameters().replaced(SMALL_ROOMS)))
     kill_at("file 3", log, out, overwrite=True)
     assert not (out / "summary.json").exists()
-    with pytest.raises(OutputError, match="exists already"):
+    with pytest.raises(OutputError, match="already exists"):
         analyze_log(log, out, RunOptions(**OPTIONS))
     analyze_log(log, out, RunOptions(**OPTIONS, resume=True))
     assert contents(out) == fresh

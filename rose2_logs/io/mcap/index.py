@@ -1,7 +1,7 @@
-"""One MCAP file: its channels, where the messages of a channel lie, and the bytes of each.
+"""One MCAP file: its channels, where their messages are, and the bytes of each.
 
-The index comes from the file's summary; a file that has none, or was cut off, is scanned once, record by
-record, over everything that is whole.
+The index comes from the file's summary. A file without one, or a truncated one, is scanned once, record by
+record, as far as it is readable.
 """
 
 from __future__ import annotations
@@ -43,9 +43,9 @@ from rose2_logs.system.warnings import log_warning
 
 logger = logging.getLogger(__name__)
 
-# Chunks that overlap in time are read in turns; two are kept so that each is decompressed once.
+# Reading alternates between chunks that overlap in time; two are cached so that each is decompressed once.
 _CHUNKS_KEPT = 2
-# What parsing raises on bytes that are not what they should be; ValueError is also TooLargeError.
+# What parsing damaged data raises; ValueError includes TooLargeError.
 DAMAGE = (McapError, ValueError, KeyError, EOFError, struct.error)
 
 
@@ -56,12 +56,12 @@ class McapFile(LogFile):
     ----------
     path : Path
     limits : ReadingParameters
-        How much it may claim.
+        The largest sizes that are accepted.
 
     Raises
     ------
     LogError
-        If the file cannot be opened or is no MCAP file, or holds more map messages than may be.
+        If the file cannot be opened, is not an MCAP file, or has more map messages than the limit.
     """
 
     def __init__(self, path: Path, limits: ReadingParameters) -> None:
@@ -79,7 +79,7 @@ class McapFile(LogFile):
             raise LogError(f"{path}: cannot be opened: {error.strerror}", file=path) from error
         try:
             if self._stream.read(len(MAGIC)) != MAGIC:
-                raise LogError(f"{path}: is not an MCAP file, it does not begin as one", file=path)
+                raise LogError(f"{path}: is not an MCAP file; it does not start like one", file=path)
             index_damage = ""
             try:
                 self.summary = read_summary(self._stream, limits.chunk_max_bytes)
@@ -89,7 +89,7 @@ class McapFile(LogFile):
             if self.summary is None:
                 self._scan()
                 if self.whole and index_damage:
-                    text = f"{path}: its index is damaged or cut off ({index_damage}); all before it was read"
+                    text = f"{path}: its index is damaged ({index_damage}); the whole file was read instead"
                     log_warning(logger, "damaged_index", text, file=path)
             else:
                 self._take_summary()
@@ -104,11 +104,11 @@ class McapFile(LogFile):
 
     @property
     def stream(self) -> IO[bytes]:
-        """The open file, for copying chunks."""
+        """The open file, to copy chunks from."""
         return self._stream
 
     def places(self, channel_ids: Collection[int]) -> list[Place]:
-        """Where the messages of some channels lie, in the order of log time."""
+        """Where the messages of some channels are stored, in log time order."""
         if self.summary is None:
             return sorted(place for place in self._scanned if place.channel_id in channel_ids)
         places: list[Place] = []
@@ -119,7 +119,7 @@ class McapFile(LogFile):
         return sorted(places)
 
     def _places_in(self, chunk: ChunkIndex, channel_ids: set[int]) -> list[Place]:
-        """Places in one chunk, by its message index, or by the chunk itself where that is damaged."""
+        """Places of the messages in a chunk, from its index, or from the chunk if the index is damaged."""
         begin = chunk.chunk_start_offset
         try:
             return [
@@ -138,28 +138,28 @@ class McapFile(LogFile):
                     if channel in channel_ids and time <= LATEST_NS:
                         found.append(Place(time, begin, record.offset, channel))
         except DAMAGE as error:
-            self._tell_damaged(begin, error)
+            self._warn_damaged(begin, error)
         return found
 
-    def _tell_damaged(self, begin: int, error: Exception) -> None:
-        text = f"{self.path}: the chunk at byte {begin} is damaged ({error}); its messages are left out"
+    def _warn_damaged(self, begin: int, error: Exception) -> None:
+        text = f"{self.path}: the chunk at byte {begin} is damaged ({error}); its messages are skipped"
         log_warning(logger, "damaged_chunk", text, file=self.path)
 
     def _message_index(self, chunk: ChunkIndex, channel_id: int) -> list[tuple[int, int]]:
-        """Log time and offset of each message of a channel in a chunk, from the index behind that.
+        """Log time and offset of each message of a channel in a chunk, from the index after the chunk.
 
-        Read exactly: in a large log there are thousands.
+        Only the needed bytes are read: a large log has thousands of these indexes.
         """
         self._stream.seek(chunk.message_index_offsets[channel_id])
         opcode, _, channel, length = INDEX.unpack(self._stream.read(INDEX.size))
         if opcode != Opcode.MESSAGE_INDEX or channel != channel_id:
-            raise ValueError("no message index where the summary says")
+            raise ValueError("the summary does not point to a message index")
         if length > chunk.message_index_length:
-            raise ValueError("the message index is longer than the place for it")
+            raise ValueError("the message index is longer than the summary says")
         entries = list(INDEX_ENTRY.iter_unpack(self._stream.read(length)))
         most = min(chunk.uncompressed_size, self.limits.chunk_max_bytes)
         if any(offset >= most for _, offset in entries):
-            raise ValueError("the message index points behind the chunk")
+            raise ValueError("the message index points beyond the chunk")
         return entries
 
     def payload(self, place: Place) -> memoryview:
@@ -168,7 +168,7 @@ class McapFile(LogFile):
         Raises
         ------
         DamagedMessageError
-            If it is not where the index says, or a checksum or a compressed chunk is wrong.
+            If it is not where the index says it is, or its chunk is damaged.
         """
         try:
             if place.offset < 0:
@@ -179,16 +179,16 @@ class McapFile(LogFile):
                 begin = place.offset + RECORD.size
                 record = chunk[begin : begin + length]
                 if opcode != Opcode.MESSAGE or len(record) != length:
-                    raise ValueError("there is no message where the index says")
+                    raise ValueError("the index does not point to a message")
             channel_id, _, log_time_ns, _ = MESSAGE.unpack_from(record)
             if (channel_id, log_time_ns) != (place.channel_id, place.log_time_ns):
-                raise ValueError("there is another message where the index says")
+                raise ValueError("the index points to another message")
         except DAMAGE as error:
             raise DamagedMessageError(f"damaged ({error})") from error
         return record[MESSAGE.size :]
 
     def messages(self, channel_ids: Collection[int] | None = None) -> Iterator[StoredMessage]:
-        """Yield every message that is whole: of some channels chunk by chunk, or all in the file's order."""
+        """Yield every readable message: of some channels chunk by chunk, or all of them in file order."""
         if channel_ids is None:
             yield from self._all_messages()
         elif self.summary is None:
@@ -206,8 +206,8 @@ class McapFile(LogFile):
                 try:
                     held = records_in(chunk_records(record.content, self.limits.chunk_max_bytes))
                 except DAMAGE as error:
-                    if self.indexed:  # else it was told when the file was scanned
-                        self._tell_damaged(record.offset, error)
+                    if self.indexed:  # otherwise scanning the file has warned about it
+                        self._warn_damaged(record.offset, error)
                     continue
             else:
                 held = iter([record])
@@ -222,7 +222,7 @@ class McapFile(LogFile):
         return StoredMessage(self.channels[channel_id], log_time_ns, publish_time_ns, sequence, data)
 
     def header(self) -> Header:
-        """Return the file's profile and the library that wrote it; empty where they are damaged."""
+        """Return the file's profile and the library that wrote it; empty if they are damaged."""
         try:
             header: Header = parsed(Header, memoryview(self._record(len(MAGIC))))
         except DAMAGE:
@@ -230,11 +230,11 @@ class McapFile(LogFile):
         return header
 
     def attachments(self) -> Iterator[Attachment]:
-        """Yield the attachments that the summary names, as far as they are whole."""
+        """Yield the readable attachments that the summary lists."""
         return self._named(Attachment, [] if self.summary is None else self.summary.attachments)
 
     def metadata(self) -> Iterator[Metadata]:
-        """Yield the metadata records that the summary names, as far as they are whole."""
+        """Yield the readable metadata records that the summary lists."""
         return self._named(Metadata, [] if self.summary is None else self.summary.metadata)
 
     def _named(self, kind: Any, offsets: list[int]) -> Iterator[Any]:
@@ -242,11 +242,13 @@ class McapFile(LogFile):
             try:
                 yield parsed(kind, memoryview(self._record(offset)))
             except DAMAGE as error:
-                text = f"{self.path}: the {kind.__name__.lower()} at byte {offset} is left out ({error})"
+                text = (
+                    f"{self.path}: the {kind.__name__.lower()} at byte {offset} is damaged ({error}); skipped"
+                )
                 log_warning(logger, "damaged_record", text, file=self.path)
 
     def messages_in(self, chunk: ChunkIndex) -> list[StoredMessage]:
-        """Messages of one chunk by log time; raises what `DAMAGE` lists where they cannot be read."""
+        """Messages of one chunk in log time order; raises the errors of `DAMAGE` if it cannot be read."""
         content = memoryview(self._record(chunk.chunk_start_offset))
         records = records_in(chunk_records(content, self.limits.chunk_max_bytes))
         found = [self._stored(record) for record in records if record.opcode == Opcode.MESSAGE]
@@ -262,9 +264,9 @@ class McapFile(LogFile):
             self.end_ns = min(statistics.message_end_time, LATEST_NS)
 
     def _records(self, is_scan: bool = False) -> Iterator[Record]:
-        """Yield the records of the data section, one in memory at a time, as far as the file is whole.
+        """Yield the records of the data section, one in memory at a time, as far as the file is readable.
 
-        A scan is told of the end, and of messages outside chunks it gets the head only.
+        For a scan, a truncated file gives a warning, and only the head of messages outside chunks is read.
         """
         size = self._stream.seek(0, 2)
         begin = len(MAGIC)
@@ -276,9 +278,7 @@ class McapFile(LogFile):
             if end > size or opcode == 0:
                 if is_scan:
                     self.whole = False
-                    text = (
-                        f"{self.path}: cut off or damaged after {begin} bytes; what is whole before is read"
-                    )
+                    text = f"{self.path}: truncated or damaged after {begin} bytes; everything before is read"
                     log_warning(logger, "cut_off", text, file=self.path)
                 if opcode == Opcode.CHUNK and length <= self.limits.chunk_max_bytes:
                     yield Record(begin, opcode, memoryview(self._stream.read(length)))
@@ -287,13 +287,13 @@ class McapFile(LogFile):
                 return
             if opcode in (Opcode.MESSAGE, Opcode.CHUNK, Opcode.SCHEMA, Opcode.CHANNEL):
                 needed = min(length, MESSAGE.size) if is_scan and opcode == Opcode.MESSAGE else length
-                # What is too large stays empty, which is damage to all who look into it.
+                # Too large: left empty, which every reader treats as damage.
                 content = self._stream.read(needed if needed <= self.limits.chunk_max_bytes else 0)
                 yield Record(begin, opcode, memoryview(content))
             begin = end
 
     def _scan(self) -> None:
-        """Index the file record by record, as far as it is whole."""
+        """Index the file record by record, as far as it is readable."""
         size = self._stream.seek(0, 2)
         for record in self._records(is_scan=True):
             try:
@@ -304,11 +304,11 @@ class McapFile(LogFile):
                     self._take(inner, record.offset, inner.offset)
             except DAMAGE as error:
                 if record.offset + RECORD.size + len(record.content) == size and not self.whole:
-                    continue  # the end of what was cut off
+                    continue  # the incomplete end of a truncated file
                 self.whole = False
                 text = (
-                    f"{self.path}: what is at byte {record.offset} is damaged ({error}); what is whole of it "
-                    "is read"
+                    f"{self.path}: the record at byte {record.offset} is damaged ({error}); its readable "
+                    "part is used"
                 )
                 log_warning(logger, "damaged_chunk", text, file=self.path)
 
@@ -325,7 +325,7 @@ class McapFile(LogFile):
     def _add(self, head: memoryview, record: int, offset: int) -> None:
         channel_id, _, log_time_ns, _ = MESSAGE.unpack_from(head)
         if channel_id not in self.channels or log_time_ns > LATEST_NS:
-            raise ValueError("a message without a channel or of an impossible time")
+            raise ValueError("a message has no channel or an impossible time")
         self.message_counts[channel_id] += 1
         self.start_ns = log_time_ns if self.start_ns is None else min(self.start_ns, log_time_ns)
         self.end_ns = log_time_ns if self.end_ns is None else max(self.end_ns, log_time_ns)
@@ -334,7 +334,7 @@ class McapFile(LogFile):
             check_count(self.path, len(self._scanned), self.limits.map_max_messages)
 
     def _chunk(self, begin: int) -> memoryview:
-        """Uncompressed records of the chunk at a file offset, its checksum verified."""
+        """Uncompressed records of the chunk at a file offset, after verifying its checksum."""
         if begin in self._chunks:
             self._chunks.move_to_end(begin)
             return self._chunks[begin]

@@ -1,4 +1,4 @@
-"""Records of an MCAP file, taken apart with bounds: nothing is allocated because a header claims it.
+"""Parsing of the records of an MCAP file; memory is never allocated just because a header claims a size.
 
 Format: https://mcap.dev/spec
 """
@@ -23,7 +23,7 @@ from rose2_logs.io.log_file import Channel
 MAGIC = b"\x89MCAP0\r\n"
 RECORD = struct.Struct("<BQ")  # opcode, length of what follows
 MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time; then the data
-INDEX = struct.Struct("<BQHI")  # head of a message index: and channel, length of its entries
+INDEX = struct.Struct("<BQHI")  # start of a message index: record head, channel, length of its entries
 INDEX_ENTRY = struct.Struct("<QQ")  # log time, offset in the uncompressed chunk
 _CHUNK = struct.Struct("<QQQII")  # first and last log time, size, checksum, length of the compression's name
 _LENGTH = struct.Struct("<Q")
@@ -31,7 +31,7 @@ _FOOTER = struct.Struct("<BQQQI")  # record head; starts of summary and offsets,
 
 
 class Record(NamedTuple):
-    """A record: where it begins, its kind, its content."""
+    """A record: its offset, its kind, its content."""
 
     offset: int
     opcode: int
@@ -40,7 +40,7 @@ class Record(NamedTuple):
 
 @dataclass(frozen=True)
 class Summary:
-    """What the end of a file tells about the rest of it; attachments and metadata by their file offsets."""
+    """What the end of a file says about the rest of it; attachments and metadata by their file offsets."""
 
     channels: dict[int, Channel]
     chunks: list[ChunkIndex]
@@ -50,37 +50,37 @@ class Summary:
 
 
 def read_exactly(stream: IO[bytes], length: int) -> bytes:
-    """Read so many bytes.
+    """Read `length` bytes.
 
     Raises
     ------
     EOFError
-        If the file ends before.
+        If the file is shorter.
     """
     left = stream.seek(0, 1)
     if left + length > stream.seek(0, 2):
-        raise EOFError("the file ends within the record")
+        raise EOFError("the file ends in the middle of a record")
     stream.seek(left)
     data = stream.read(length)
     if len(data) != length:
-        raise EOFError("the file ends within the record")
+        raise EOFError("the file ends in the middle of a record")
     return data
 
 
 def records_in(data: memoryview) -> Iterator[Record]:
-    """Yield the records that lie one behind the other.
+    """Yield consecutive records.
 
     Raises
     ------
     ValueError, struct.error
-        If the last one is not whole.
+        If the last one is incomplete.
     """
     place = 0
     while place < len(data):
         opcode, length = RECORD.unpack_from(data, place)
         begin = place + RECORD.size
         if length > len(data) - begin or opcode == 0:
-            raise ValueError("a record is not whole")
+            raise ValueError("a record is incomplete")
         yield Record(place, opcode, data[begin : begin + length])
         place = begin + length
 
@@ -106,9 +106,9 @@ def channel_of(channel: McapChannel, schema: Schema | None) -> Channel:
 
 
 def chunk_records(content: bytes | memoryview, most_bytes: int) -> memoryview:
-    """Uncompressed records of a chunk, from its record's content, checksum verified.
+    """Uncompressed records of a chunk, from its record's content, after verifying the checksum.
 
-    Of one that is cut off as much as can be had; the last record may not be whole.
+    Of a truncated chunk, as much as can be decompressed; the last record may then be incomplete.
 
     Raises
     ------
@@ -132,12 +132,12 @@ def chunk_records(content: bytes | memoryview, most_bytes: int) -> memoryview:
 
 
 def read_summary(stream: IO[bytes], most_bytes: int) -> Summary | None:
-    """Return the summary of a file if every message of the file can be found by it, None if not by any.
+    """Return the summary of a file, or None if there is none by which every message can be found.
 
     Raises
     ------
     ValueError, struct.error, EOFError ...
-        If it is damaged or cut off.
+        If it is damaged or truncated.
     """
     size = stream.seek(0, 2)
     tail = _FOOTER.size + len(MAGIC)
@@ -145,15 +145,15 @@ def read_summary(stream: IO[bytes], most_bytes: int) -> Summary | None:
     end = read_exactly(stream, min(tail, size))
     opcode, _, start, _, checksum = _FOOTER.unpack_from(end)
     if opcode != Opcode.FOOTER or end[_FOOTER.size :] != MAGIC:
-        raise ValueError("the file does not end as it should")
+        raise ValueError("the file does not end like an MCAP file")
     if start == 0:
         return None
     length = size - tail - start
     if not 0 <= length <= most_bytes:
-        raise ValueError("it does not lie where the file's end says")
+        raise ValueError("the end of the file does not point to it")
     stream.seek(start)
     data = read_exactly(stream, length)
-    # It covers the footer up to where it stands.
+    # The checksum covers the footer up to the checksum itself.
     if checksum and zlib.crc32(end[: _FOOTER.size - 4], zlib.crc32(data)) != checksum:
         raise ValueError("its checksum is wrong")
     return _usable(memoryview(data), start)
@@ -189,7 +189,7 @@ def _usable(data: memoryview, start: int) -> Summary | None:
     if len(chunks) < statistics.chunk_count or any(not each.message_index_offsets for each in chunks):
         return None
     if not _lie_side_by_side(chunks, start):
-        raise ValueError("its chunks lie one over the other")
+        raise ValueError("its chunks overlap")
     # Messages outside chunks have no index.
     if not chunks and statistics.message_count:
         return None
@@ -198,7 +198,7 @@ def _usable(data: memoryview, start: int) -> Summary | None:
 
 
 def _lie_side_by_side(chunks: list[ChunkIndex], end: int) -> bool:
-    """Whether the chunks, each with its message index behind it, are apart: no byte is told of twice."""
+    """Whether the chunks, each followed by its message index, do not overlap."""
     place = len(MAGIC)
     for chunk in sorted(chunks, key=lambda each: each.chunk_start_offset):
         index_begin = chunk.chunk_start_offset + chunk.chunk_length

@@ -1,7 +1,7 @@
-"""One ROS 1 bag: its channels, where the messages of a channel lie, and the bytes of each.
+"""One ROS 1 bag: its channels, where their messages are, and the bytes of each.
 
-The index is the bag's own; a bag that has none because its recorder died, or whose index is damaged, is
-scanned once, chunk by chunk, over everything that is whole.
+The bag's own index is used. A bag without one (its recorder crashed), or with a damaged one, is scanned once,
+chunk by chunk, as far as it is readable.
 """
 
 from __future__ import annotations
@@ -47,13 +47,13 @@ from rose2_logs.system.warnings import log_warning
 
 logger = logging.getLogger(__name__)
 
-# What parsing raises on bytes that are not what they should be; ValueError is also TooLargeError.
+# What parsing damaged data raises; ValueError includes TooLargeError.
 _DAMAGE = (ValueError, KeyError, EOFError, struct.error)
 # Messages of a scanned chunk that are put into an array at once: as tuples they take ten times the memory.
 _ENTRIES_AT_ONCE = 65_536
-# Chunks that are kept while messages are read by time, as far as they are no larger together: those of a bag
-# that was written topic by topic come in turns, and each would be decompressed for every message. Those of a
-# recorder have 0.8 MB.
+# Total size of the chunks that are cached while messages are read in time order. In a bag that was written
+# topic by topic, reading alternates between chunks, and without a cache each would be decompressed for every
+# message. Recorders write chunks of 0.8 MB.
 _CHUNKS_KEPT_BYTES = 16 << 20
 
 
@@ -64,18 +64,18 @@ class BagFile(LogFile):
     ----------
     path : Path
     limits : ReadingParameters
-        How much it may claim.
+        The largest sizes that are accepted.
 
     Raises
     ------
     LogError
-        If the file cannot be opened or is no bag of version 2.0, or holds more map messages than may be.
+        If the file cannot be opened, is not a bag of version 2.0, or has more map messages than the limit.
     """
 
     def __init__(self, path: Path, limits: ReadingParameters) -> None:
         self.path = path
         self.limits = limits
-        # Maps are read once each, and one behind the other.
+        # Maps are read once each, one after the other, so nothing is cached.
         self._latest = _Chunks(self._read_chunk, 0)
         try:
             self._stream = io.BufferedReader(CheckedFile(path))
@@ -120,7 +120,7 @@ class BagFile(LogFile):
         self._latest = _Chunks(self._read_chunk, 0)
 
     def places(self, channel_ids: Collection[int]) -> list[Place]:
-        """Where the messages of some channels lie, in the order of log time."""
+        """Where the messages of some channels are stored, in log time order."""
         chosen = self._index[np.isin(self._index["connection"], list(channel_ids))]
         check_count(self.path, len(chosen), self.limits.map_max_messages)
         return sorted(Place(*each) for each in chosen.tolist())
@@ -131,7 +131,7 @@ class BagFile(LogFile):
         Raises
         ------
         DamagedMessageError
-            If it is not where the index says, or its chunk is damaged.
+            If it is not where the index says it is, or its chunk is damaged.
         """
         try:
             return self._payload(place, self._latest)
@@ -146,21 +146,21 @@ class BagFile(LogFile):
         records = chunks.records(place.record)
         stream = BytesIO(records)
         head = read_head(stream, place.offset)
-        while head.op == CONNECTION:  # may stand before its first message
+        while head.op == CONNECTION:  # may precede its first message
             head = read_head(stream, head.end)
         if (
             head.op != MESSAGE
             or number(head.fields, "conn") != place.channel_id
             or time_ns(head.fields, "time") != place.log_time_ns
         ):
-            raise ValueError("there is another message where the index says")
+            raise ValueError("the index points to another message")
         data = memoryview(records)[head.data_begin : head.end]
         if len(data) != head.data_length:
-            raise EOFError("it ends within the message")
+            raise EOFError("it ends in the middle of a message")
         return data
 
     def messages(self, channel_ids: Collection[int] | None = None) -> Iterator[StoredMessage]:
-        """Yield every message that is whole, of some channels or of all, by log time."""
+        """Yield every readable message of some channels, or of all, in log time order."""
         sequence: Counter[int] = Counter()
         chunks = _Chunks(self._read_chunk, _CHUNKS_KEPT_BYTES)
         index = self._index
@@ -179,7 +179,7 @@ class BagFile(LogFile):
         return connections.tolist(), counts.tolist()
 
     def _read_index(self, begin: int, parts: list[NDArray[np.void]]) -> None:
-        """Take the index at the end of the bag, and of each chunk the one behind it."""
+        """Read the index at the end of the bag, and the index after each chunk."""
         infos: dict[int, dict[int, int]] = {}
         while begin < self._size:
             try:
@@ -187,7 +187,7 @@ class BagFile(LogFile):
             except _DAMAGE:
                 if not infos:
                     raise
-                break  # what is behind the index
+                break  # whatever follows the index
             if head.op == CONNECTION:
                 self._take_connection(head, self._data(head))
             elif head.op == CHUNK_INFO:
@@ -196,7 +196,7 @@ class BagFile(LogFile):
                     raise ValueError("a chunk is described twice")
                 infos[place] = counts
             else:
-                raise ValueError("a record that does not belong into the index")
+                raise ValueError("the index contains a record that does not belong there")
             begin = head.end
         self._check_index(infos)
         rows = IndexRows()
@@ -208,34 +208,34 @@ class BagFile(LogFile):
         parts.append(rows.places())
 
     def _check_index(self, infos: dict[int, dict[int, int]]) -> None:
-        """Compare what the index tells with what the bag's header says."""
+        """Compare the index with the counts in the bag's header."""
         fields = read_head(self._stream, len(MAGIC)).fields
         if len(infos) != number(fields, "chunk_count") or len(self.channels) != number(fields, "conn_count"):
-            raise ValueError("the index is not whole")
+            raise ValueError("the index is incomplete")
 
     def _read_chunk_index(self, place: int, counts: dict[int, int], rows: IndexRows) -> None:
         head = read_head(self._stream, place)
         if head.op != CHUNK:
-            raise ValueError("there is no chunk where the index says")
+            raise ValueError("the index does not point to a chunk")
         self._stream.seek(head.end)
         length = len(counts) * INDEX_HEAD_BYTES + sum(counts.values()) * INDEX_ENTRY_BYTES
         if head.end + length > self._size:
-            raise EOFError("it ends within the index of a chunk")
+            raise EOFError("it ends in the middle of a chunk's index")
         rows.take(self._stream.read(length), counts, place)
 
     def _recover_chunk(self, place: int, count: int, why: Exception, parts: list[NDArray[np.void]]) -> None:
-        """Do without the index behind a chunk; if there is no chunk either, tell what is lost."""
+        """Scan a chunk whose index is damaged; if there is no chunk either, warn about what is lost."""
         with suppress(*_DAMAGE):
             head = read_head(self._stream, place)
             if head.op == CHUNK:
                 self._scan_chunk(head, parts)
                 return
         self.whole = False
-        text = f"{self.path}: the chunk at byte {place} is damaged ({why}); its {count} messages are left out"
+        text = f"{self.path}: the chunk at byte {place} is damaged ({why}); its {count} messages are skipped"
         log_warning(logger, "damaged_chunk", text, file=self.path)
 
     def _scan(self, parts: list[NDArray[np.void]]) -> None:
-        """Index the bag chunk by chunk, as far as it is whole."""
+        """Index the bag chunk by chunk, as far as it is readable."""
         begin = len(MAGIC)
         reason = ""
         while begin < self._size:
@@ -251,13 +251,13 @@ class BagFile(LogFile):
                     self._take_connection(head, self._data(head))
             begin = head.end
         if begin > self._size or begin == len(MAGIC):
-            reason = reason or "a record is not whole"
+            reason = reason or "incomplete record"
         if reason:
             self.whole = False
-            text = f"{self.path}: cut off or damaged ({reason}) after {min(begin, self._size)} bytes; "
-            log_warning(logger, "cut_off", text + "what is whole before is read", file=self.path)
+            text = f"{self.path}: truncated or damaged ({reason}) after {min(begin, self._size)} bytes; "
+            log_warning(logger, "cut_off", text + "everything before is read", file=self.path)
         else:
-            text = f"{self.path}: was not closed, or its index is damaged; all that is there was read"
+            text = f"{self.path}: was not closed, or its index is damaged; the whole file was read instead"
             log_warning(logger, "damaged_index", text, file=self.path)
 
     def _scan_chunk(self, chunk: Head, parts: list[NDArray[np.void]]) -> None:
@@ -277,7 +277,7 @@ class BagFile(LogFile):
         except _DAMAGE as error:
             self.whole = False
             text = f"{self.path}: the chunk at byte {chunk.begin} is damaged ({error}); "
-            log_warning(logger, "damaged_chunk", text + "what is whole of it is read", file=self.path)
+            log_warning(logger, "damaged_chunk", text + "its readable part is used", file=self.path)
         if found:
             parts.append(np.array(found, INDEX_DTYPE))
 
@@ -287,13 +287,13 @@ class BagFile(LogFile):
 
     def _data(self, head: Head) -> bytes:
         if head.end > self._size:
-            raise EOFError("it ends within a record")
+            raise EOFError("it ends in the middle of a record")
         self._stream.seek(head.data_begin)
         return self._stream.read(head.data_length)
 
 
 class _Chunks:
-    """Uncompressed records of chunks by file offset: the latest, and of others as many as may be kept."""
+    """Cache of uncompressed chunks by file offset: always the latest one, others up to a total size."""
 
     def __init__(self, read: Callable[[int], bytes], kept_bytes: int) -> None:
         self._read = read

@@ -1,4 +1,4 @@
-"""Records of a ROS 1 bag, taken apart with bounds: nothing is allocated because a header claims it.
+"""Parsing of the records of a ROS 1 bag; memory is never allocated just because a header claims a size.
 
 Format: https://wiki.ros.org/Bags/Format/2.0
 """
@@ -19,29 +19,29 @@ from rose2_logs.io.log_file import Channel
 
 MAGIC = b"#ROSBAG V2.0\n"
 MESSAGE, BAG_HEADER, INDEX, CHUNK, CHUNK_INFO, CONNECTION = 2, 3, 4, 5, 6, 7
-"""Kinds of records, their field ``op``."""
+"""Kinds of records: the values of their field ``op``."""
 INDEX_HEAD_BYTES = 55
-"""Of an index record: its fields and the two lengths around them."""
+"""Size of an index record without its entries: its fields and the two lengths around them."""
 LARGEST_HEADER_BYTES = 1 << 20
-"""Headers have a few fields, of which the topic's name is the longest; more is damage."""
+"""Headers have a few short fields, of which the topic's name is the longest; a larger one is damage."""
 KEPT_FIELDS: tuple[str, ...] = ("callerid", "latching", "md5sum")
-"""Of a connection, beside its topic, type and definition."""
+"""Fields of a connection that are kept besides its topic, type and definition."""
 
 _LENGTH = struct.Struct("<I")
 _TIME = struct.Struct("<II")  # seconds, nanoseconds
 _LONG = struct.Struct("<Q")
 _INDEX_ENTRY = np.dtype([("s", "<u4"), ("ns", "<u4"), ("offset", "<u4")])
 INDEX_ENTRY_BYTES = _INDEX_ENTRY.itemsize
-"""Of an index record, for each message."""
+"""Size of the entry of one message in an index record."""
 INDEX_DTYPE = np.dtype([("time", "<i8"), ("chunk", "<i8"), ("offset", "<u4"), ("connection", "<u4")])
-"""Where a message lies: log time in nanoseconds, file offset of its chunk, offset in the chunk."""
+"""Where a message is: log time in nanoseconds, file offset of its chunk, offset in the chunk, connection."""
 
 Fields = dict[str, bytes]
 
 
 @dataclass(frozen=True)
 class Head:
-    """Head of a record: its fields, and where its data lie in the file or chunk."""
+    """Header of a record: its fields, and where its data are in the file or chunk."""
 
     begin: int
     fields: Fields
@@ -55,44 +55,44 @@ class Head:
 
     @property
     def end(self) -> int:
-        """Where the next record begins."""
+        """Offset of the next record."""
         return self.data_begin + self.data_length
 
 
 def number(fields: Fields, name: str) -> int:
-    """Take an unsigned number of 4 or 8 bytes; KeyError or struct.error if there is none."""
+    """Unsigned number of 4 or 8 bytes in a field; raises KeyError or struct.error if there is none."""
     value = fields[name]
     found: int = (_LONG if len(value) == _LONG.size else _LENGTH).unpack(value)[0]
     return found
 
 
 def time_ns(fields: Fields, name: str) -> int:
-    """Take a time as nanoseconds."""
+    """Time in a field, as nanoseconds."""
     seconds, nanoseconds = _TIME.unpack(fields[name])
     return int(seconds) * 10**9 + int(nanoseconds)
 
 
 def read_head(stream: IO[bytes], begin: int) -> Head:
-    """Read the head of the record at an offset.
+    """Read the header of the record at an offset.
 
     Raises
     ------
     ValueError, EOFError, struct.error
-        If there is none.
+        If there is no valid record.
     """
     stream.seek(begin)
     (length,) = _LENGTH.unpack(_exactly(stream, _LENGTH.size))
     if length > LARGEST_HEADER_BYTES:
-        raise ValueError(f"a header claims {length} bytes")
+        raise ValueError(f"a record header claims {length} bytes")
     fields = parse_fields(_exactly(stream, length))
     if len(fields.get("op", b"")) != 1:
-        raise ValueError("a record does not tell its kind")
+        raise ValueError("a record has no kind")
     (data_length,) = _LENGTH.unpack(_exactly(stream, _LENGTH.size))
     return Head(begin, fields, begin + 2 * _LENGTH.size + length, data_length)
 
 
 def parse_fields(data: bytes) -> Fields:
-    """Take a header apart: fields ``name=value``, each after its length."""
+    """Parse a header: fields ``name=value``, each preceded by its length."""
     fields, place = {}, 0
     while place < len(data):
         (length,) = _LENGTH.unpack_from(data, place)
@@ -100,7 +100,7 @@ def parse_fields(data: bytes) -> Fields:
         field = data[place : place + length]
         name, sign, value = field.partition(b"=")
         if len(field) != length or not sign:
-            raise ValueError("a header is damaged")
+            raise ValueError("a record header is damaged")
         fields[name.decode()] = value
         place += length
     return fields
@@ -109,31 +109,31 @@ def parse_fields(data: bytes) -> Fields:
 def _exactly(stream: IO[bytes], length: int) -> bytes:
     data = stream.read(length)
     if len(data) != length:
-        raise EOFError("it ends within a record")
+        raise EOFError("it ends in the middle of a record")
     return data
 
 
 def heads_in(records: bytes | memoryview) -> Iterator[Head]:
-    """Yield the heads of the records in an uncompressed chunk, as far as they are whole.
+    """Yield the headers of the records in an uncompressed chunk.
 
     Raises
     ------
     ValueError, EOFError, struct.error
-        At one that is not.
+        At the first record that is damaged or incomplete.
     """
     stream, place = BytesIO(records), 0
     while place < len(records):
         head = read_head(stream, place)
         if head.end > len(records):
-            raise EOFError("it ends within a record")
+            raise EOFError("it ends in the middle of a record")
         yield head
         place = head.end
 
 
 def chunk_data(stream: IO[bytes], head: Head, most_bytes: int) -> bytes | memoryview:
-    """Uncompressed records of the chunk with this head.
+    """Uncompressed records of the chunk with this header.
 
-    Of one that is cut off as much as can be had; the last record may not be whole.
+    Of a truncated chunk, as much as can be decompressed; the last record may then be incomplete.
 
     Raises
     ------
@@ -143,7 +143,7 @@ def chunk_data(stream: IO[bytes], head: Head, most_bytes: int) -> bytes | memory
     compression = head.fields["compression"].decode()
     size = number(head.fields, "size")
     if head.data_length > most_bytes:
-        size = head.data_length  # which is refused
+        size = head.data_length  # so that `decompress` refuses it
     stream.seek(head.data_begin)
     is_plain = compression == "none"
     data = stream.read(min(head.data_length, most_bytes))
@@ -158,7 +158,7 @@ def connection_of(head: Head, data: bytes) -> Channel:
     topic = head.fields["topic"].decode()
     return Channel(
         number(head.fields, "conn"),
-        # As ROS resolves names: without doubled or trailing slashes.
+        # As ROS resolves names: without double or trailing slashes.
         ("/" if topic.startswith("/") else "") + "/".join(part for part in topic.split("/") if part),
         "ros1",
         number(head.fields, "conn") + 1,
@@ -170,28 +170,28 @@ def connection_of(head: Head, data: bytes) -> Channel:
 
 
 class IndexRows:
-    """Gathers the index records of chunks, of which a long bag has hundreds of thousands."""
+    """Collects the index records of chunks; a long bag has hundreds of thousands of them."""
 
     def __init__(self) -> None:
         self._entries: list[bytes] = []
         self._rows: list[tuple[int, int, int]] = []
 
     def take(self, data: bytes, counts: dict[int, int], chunk: int) -> None:
-        """Take the index records behind a chunk; all of them or none.
+        """Add the index records that follow a chunk: all of them, or none if one is damaged.
 
         Parameters
         ----------
         data : bytes
-            Begins with the records.
+            Starts with the records.
         counts : dict
-            Messages by connection, as the bag tells of the chunk.
+            Expected number of messages by connection.
         chunk : int
             File offset of the chunk.
 
         Raises
         ------
         ValueError, KeyError, struct.error
-            If a record is damaged or missing, or tells otherwise.
+            If a record is damaged or missing, or its number of messages is not the expected one.
         """
         entries, rows, place = [], [], 0
         for _ in counts:
@@ -203,9 +203,9 @@ class IndexRows:
             connection, count = number(fields, "conn"), number(fields, "count")
             found = data[place : place + size]
             if fields["op"] != bytes([INDEX]) or number(fields, "ver") != 1:
-                raise ValueError("a chunk has no index behind it")
+                raise ValueError("a chunk is not followed by its index")
             if len(found) != size or size != count * _INDEX_ENTRY.itemsize or counts.get(connection) != count:
-                raise ValueError("an index has another length than it says")
+                raise ValueError("a chunk's index does not have the length that it claims")
             entries.append(found)
             rows.append((chunk, connection, count))
             place += size
@@ -226,8 +226,8 @@ class IndexRows:
 def chunk_info(head: Head, data: bytes) -> tuple[int, dict[int, int]]:
     """File offset of a chunk and its number of messages by connection."""
     if number(head.fields, "ver") != 1:
-        raise ValueError("a chunk's description of an unknown version")
+        raise ValueError("a chunk's description has an unknown version")
     counts = np.frombuffer(data, "<u4").reshape(-1, 2)
     if len(counts) != number(head.fields, "count"):
-        raise ValueError("a chunk's description has another length than it says")
+        raise ValueError("a chunk's description does not have the length that it claims")
     return number(head.fields, "chunk_pos"), dict(counts.tolist())

@@ -1,6 +1,6 @@
-"""One SQLite database of a ROS 2 bag: its channels, where their messages lie, and the bytes of each.
+"""One SQLite database of a ROS 2 bag: its channels, where their messages are, and the bytes of each.
 
-Also of a database that was cut off or is damaged: rows on pages that are lost are passed over.
+Truncated or damaged databases are read too: rows on lost pages are skipped.
 Format: https://github.com/ros2/rosbag2, rosbag2_storage_sqlite3
 """
 
@@ -25,28 +25,28 @@ from rose2_logs.system.warnings import log_warning
 logger = logging.getLogger(__name__)
 
 _ROW_DTYPE = np.dtype([("time", "<i8"), ("row", "<i8"), ("channel", "<i8")])
-# Rows that are taken from a database at once.
+# Rows that are fetched from a database at once.
 _ROWS_AT_ONCE = 10_000
 _LAST_ROW = 2**62
-# Of rows whose time or topic is not a number.
+# Marks rows whose time or topic is not a number.
 _NO_CHANNEL = -1
-# What is wrong with a database, or with a text in it.
+# What a damaged database, or a damaged text in it, raises.
 _DAMAGE = (sqlite3.Error, ValueError, TypeError, OverflowError, LookupError, MemoryError)
 
 
 class SqliteFile(LogFile):
-    """An open database; it is never written to, and neither is anything beside it.
+    """An open database; neither it nor any file next to it is ever written to.
 
     Parameters
     ----------
     path : Path
     limits : ReadingParameters
-        How much it may claim.
+        The largest sizes that are accepted.
 
     Raises
     ------
     LogError
-        If it cannot be opened or is not that of a bag, or holds more map messages than may be.
+        If it cannot be opened, is not the database of a bag, or has more map messages than the limit.
     """
 
     def __init__(self, path: Path, limits: ReadingParameters) -> None:
@@ -81,11 +81,11 @@ class SqliteFile(LogFile):
         self._look_for_journal()
 
     def close(self) -> None:
-        """Close the file; may be called twice."""
+        """Close the file; may be called more than once."""
         self._base.close()
 
     def places(self, channel_ids: Collection[int]) -> list[Place]:
-        """Where the messages of some channels lie, in the order of log time."""
+        """Where the messages of some channels are stored, in log time order."""
         chosen = self._rows[np.isin(self._rows["channel"], list(channel_ids))]
         check_count(self.path, len(chosen), self.limits.map_max_messages)
         return sorted(Place(time, row, -1, channel) for time, row, channel in chosen.tolist())
@@ -96,7 +96,7 @@ class SqliteFile(LogFile):
         Raises
         ------
         DamagedMessageError
-            If it lies on pages that are lost, or is larger than may be.
+            If it is on lost pages, or larger than the limit.
         """
         try:
             return self._payload(place.record)
@@ -110,7 +110,7 @@ class SqliteFile(LogFile):
         return memoryview(found[0])
 
     def messages(self, channel_ids: Collection[int] | None = None) -> Iterator[StoredMessage]:
-        """Yield every message that is whole, of some channels or of all, by log time."""
+        """Yield every readable message of some channels, or of all, in log time order."""
         sequence: Counter[int] = Counter()
         rows = self._rows
         if channel_ids is not None:
@@ -125,7 +125,7 @@ class SqliteFile(LogFile):
             sequence[channel_id] += 1
 
     def _set_up(self) -> None:
-        """Read what is there of a database that is shorter than it says; trust nothing that it defines."""
+        """Prepare to read a database that may be truncated; nothing that it defines is trusted."""
         self._base.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, min(self.limits.chunk_max_bytes, 2**31 - 1))
         self._base.text_factory = lambda text: text.decode("utf-8", errors="replace")
         for pragma in ("writable_schema = ON", "trusted_schema = OFF", "mmap_size = 0"):
@@ -135,7 +135,7 @@ class SqliteFile(LogFile):
             "SELECT count(*) FROM sqlite_master WHERE type = 'table' AND name IN ('messages', 'topics')"
         ).fetchone()
         if tables[0] != 2:
-            raise ValueError("it has no tables `messages` and `topics`")
+            raise ValueError("it lacks the tables `messages` and `topics`")
 
     def _read_channels(self) -> None:
         columns = [str(row[1]) for row in self._base.execute("PRAGMA table_info(topics)")]
@@ -159,7 +159,7 @@ class SqliteFile(LogFile):
             )
 
     def _definitions(self) -> dict[str, tuple[str, str]]:
-        """Language and text of the definitions of types, which newer bags hold."""
+        """Language and text of the type definitions that newer bags contain."""
         query = "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions"
         try:
             rows = self._base.execute(query)
@@ -168,7 +168,7 @@ class SqliteFile(LogFile):
             return {}
 
     def _read_rows(self) -> Any:
-        """Time, row and channel of every message that can be reached, in the order of the rows."""
+        """Time, row and channel of every message that can be reached, in row order."""
         parts: list[Any] = [np.empty(0, _ROW_DTYPE)]
         last, step = -1, 0
         while last + step < _LAST_ROW:
@@ -182,16 +182,16 @@ class SqliteFile(LogFile):
             if error is not None:
                 if step == 0:
                     self.whole = False
-                    text = (
-                        f"{self.path}: damaged or cut off ({error}) after row {max(last, 0)}; the messages "
+                    text = f"{self.path}: damaged or truncated ({error}) after row {max(last, 0)}; only the "
+                    log_warning(
+                        logger, "cut_off", f"{text}messages that can be reached are read", file=self.path
                     )
-                    log_warning(logger, "cut_off", f"{text}that can be reached are read", file=self.path)
-                # To the pages behind those that are lost: twice as far each time.
+                # Skip the lost pages, doubling the step each time.
                 step = 2 * step or 1
         return np.concatenate(parts)
 
     def _take_rows(self, after: int, found: list[tuple[int, int, int]]) -> Exception | None:
-        """Append the next rows, as many as are taken at once, and return what went wrong."""
+        """Append the next `_ROWS_AT_ONCE` rows to `found`, and return the error if one occurred."""
         query = "SELECT timestamp, rowid, topic_id FROM messages WHERE rowid > ? ORDER BY rowid LIMIT ?"
         try:
             for time, row, channel in self._base.execute(query, (after, _ROWS_AT_ONCE)):
@@ -200,16 +200,16 @@ class SqliteFile(LogFile):
                 after = row
                 is_usable = isinstance(time, int) and isinstance(channel, int) and 0 <= time <= LATEST_NS
                 found.append((time, row, channel) if is_usable else (0, row, _NO_CHANNEL))
-        except (sqlite3.Error, MemoryError) as error:  # the latter where a row claims to be huge
+        except (sqlite3.Error, MemoryError) as error:  # MemoryError if a row claims to be huge
             return error
         return None
 
     def _look_for_journal(self) -> None:
-        """Say if the recorder left messages beside the database, which SQLite would take up by writing."""
+        """Warn if the recorder left messages in SQLite's journal, which reading alone cannot recover."""
         journal = self.path.with_name(f"{self.path.name}-wal")
         if journal.is_file() and journal.stat().st_size:
             text = (
-                f"{self.path}: {journal.name} holds messages that are not in the database yet and are left "
-                f"out; `sqlite3 {self.path.name} .tables` on a copy of both takes them up"
+                f"{self.path}: {journal.name} contains messages that are not in the database yet; they are "
+                f"skipped; to include them, run `sqlite3 {self.path.name} .tables` on a copy of both files"
             )
             log_warning(logger, "journal", text, file=self.path)

@@ -1,4 +1,4 @@
-"""Floor plans as DXF for CAD programs, by ezdxf: meters, a layer for each kind of thing."""
+"""Floor plans as DXF for CAD programs, written by ezdxf: in meters, one layer per kind of object."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ if TYPE_CHECKING:
     from ezdxf.layouts.layout import Modelspace
 
 VERSION = "R2010"
-"""Read by every CAD program in use, and the first release with true colors on all entities."""
+"""Read by every CAD program in use; the first release with true colors on all entities."""
 ROOMS, PREDICTED, DOORWAYS, WALLS, LABELS = "ROOMS", "PREDICTED", "DOORWAYS", "WALLS", "LABELS"
 LAYERS = {ROOMS: 7, PREDICTED: 8, DOORWAYS: 1, WALLS: 7, LABELS: 7}
-"""Layers and their colors by AutoCAD's index: 7 is black or white, 8 gray, 1 red."""
+"""Layers and their AutoCAD color indices: 7 is black or white, 8 gray, 1 red."""
 TEXT_HEIGHT_M = 0.25
-"""Labels can be read on a print at 1:100 (2.5 mm)."""
+"""Readable on a print at 1:100 (2.5 mm)."""
 LABEL_RISE_M = 0.75 * TEXT_HEIGHT_M
-"""The middles of a label's two lines lie this far above and below its point: half a line apart."""
+"""The two lines of a label are centered this far above and below its point, half a line apart."""
 HATCH_PATTERN, HATCH_SCALE = "ANSI31", 0.08
-"""Lines at 45 degrees about a quarter of a meter apart."""
+"""Lines at 45 degrees, about a quarter of a meter apart."""
 
 
 def write_dxf(plan: RoomPlan, path: Path) -> None:
-    """Write a plan.
+    """Write a plan as DXF.
 
     Raises
     ------
@@ -40,14 +40,14 @@ def write_dxf(plan: RoomPlan, path: Path) -> None:
     from ezdxf import options, units  # type: ignore[attr-defined]
     from ezdxf.filemanagement import new
 
-    # Otherwise the file would hold the time and random numbers: the same plan gives the same file.
+    # Without this the file would contain the time and random numbers; the same plan must give the same file.
     fixed, options.write_fixed_meta_data_for_testing = options.write_fixed_meta_data_for_testing, True
     try:
         document = new(VERSION, units=units.M)
         for name, color in LAYERS.items():
             document.layers.add(name, color=color)
         _draw(plan, document.modelspace())
-        # Of itself it lists the classes in the order of a set, which changes from run to run.
+        # By default ezdxf lists the classes in the order of a set, which changes from run to run.
         for name in sorted(document.entitydb.dxf_types_in_use()):
             document.classes.add_class(name)
         with replacing(path) as part:
@@ -90,6 +90,6 @@ def _draw(plan: RoomPlan, space: Modelspace) -> None:
 
 
 def _rings(shape: BaseGeometry) -> list[list[tuple[float, float]]]:
-    """Corners of all rings of a shape, without their last, which is the first again."""
+    """Corners of all rings of a shape, without the last one, which repeats the first."""
     rings = shapely.get_rings(shapely.get_parts(np.array([shape], object)))
     return [[(x, y) for x, y in shapely.get_coordinates(ring)[:-1].tolist()] for ring in rings]

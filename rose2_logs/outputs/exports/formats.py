@@ -1,4 +1,4 @@
-"""The formats by name, and the one way to write a plan in several of them."""
+"""The export formats by name, and writing a plan in any of them."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ FORMATS: dict[str, tuple[str, ...]] = {
     "map_server": ENDINGS,
     "graph": (".graph.json",),
 }
-"""Endings of the files of each format."""
+"""File endings of each format."""
 
 
 def planned_files(formats: Sequence[str], folder: Path, stem: str) -> list[Path]:
@@ -32,31 +32,36 @@ def planned_files(formats: Sequence[str], folder: Path, stem: str) -> list[Path]
     Raises
     ------
     ParameterError
-        If there is no such format.
+        If a format is unknown.
     """
     for name in formats:
         if name not in FORMATS:
-            raise ParameterError(f"no format {name!r}; there are: {', '.join(FORMATS)}")
+            raise ParameterError(f"unknown format {name!r}; choose one of {', '.join(FORMATS)}")
     return [folder / f"{stem}{ending}" for name in dict.fromkeys(formats) for ending in FORMATS[name]]
 
 
 def write_plan(plan: RoomPlan, formats: Sequence[str], folder: Path, stem: str) -> list[Path]:
-    """Write a plan in some formats; files that are there are replaced.
+    """Write a plan in one or more formats; existing files are replaced.
 
     Parameters
     ----------
     plan : RoomPlan
     formats : sequence of str
-        Names among `FORMATS`.
+        Keys of `FORMATS`.
     folder : path
-        Where to; it is made.
+        Output folder; created if needed.
     stem : str
-        How the files' names begin.
+        Start of the file names.
+
+    Returns
+    -------
+    list of Path
+        The written files.
 
     Raises
     ------
     ParameterError
-        If there is no such format.
+        If a format is unknown.
     OutputError
         If a file cannot be written.
     """

@@ -12,24 +12,31 @@ from rose2_logs.model.analysis import Walls
 from rose2_logs.model.room_plan import RoomPlan, predicted_parts
 
 DECIMALS = 4
-"""Of coordinates in meters: a tenth of a millimeter."""
+"""Decimals of coordinates in meters: a tenth of a millimeter."""
 CAVEAT = (
-    "x and y are meters in the frame of the robot's map, not longitude and latitude: programs that expect "
-    "degrees have to be told, as by an engineering or local coordinate system"
+    "x and y are meters in the frame of the robot's map, not longitude and latitude; in programs that expect "
+    "degrees, assign an engineering (local) coordinate system"
 )
 
 
 def plan_geojson(plan: RoomPlan, walls: Walls | None = None) -> dict[str, Any]:
     """Return rooms, their unseen parts, doorways and walls as a feature collection.
 
-    Each feature's property ``kind`` is room, predicted, doorway, wall or line. The member ``map_frame``, none
-    of the standard's, names the frame and says that coordinates are meters. Rings turn as the standard asks.
+    The property ``kind`` of each feature is room, predicted, doorway, wall or line. The member ``map_frame``,
+    which is not part of the standard, names the frame and says that coordinates are meters. Rings have the
+    orientation that the standard requires.
 
     Parameters
     ----------
     plan : RoomPlan
     walls : Walls, optional
-        Tells more than the plan does: the walls' directions, the representative lines with their weight.
+        Adds what the plan does not contain: directions of the walls, and the representative lines with their
+        weights.
+
+    Returns
+    -------
+    dict
+        A GeoJSON FeatureCollection, ready for `json.dump`.
     """
     features = [
         _feature(

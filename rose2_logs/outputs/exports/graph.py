@@ -1,4 +1,4 @@
-"""The graph of rooms as JSON, in the node-link form that networkx reads."""
+"""The graph of rooms as JSON, in the node-link format of networkx."""
 
 from __future__ import annotations
 
@@ -10,8 +10,13 @@ from rose2_logs.model.room_plan import RoomPlan
 def plan_graph(plan: RoomPlan) -> dict[str, Any]:
     """Return rooms as nodes and doorways as edges.
 
-    ``networkx.node_link_graph(data, edges="edges")`` makes a MultiGraph of it: two rooms may have several
-    doorways.
+    ``networkx.node_link_graph(data, edges="edges")`` turns it into a MultiGraph: there may be several
+    doorways between two rooms.
+
+    Returns
+    -------
+    dict
+        Ready for `json.dump`.
     """
     nodes = []
     for room in plan.rooms:

@@ -1,4 +1,4 @@
-"""Floor plans as a labeled map that map_server and Nav2 load: the rooms are the values of its cells."""
+"""Floor plans as a labeled map that map_server and Nav2 can load: the cell values are the rooms."""
 
 from __future__ import annotations
 
@@ -18,26 +18,26 @@ from rose2_logs.system.files import replacing
 logger = logging.getLogger(__name__)
 
 ROOM_VALUES = 99
-"""An occupancy grid holds 0 for free and 100 for occupied; the values between are for rooms."""
+"""In an occupancy grid 0 is free and 100 is occupied; the values between are used for rooms."""
 FREE, OCCUPIED, UNKNOWN_PIXEL = 0, 100, 255
 OCCUPIED_THRESH, FREE_THRESH = 0.65, 0.196
-"""Defaults of map_server, which must be there; in the mode `raw` they mean nothing."""
+"""Defaults of map_server; required in the file, but without effect in the mode `raw`."""
 ENDINGS = (".rooms.pgm", ".rooms.yaml", ".rooms.list.yaml", ".rooms.labels.png")
-"""The image, its description for map_server, what rooms its values are, and the rooms by their numbers."""
+"""The image, its description for map_server, the list of rooms by value, and the image of room numbers."""
 
 
 def write_labeled_map(plan: RoomPlan, folder: Path, stem: str) -> tuple[Path, ...]:
     """Write a plan's map with its rooms.
 
-    The description says ``mode: raw``, so that cells load with the values of the image: 0 free, 100 occupied,
-    255 unknown, 1 to 99 a room. Which room a value is stands in the list, with what else is known of it. More
-    rooms than that share values, so a second image of the same cells holds the numbers of the rooms, 0 where
-    there is none.
+    The description has ``mode: raw``, so that cells load with the values of the image: 0 free, 100 occupied,
+    255 unknown, 1 to 99 a room. The list says which room a value stands for, with its name, areas and
+    neighbors. If there are more than 99 rooms, they share values; a second image of the same cells therefore
+    contains the room numbers themselves, 0 for no room.
 
     Returns
     -------
     tuple of Path
-        The files, as `ENDINGS`.
+        The files, in the order of `ENDINGS`.
 
     Raises
     ------
@@ -47,14 +47,11 @@ def write_labeled_map(plan: RoomPlan, folder: Path, stem: str) -> tuple[Path, ..
     from PIL import Image
 
     if plan.map is None:
-        raise OutputError(
-            f"{folder / stem}: no map to label, because the annotated MCAP is not there; analyze without "
-            "annotated_log=False, or export another format"
-        )
+        raise OutputError(f"{folder / stem}: the plan has no map to label; choose another format")
     values = room_values(plan)
     if len(plan.rooms) > ROOM_VALUES:
         logger.warning(
-            "%s: %d rooms share the %d values that a map of map_server has for them; %s has them apart",
+            "%s: %d rooms share the %d values that a map_server map has for rooms; %s distinguishes them",
             folder / stem,
             len(plan.rooms),
             ROOM_VALUES,
@@ -82,7 +79,7 @@ def write_labeled_map(plan: RoomPlan, folder: Path, stem: str) -> tuple[Path, ..
 
 
 def room_values(plan: RoomPlan) -> dict[int, int]:
-    """Value of each room's cells, by its number."""
+    """Cell value of each room, by room number."""
     return {room.number: 1 + place % ROOM_VALUES for place, room in enumerate(plan.rooms)}
 
 

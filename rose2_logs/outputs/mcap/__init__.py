@@ -1,1 +1,1 @@
-"""The annotated MCAP, and the layouts of its viewers."""
+"""The annotated MCAP, and layouts for its viewers."""

@@ -1,4 +1,4 @@
-"""The input log with what was found added to it, as an MCAP that Foxglove, RViz and rosbag2 open."""
+"""The input log with the results added as topics: an MCAP that Foxglove, RViz and rosbag2 open."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ ADDED = {
     "/rose2/markers": "visualization_msgs/msg/MarkerArray",
     "/rose2/rooms": ROOMS_TYPE,
 }
-"""Topics that are added, with their types."""
+"""The added topics, with their types."""
 ATTACHMENT = "rose2_parameters.json"
 METADATA = "rose2_logs"
 
@@ -54,21 +54,22 @@ METADATA = "rose2_logs"
 class AnnotatedMcap(Sink):
     """Sink that copies the input log and adds the topics of `ADDED` with the source map's stamp and frame.
 
-    Messages, schemas, channels, attachments and metadata of an MCAP stay as they were, byte for byte; chunks
-    between those with a map are copied compressed as they are. A bag becomes an MCAP of the ros2 profile with
-    every message as CDR. The copy is read along with the run, so that messages stand by log time and the log
-    is never held in memory. Of saved maps, which are no messages yet, each map is written to the map topic.
+    Messages, schemas, channels, attachments and metadata of an MCAP are kept byte for byte; chunks between
+    those with a map are copied without decompressing them. A bag becomes an MCAP of the ros2 profile, with
+    every message as CDR. The input is read while the run proceeds, so that messages are in log time order and
+    the log is never in memory as a whole. Saved maps are not messages yet, so each map is written to the map
+    topic.
 
     Parameters
     ----------
     path : path
-        Where to; written beside and renamed when whole.
+        Output file; written under a hidden name and renamed when complete.
     source : MessageSource, optional
-        The log if it is open already, which it then stays.
+        The log, if it is already open; it is left open.
     is_bag : bool
-        Whether to describe the file in a ``metadata.yaml``, so that its folder is a bag of ROS 2.
+        Whether to describe the file in a ``metadata.yaml``, which makes its folder a ROS 2 bag.
 
-    In the end the file is read back, and what it holds is held against what was read and added.
+    At the end the file is read back, and its content is compared with what was read and added.
 
     Attributes
     ----------
@@ -79,8 +80,8 @@ class AnnotatedMcap(Sink):
     Raises
     ------
     OutputError
-        If the file cannot be written or is not what was to be written, or the input holds ``/rose2/`` topics
-        already, or messages that no bag of ROS 2 can hold.
+        If the file cannot be written or differs from what was written, if the input already has ``/rose2/``
+        topics, or if a ROS 2 bag is wanted and the input has messages that it cannot contain.
     LogError
         If the input cannot be copied.
     """
@@ -117,7 +118,7 @@ class AnnotatedMcap(Sink):
         self._input, self._own = Tallies(), Tallies()
         self._items = self._input.watched(log.messages())
         self._waiting: CopiedMessage | CopiedChunk | None = None
-        # The messages of a chunk that was taken apart; they come before all else.
+        # Messages of a chunk that had to be unpacked; they are next.
         self._opened: deque[CopiedMessage] = deque()
         self._maker = MessageMaker(info.parameters.occupancy)
         self._sequence = 0
@@ -136,7 +137,7 @@ class AnnotatedMcap(Sink):
             )
         for record in log.metadata():
             self._writer.add_metadata(record.name, record.metadata)
-        # The quality of service of the source's map, in its distribution's spelling.
+        # The quality of service of the source map, as its ROS distribution writes it.
         qos = map_metadata.get("offered_qos_profiles", "[]")
         self._qos = qos if qos.strip() not in ("", "[]") else LATCHED_QOS
         self._added = {topic: self._add_channel(topic, kind) for topic, kind in ADDED.items()}
@@ -153,7 +154,7 @@ class AnnotatedMcap(Sink):
         return self._waiting is not None
 
     def write(self, step: TrackedSnapshot) -> None:
-        """Copy the input up to the map's log time, then add what was found in the map."""
+        """Copy the input up to the map's log time, then add the results of the map."""
         time_ns = step.snapshot.log_time_ns
         self._extent.add(step)
         self._frame_id = step.analysis.geometry.frame_id
@@ -187,7 +188,7 @@ class AnnotatedMcap(Sink):
         self.abandon()
 
     def _describe(self) -> None:
-        """Write what opens the file: layouts of viewers, and the bag's description."""
+        """Write the layouts for viewers and, if wanted, the bag's description."""
         extent = self._extent
         scene = MapScene(self._frame_id, self._info.topic, extent.low_m, extent.high_m, self._qos)
         write_layouts(self._path, scene)
@@ -195,12 +196,12 @@ class AnnotatedMcap(Sink):
             write_bag_metadata(self._path, bag_metadata_path(self._path))
 
     def _checked(self) -> dict[str, Any]:
-        # Channels that hold no message went over too.
+        # Channels without messages were copied too.
         read = {number: self._input[key] for key, number in self._channels.items()}
         return checked_copy(self._part, str(self._path), read, self._own, self._input.closed_chunks)
 
     def _copy_until(self, time_ns: int | None) -> None:
-        """Copy what was logged up to a time; a chunk that goes on after it is taken apart."""
+        """Copy what was logged up to a time; a chunk that extends beyond it is unpacked."""
         while True:
             if self._waiting is None:
                 self._waiting = self._opened.popleft() if self._opened else next(self._items, None)
@@ -216,11 +217,11 @@ class AnnotatedMcap(Sink):
                 try:
                     self._opened.extend(item.messages())
                 except DAMAGE:
-                    # Nothing of it can be told apart any more; it stays what it is.
+                    # It cannot be unpacked, so it is copied as a whole.
                     self._copy_chunk(item)
 
     def _copy_chunk(self, chunk: CopiedChunk) -> None:
-        """Copy a chunk as it is, or message by message where the index behind it is damaged."""
+        """Copy a chunk as it is, or message by message if the index that follows it is damaged."""
         try:
             self._writer.copy_chunk(chunk.stream, chunk.index)
             return
@@ -250,7 +251,7 @@ class AnnotatedMcap(Sink):
         if channel.key not in self._channels:
             if channel.topic.startswith(PREFIX):
                 raise OutputError(
-                    f"{self._info.log_path}: holds {channel.topic} already; analyze the log it was made from"
+                    f"{self._info.log_path}: already has {channel.topic}; analyze the log it was made from"
                 )
             if self._is_bag and channel.message_encoding != "cdr":
                 raise OutputError(
@@ -258,7 +259,7 @@ class AnnotatedMcap(Sink):
                     "messages, which no bag of ROS 2 can hold; leave out bag=True"
                 )
             schema = (channel.schema_name, channel.schema_encoding, channel.schema_data)
-            # The chunks that are copied name channels and schemas by their ids.
+            # Copied chunks refer to channels and schemas by their ids, so these must not change.
             self._channels[channel.key] = self._writer.register_channel(
                 channel.topic,
                 channel.message_encoding,
@@ -289,7 +290,7 @@ class AnnotatedMcap(Sink):
         if self._opened_source is not None:
             self._opened_source.close()
         if self._file is not None:
-            # Closing writes what waits: where the disk is full, that fails once more, and hides why it began.
+            # Closing flushes the buffer; on a full disk that fails again and would hide the first error.
             with suppress(OSError):
                 self._file.close()
         self._part.unlink(missing_ok=True)

@@ -1,4 +1,4 @@
-"""``metadata.yaml`` of rosbag2, which makes a folder with an MCAP a bag that ``ros2 bag play`` takes."""
+"""The ``metadata.yaml`` of rosbag2, which makes a folder with an MCAP a bag for ``ros2 bag play``."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from rose2_logs.errors import OutputError
 from rose2_logs.system.files import replacing
 
 VERSION = 5
-"""Of the format, that of Humble, which all later releases read."""
+"""Version of the format: that of Humble, which all later releases can read."""
 
 
 def write_bag_metadata(log: Path, path: Path) -> None:
-    """Describe an MCAP of the ros2 profile that lies in the folder of the description.
+    """Describe an MCAP of the ros2 profile in the same folder.
 
     Parameters
     ----------
     log : path
-        The MCAP, whole.
+        The complete MCAP.
     path : path
-        Where to.
+        Output file.
 
     Raises
     ------
@@ -39,7 +39,7 @@ def write_bag_metadata(log: Path, path: Path) -> None:
     topics: dict[str, dict[str, Any]] = {}
     for number, channel in sorted(summary.channels.items()):
         if channel.schema_id not in summary.schemas:
-            continue  # without a type there is nothing that ROS could play
+            continue  # ROS cannot play messages without a type
         count = statistics.channel_message_counts.get(number, 0)
         if channel.topic in topics:
             topics[channel.topic]["message_count"] += count
@@ -67,7 +67,7 @@ def write_bag_metadata(log: Path, path: Path) -> None:
         "topics_with_message_count": list(topics.values()),
         "compression_format": "",
         "compression_mode": "",
-        # A copy, which YAML would else write as a reference to the first.
+        # A copy: YAML would write the same object as a reference to the first one.
         "files": [{"path": log.name, **deepcopy(contents)}],
     }
     with replacing(path) as part:

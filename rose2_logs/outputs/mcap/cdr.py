@@ -1,7 +1,7 @@
-"""CDR, the serialization of ROS 2 messages, written field by field; arrays go in as they lie in memory.
+"""CDR, the serialization of ROS 2 messages, written field by field; arrays are copied as they are.
 
-Generic serializers make a Python object of every point, which for the markers of one map takes longer than
-many a map's analysis.
+Generic serializers turn every point into a Python object, which for the markers of one map can take longer
+than the analysis of the map.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 ENCAPSULATION = b"\0\1\0\0"
-"""Begins each message: plain CDR, little endian. Fields are aligned to the byte after it."""
+"""Start of each message: plain CDR, little endian. Fields are aligned relative to the byte after it."""
 SIZES = {code: struct.calcsize(f"<{code}") for code in "BiIfd"}
-"""Bytes of a number of each `struct` type that is written."""
+"""Size in bytes of each `struct` type that is written."""
 
 
 class CdrWriter:
-    """The bytes of one message; every method appends fields, each aligned to its own size."""
+    """Builds the bytes of one message; every method appends fields, each aligned to its own size."""
 
     def __init__(self) -> None:
         self._data = bytearray(ENCAPSULATION)
@@ -29,18 +29,18 @@ class CdrWriter:
         self._data += struct.pack(f"<{len(values)}{code}", *values)
 
     def written(self, fields: bytes, alignment: int) -> None:
-        """Append fields that were written before, of which the largest is aligned to so many bytes."""
+        """Append fields that are already serialized and start at a multiple of `alignment` bytes."""
         self._align(alignment)
         self._data += fields
 
     def string(self, text: str) -> None:
-        """Append a string; its length counts the zero byte that ends it."""
+        """Append a string; its length includes the zero byte at the end."""
         encoded = text.encode() + b"\0"
         self.numbers("I", len(encoded))
         self._data += encoded
 
     def array(self, values: NDArray[np.generic]) -> None:
-        """Append the elements of an array in reading order, without their number."""
+        """Append the elements of an array in C order, without a count."""
         if values.size:
             self._align(values.itemsize)
             self._data += values.astype(values.dtype.newbyteorder("<"), copy=False).tobytes()
@@ -68,11 +68,11 @@ class CdrWriter:
         self.sequence(points)
 
     def fields(self) -> bytearray:
-        """Return what was appended, without the beginning."""
+        """Return the appended fields, without the start of the message."""
         return self._data[len(ENCAPSULATION) :]
 
     def message(self) -> bytearray:
-        """Return the message, which is written no further."""
+        """Return the complete message."""
         return self._data
 
     def _align(self, size: int) -> None:

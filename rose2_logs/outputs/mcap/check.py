@@ -1,7 +1,8 @@
-"""What every channel of an MCAP holds, told by a number and a hash, to hold a copy against its source.
+"""The content of every channel of an MCAP as a number and a hash, to compare a copy with its source.
 
 The hash of a channel is the sum, modulo 2^128, of the first 16 bytes of the SHA-256 of each of its messages
-(log time, publish time, sequence as little-endian numbers, data). So it does not depend on their order.
+(log time, publish time and sequence as little-endian numbers, then the data). It does not depend on their
+order.
 """
 
 from __future__ import annotations
@@ -24,33 +25,33 @@ from rose2_logs.outputs.mcap.input import CopiedChunk, CopiedMessage
 
 HASH_BYTES = 16
 LARGEST_CHUNK_BYTES = 1 << 30
-"""A chunk that is said to be larger is not looked into; it is copied all the same."""
+"""A chunk that claims to be larger is copied without being checked."""
 
 _TIMES = struct.Struct("<QQI")
 
 
 @dataclass
 class Tally:
-    """How many messages a channel has, and the sum of their hashes."""
+    """Number of messages of a channel, and the sum of their hashes."""
 
     messages: int = 0
     hashes: int = 0
 
     def add(self, log_time: int, publish_time: int, sequence: int, data: Any) -> None:
-        """Take a message."""
+        """Add a message."""
         digest = hashlib.sha256(_TIMES.pack(log_time, publish_time, sequence))
         digest.update(data)
         self.messages += 1
         self.hashes += int.from_bytes(digest.digest()[:HASH_BYTES], "little")
 
     def merge(self, other: Tally) -> None:
-        """Take the messages of another one."""
+        """Add the messages of another tally."""
         self.messages += other.messages
         self.hashes += other.hashes
 
     @property
     def hash(self) -> str:
-        """The hash of all messages, hexadecimal."""
+        """The hash of all messages, in hexadecimal."""
         return f"{self.hashes % 256**HASH_BYTES:0{2 * HASH_BYTES}x}"
 
     def as_json(self) -> dict[str, Any]:
@@ -64,7 +65,8 @@ class Tallies(defaultdict[int, Tally]):
     Attributes
     ----------
     closed_chunks : int
-        Chunks that cannot be looked into: damaged, or too large. Their messages are not counted.
+        Number of chunks that cannot be checked because they are damaged or too large. Their messages are not
+        counted.
     """
 
     def __init__(self) -> None:
@@ -72,7 +74,7 @@ class Tallies(defaultdict[int, Tally]):
         self.closed_chunks = 0
 
     def watched(self, items: Iterable[CopiedMessage | CopiedChunk]) -> Iterator[CopiedMessage | CopiedChunk]:
-        """Count what is copied on its way from the input; ids are those of the input."""
+        """Count messages while they are copied from the input; ids are those of the input."""
         for item in items:
             if isinstance(item, CopiedMessage):
                 self[item.channel.key].add(item.log_time, item.publish_time, item.sequence, item.data)
@@ -81,7 +83,7 @@ class Tallies(defaultdict[int, Tally]):
             yield item
 
     def leave_out(self, chunk: CopiedChunk) -> None:
-        """Count a chunk no more, because it cannot be copied."""
+        """Subtract a chunk that cannot be copied."""
         counted = Tallies()
         counted._take_copied(chunk)
         self.closed_chunks -= counted.closed_chunks
@@ -93,18 +95,18 @@ class Tallies(defaultdict[int, Tally]):
         self._take_chunk(chunk.stream, chunk.index.chunk_length - RECORD.size)
 
     def take_file(self, file: IO[bytes]) -> None:
-        """Count the messages of an MCAP file from its first record to its data's end.
+        """Count the messages of an MCAP file up to the end of its data section.
 
         Raises
         ------
         ValueError
-            If it ends before.
+            If the file is truncated.
         """
         file.seek(len(MAGIC))
         while True:
             head = file.read(RECORD.size)
             if len(head) < RECORD.size:
-                raise ValueError("it is cut off")
+                raise ValueError("it is truncated")
             opcode, length = RECORD.unpack(head)
             end = file.tell() + length
             if opcode == Opcode.DATA_END:
@@ -116,11 +118,11 @@ class Tallies(defaultdict[int, Tally]):
             file.seek(end)
 
     def _take_chunk(self, file: IO[bytes], length: int) -> None:
-        """Count the messages of a chunk, all or none."""
+        """Count the messages of a chunk: all of them, or none if it is damaged."""
         found: dict[int, Tally] = defaultdict(Tally)
         try:
             if length > LARGEST_CHUNK_BYTES:
-                raise ValueError("larger than is looked into")
+                raise ValueError("too large to be checked")
             for record in records_in(chunk_records(file.read(length), LARGEST_CHUNK_BYTES)):
                 if record.opcode == Opcode.MESSAGE:
                     _take_message(found, record.content)
@@ -139,28 +141,28 @@ def _take_message(tallies: dict[int, Tally], message: memoryview) -> None:
 def checked_copy(
     path: Path, name: str, copied: dict[int, Tally], added: dict[int, Tally], closed_chunks: int
 ) -> dict[str, Any]:
-    """Read a written file from the disk and hold it against what was to be written.
+    """Read a written file back and compare it with what should have been written.
 
     Parameters
     ----------
     path : path
         The file.
     name : str
-        What errors call it.
+        Name of the file in error messages.
     copied, added : dict of int to Tally
-        What was read of the input and what was added to it, by the ids of the file's channels.
+        What was read from the input and what was added to it, by the channel ids of the file.
     closed_chunks : int
-        Chunks of the input that cannot be looked into.
+        Number of chunks of the input that cannot be checked.
 
     Returns
     -------
     dict
-        For each channel topic, number and hash of its messages in the input and in the output; JSON values.
+        For each channel: topic, number and hash of its messages in the input and in the output; JSON values.
 
     Raises
     ------
     OutputError
-        If a message is missing, is another one, or is too much.
+        If a message is missing, differs, or was not expected.
     """
     found = Tallies()
     try:
@@ -169,26 +171,26 @@ def checked_copy(
             file.seek(0)
             summary = make_reader(file).get_summary()
     except DAMAGE as error:
-        raise OutputError(f"{name}: is not as it was written: {error}") from error
+        raise OutputError(f"{name}: reads back differently than it was written: {error}") from error
     if summary is None or summary.statistics is None:
-        raise OutputError(f"{name}: is not as it was written: it has no summary")
+        raise OutputError(f"{name}: reads back differently than it was written: it has no summary")
     channels, counts = [], summary.statistics.channel_message_counts
     for number, channel in sorted(summary.channels.items()):
         expected, got = copied.get(number) or added.get(number) or Tally(), found[number]
-        # What cannot be looked into counts in the file's index only.
+        # Chunks that cannot be checked are counted only in the file's index.
         indexed = got.messages if found.closed_chunks else counts.get(number, 0)
         if expected.as_json() != got.as_json() or indexed != got.messages:
             raise OutputError(
                 f"{name}: {channel.topic} has {got.messages} messages (hash {got.hash}) after writing, "
                 f"{expected.messages} (hash {expected.hash}) went in; "
-                "try another disk, or annotated_log=False"
+                "try another disk, or leave out the annotated MCAP (annotated_log=False)"
             )
         if number in added:
             channels.append({"topic": channel.topic, "added": got.as_json()})
         else:
             channels.append({"topic": channel.topic, "input": expected.as_json(), "output": got.as_json()})
     if set(found) - set(summary.channels):
-        raise OutputError(f"{name}: holds messages of channels that it does not name")
+        raise OutputError(f"{name}: has messages of channels that its summary does not list")
     return {
         "channels": channels,
         "chunks_not_looked_into": {"input": closed_chunks, "output": found.closed_chunks},

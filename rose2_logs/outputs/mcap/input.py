@@ -1,4 +1,4 @@
-"""A log as a stream of MCAP messages: what an annotated MCAP copies from its input."""
+"""Any log as a stream of MCAP messages, for the annotated MCAP to copy."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ LATCHED_QOS = (
     "  liveliness: 1\n  liveliness_lease_duration:\n    sec: 9223372036\n    nsec: 854775807\n"
     "  avoid_ros_namespace_conventions: false"
 )
-"""Keep last, depth 1, reliable, transient local: how ROS 2 publishes maps; rosbag2's spelling."""
+"""Keep last, depth 1, reliable, transient local: how ROS 2 publishes maps, in rosbag2's notation."""
 
 
 @dataclass(frozen=True)
 class CopiedChannel:
-    """A channel with its schema, as it is to stand in the output; channels are equal by `key`.
+    """A channel with its schema, as written to the output.
 
     `key` and `schema_id` are the ids of channel and schema in the input.
     """
@@ -54,7 +54,7 @@ class CopiedChannel:
 
 @dataclass(frozen=True)
 class CopiedMessage:
-    """A message as it is to stand in the output."""
+    """A message as written to the output."""
 
     channel: CopiedChannel
     log_time: int
@@ -65,18 +65,18 @@ class CopiedMessage:
 
 @dataclass(frozen=True)
 class CopiedChunk:
-    """A chunk of messages that can stand in the output as it is, compressed.
+    """A compressed chunk of messages that can be copied to the output as it is.
 
     Attributes
     ----------
     log_time, end_time : int
         Log times of its first and its last message.
     stream : binary file
-        Holds it.
+        The file that contains it.
     index : ChunkIndex
-        Where it lies.
+        Where it is in the file.
     messages : callable
-        Gives its messages by log time; raises what `DAMAGE` lists where they cannot be read.
+        Returns its messages in log time order; raises the errors of `DAMAGE` if they cannot be read.
     """
 
     log_time: int
@@ -92,7 +92,7 @@ class CopiedLog(ABC):
     Attributes
     ----------
     profile, library : str
-        Of the output's header.
+        For the header of the output.
     """
 
     profile = "ros2"
@@ -100,13 +100,13 @@ class CopiedLog(ABC):
 
     @abstractmethod
     def channels(self) -> list[CopiedChannel]:
-        """List the channels that are known before reading, those without a message among them."""
+        """Return the channels that are known before reading, including those without messages."""
 
     @abstractmethod
     def messages(self) -> Iterator[CopiedMessage | CopiedChunk]:
-        """Yield every message by log time, or in the order of the file where it has no index.
+        """Yield every message in log time order, or in file order if there is no index.
 
-        Messages in chunks that can go over as they are come as those chunks, in the order of the file.
+        Chunks that can be copied as they are, are yielded whole, in file order.
         """
 
     def attachments(self) -> Iterator[Attachment]:
@@ -119,7 +119,7 @@ class CopiedLog(ABC):
 
 
 def copied_log(source: MessageSource) -> CopiedLog:
-    """Return an open log for copying; saved maps have nothing to copy and are written by the sink itself."""
+    """Return an open log for copying; saved maps have no messages, and the sink writes them itself."""
     if not isinstance(source, FileLog):
         return _NoLog()
     first = source.files[0]
@@ -150,7 +150,7 @@ def _copied(channel: Channel, key: int) -> CopiedChannel:
 
 
 class _McapLog(CopiedLog):
-    """An MCAP file: chunk by chunk, or message by message where its index does not tell of every message."""
+    """An MCAP file: chunk by chunk, or message by message if its index does not cover every message."""
 
     def __init__(self, file: McapFile) -> None:
         self._file = file
@@ -195,9 +195,9 @@ class _McapLog(CopiedLog):
 
 
 def _is_all_in_indexed_chunks(summary: Summary) -> bool:
-    """Whether every message lies in a chunk that is followed by its message index.
+    """Whether every message is in a chunk that is followed by its message index.
 
-    Of an index record all but the head is of one length for each message, and so tells how many there are.
+    Index entries have a fixed size, so the length of an index gives the number of messages.
     """
     indexed = 0
     for chunk in summary.chunks:
@@ -213,7 +213,7 @@ def _is_all_in_indexed_chunks(summary: Summary) -> bool:
 
 
 class _Files(CopiedLog):
-    """Bags, databases, or several MCAP files; messages of ROS 1 as CDR."""
+    """Bags, databases, or several MCAP files; ROS 1 messages become CDR."""
 
     def __init__(self, files: Sequence[LogFile]) -> None:
         self._files = files
@@ -230,7 +230,7 @@ class _Files(CopiedLog):
             made = self._as_channel(key, channel)
             self._channels[number, channel.id] = made
             if channel.message_encoding == "ros1" and made.message_encoding == "cdr":
-                # Through the definitions with ROS 2's Header: the sequence number of ROS 1's is left out.
+                # Converted with the Header of ROS 2, which drops the sequence number of ROS 1.
                 self._converters[key] = partial(self._target.ros1_to_cdr, typename=made.schema_name)
 
     def channels(self) -> list[CopiedChannel]:
@@ -250,8 +250,8 @@ class _Files(CopiedLog):
                     data = file.decompressed(data)
                 if channel.key in self._converters:
                     data = self._converters[channel.key](bytes(data))
-            except Exception as error:  # whatever a deserializer raises on bytes that are not what they say
-                text = f"{file.path}: a message on {channel.topic} cannot be copied ({error}); it is left out"
+            except Exception as error:  # whatever a deserializer raises on damaged data
+                text = f"{file.path}: a message on {channel.topic} cannot be copied ({error}); skipped"
                 log_warning(logger, "not_copied", text, file=file.path, topic=channel.topic)
                 continue
             yield CopiedMessage(channel, message.log_time_ns, message.publish_time_ns, message.sequence, data)
@@ -276,10 +276,10 @@ class _Files(CopiedLog):
         )
 
     def _definition(self, name: str) -> bytes | None:
-        """Definition of a type in ROS 2's terms, None if it is not known."""
+        """Definition of a type in ROS 2 syntax, or None if it is unknown."""
         try:
             text, _ = self._target.generate_msgdef(name, ros_version=2)
-        except Exception:  # a type that no definition was found for, or that uses one
+        except Exception:  # the type, or one that it uses, has no definition
             return None
         return text.encode()
 
@@ -290,7 +290,7 @@ def _ros2_name(name: str) -> str:
 
 
 def _definitions(channels: Sequence[Channel]) -> dict[str, Any]:
-    """Message types by the definitions in a log, over those that every ROS has."""
+    """Message types defined in a log, in addition to the standard ones."""
     from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 
     is_ros1 = any(channel.message_encoding == "ros1" for channel in channels)
@@ -304,18 +304,18 @@ def _definitions(channels: Sequence[Channel]) -> dict[str, Any]:
                 types.update(get_types_from_msg(text, name))
             elif channel.schema_encoding == "ros2idl":
                 types.update(get_types_from_idl(text))
-        except Exception as error:  # whatever a parser raises on a text that is none
+        except Exception as error:  # whatever a parser raises on an invalid definition
             why = " ".join(str(error).split())
             text = f"the definition of {channel.schema_name} on {channel.topic} cannot be read ({why})"
-            log_warning(logger, "definition", f"{text}; the standard one is taken", topic=channel.topic)
+            log_warning(logger, "definition", f"{text}; the standard one is used", topic=channel.topic)
     return types
 
 
 def _qos_of_version_8(text: str) -> str:
-    """Quality of service as the readers of MCAP files know it; newer bags spell it otherwise."""
+    """Quality of service in the older notation that readers of MCAP files expect."""
     from rosbags.rosbag2.metadata import dump_qos_v8, parse_qos
 
     try:
         return str(dump_qos_v8(parse_qos(text)))
-    except Exception:  # whatever the parser raises; what nobody understands says nothing
+    except Exception:  # whatever the parser raises; an unreadable profile is left empty
         return "[]"

@@ -50,7 +50,7 @@ MARKER_LAYERS = ("rooms", "lines", "walls", "outlines", "doorways", "labels")
 LAYER_STEP_M = 0.01
 DEFAULT_OCCUPANCY = OccupancyParameters()
 TOUCH_M = 1e-3
-"""How much wider a shape is drawn that cannot be triangulated as it is: far below a cell."""
+"""How much a shape is widened that cannot be triangulated as it is: far less than a cell."""
 ADD, DELETE_ALL = 0, 3
 LINE_LIST, TEXT, TRIANGLES = 5, 9, 11
 NO_TURN = (0.0, 0.0, 0.0, 1.0)
@@ -58,14 +58,14 @@ NO_TURN = (0.0, 0.0, 0.0, 1.0)
 
 
 def ros2_typestore(extra: Mapping[str, Any] | None = None, wanted: Iterable[str] | None = None) -> Typestore:
-    """Build a store with the ROS 2 types, what a log defines besides, and the rooms message.
+    """Build a store with the ROS 2 types, the types that a log defines, and the rooms message.
 
     Parameters
     ----------
     extra : mapping of type name to fields, optional
-        Definitions of a bag; ROS 2's own Header wins over that of ROS 1.
+        Definitions from a bag; the Header of ROS 2 takes precedence over that of ROS 1.
     wanted : iterable of str, optional
-        Types that are enough, with all that they are made of: each takes its time.
+        Register only these types and the types that they use: registering all of them is slow.
     """
     from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
@@ -81,7 +81,7 @@ def ros2_typestore(extra: Mapping[str, Any] | None = None, wanted: Iterable[str]
 
 
 def _needed(definitions: Mapping[str, Any], wanted: Iterable[str]) -> dict[str, Any]:
-    """Those of some definitions that the wanted types are made of."""
+    """The wanted definitions and those that they use."""
     found: dict[str, Any] = {}
     left = list(wanted)
     while left:
@@ -93,9 +93,9 @@ def _needed(definitions: Mapping[str, Any], wanted: Iterable[str]) -> dict[str, 
 
 
 def _type_name(kind: Any) -> str:
-    """Name of a field's type, or of the elements of an array; of types without fields it does not matter."""
+    """Name of a field's type, or of an array's elements; for primitive types the result is not used."""
     _, inner = kind
-    # A name, or for an array the kind of its elements and their number, or for a number its name and size.
+    # `inner`: a name; for an array the kind and number of its elements; for a number its name and size.
     return (
         inner if isinstance(inner, str) else inner[0] if isinstance(inner[0], str) else _type_name(inner[0])
     )
@@ -113,24 +113,24 @@ class MessageMaker:
     def __init__(self, occupancy: OccupancyParameters = DEFAULT_OCCUPANCY) -> None:
         self._store = ros2_typestore(wanted=WRITTEN_TYPES)
         self._triangles = Triangles()
-        # What the segmented map holds outside of rooms for each value of a cell, as an unsigned byte.
+        # Value of the segmented map outside of rooms, indexed by the cell's value as an unsigned byte.
         values = np.arange(256, dtype=np.uint8).view(np.int8)
         free, occupied = classify(values, occupancy)
         self._unroomed = np.where(occupied, np.int8(100), np.where(free, np.int8(0), np.int8(UNKNOWN)))
 
     def definition(self, message_type: str) -> bytes:
-        """Text of a type's definition with all it is made of, as MCAP's ros2msg schema."""
+        """Text of a type's definition with the types that it uses, as a ros2msg schema of MCAP."""
         return self._store.generate_msgdef(message_type, ros_version=2)[0].encode()
 
     def source_map(self, step: TrackedSnapshot) -> bytearray:
-        """Make the map itself, for inputs that are no log of messages."""
+        """Make the map itself, for saved maps, which are not messages yet."""
         return _grid(step, step.snapshot.cells)
 
     def segmented_map(self, step: TrackedSnapshot) -> bytearray:
         """Make the segmented map: rooms as 1..98, occupied 100, other free cells 0, all others -1."""
         values = np.array([0, *(1 + (track - 1) % HIGHEST_VALUE for track in step.track_ids)], np.int8)
         labels = step.analysis.rooms.labels
-        # A probability, as some maps hold, would look like a room.
+        # The probabilities that some maps contain would look like rooms.
         known = np.ascontiguousarray(step.snapshot.cells).view(np.uint8)
         cells = cv2.LUT(known, self._unroomed.view(np.uint8)).view(np.int8)
         np.copyto(cells, values.take(labels, mode="clip"), where=labels > 0)
@@ -167,7 +167,7 @@ class MessageMaker:
         return message.message()
 
     def markers(self, step: TrackedSnapshot) -> bytearray:
-        """Make the markers: all old ones deleted, then fills, outlines, labels, walls, lines, doorways."""
+        """Make the markers: delete the old ones, then fills, outlines, labels, walls, lines, doorways."""
         analysis, rooms = step.analysis, step.analysis.rooms
         made = [Marker("", 0, TRIANGLES, action=DELETE_ALL)]
         points = np.nan_to_num(rooms.label_points_m).tolist()
@@ -203,7 +203,7 @@ class MessageMaker:
             made.append(Marker("lines", 0, LINE_LIST, lines, (0.2, 0.4, 0.9, 0.35), LINE_WIDTH_M))
         doors = np.array([door.ends_m for door in rooms.doorways]).reshape(-1, 2)
         made.append(Marker("doorways", 0, LINE_LIST, doors, (0.9, 0.3, 0.1, 1.0), OUTLINE_WIDTH_M))
-        # One above the other, so that none flickers through another or through the map.
+        # At different heights, so that layers do not flicker through each other or through the map.
         heights = {name: LAYER_STEP_M * (layer + 1) for layer, name in enumerate(MARKER_LAYERS)}
         message = CdrWriter()
         message.numbers("I", len(made))
@@ -214,16 +214,16 @@ class MessageMaker:
 
 
 class SharedFields(NamedTuple):
-    """What all markers of a map have in common, as it stands in the message from an aligned place on.
+    """Serialized fields that all markers of a map share; each block starts at an aligned offset.
 
     Attributes
     ----------
     header : bytes
         Stamp and frame.
     after_points : bytes
-        Colors and texture, of which there are none, up to the text.
+        The fields between points and text: colors and texture, both empty.
     after_text : bytes
-        The mesh, of which there is none.
+        The fields after the text: an empty mesh.
     """
 
     header: bytes
@@ -232,7 +232,7 @@ class SharedFields(NamedTuple):
 
     @classmethod
     def of(cls, stamp_ns: int, frame_id: str) -> Self:
-        """Write the fields."""
+        """Serialize the fields."""
         header, after_points, after_text = CdrWriter(), CdrWriter(), CdrWriter()
         header.header(stamp_ns, frame_id)
         after_points.numbers("I", 0)  # colors
@@ -249,14 +249,14 @@ class SharedFields(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Marker:
-    """What differs between the markers of a map: the fields of a visualization_msgs/Marker.
+    """The fields of a visualization_msgs/Marker that differ between the markers of a map.
 
     Attributes
     ----------
     ns, number : str, int
         Namespace and id.
     kind : int
-        Its type.
+        Type of the marker.
     points_m : (N, 2) float
         World meters.
     color : (float, float, float, float)
@@ -264,11 +264,11 @@ class Marker:
     width_m : float
         Scale: the width of lines, the height of text.
     action : int
-        To add it or to delete all.
+        `ADD` or `DELETE_ALL`.
     text : str
-        What it says.
+        Text to show.
     position_m : (float, float)
-        Where the text stands.
+        Position of the text.
     """
 
     ns: str
@@ -282,14 +282,14 @@ class Marker:
     position_m: tuple[float, float] = (0.0, 0.0)
 
     def write(self, message: CdrWriter, shared: SharedFields, height_m: float) -> None:
-        """Append the marker, so high above the map."""
+        """Append the marker, at a height above the map."""
         width_m = self.width_m
         message.written(shared.header, 4)
         message.string(self.ns)
         message.numbers("i", self.number, self.kind, self.action)
         message.numbers("d", *self.position_m, height_m, *NO_TURN, width_m, width_m, width_m)
         message.numbers("f", *self.color)
-        message.numbers("i", 0, 0)  # lifetime: for ever
+        message.numbers("i", 0, 0)  # lifetime: forever
         message.numbers("B", 0)  # frame_locked
         message.points(self.points_m)
         message.written(shared.after_points, 4)
@@ -312,9 +312,9 @@ def _grid(step: TrackedSnapshot, cells: NDArray[np.int8]) -> bytearray:
 
 
 class Triangles:
-    """Fills shapes with triangles; what it found for those of the map before, it gives again.
+    """Splits shapes into triangles, and caches the triangles of the previous map.
 
-    Many a part of a shape is that of the map before, and large ones take long.
+    Most parts of shapes do not change from map to map, and large ones take long to triangulate.
     """
 
     def __init__(self) -> None:
@@ -336,8 +336,8 @@ class Triangles:
 def _triangulated(parts: NDArray[np.object_]) -> list[FloatArray]:
     """Corners (3 K, 2) of the triangles of each polygon.
 
-    GEOS fails on some outlines of cells in which a ring touches itself at a corner; a hair wider they touch
-    along a line instead, and it does not.
+    GEOS fails on some cell outlines in which a ring touches itself at a corner. Slightly widened, they touch
+    along a line instead, and GEOS succeeds.
     """
     try:
         found = shapely.constrained_delaunay_triangles(parts)
@@ -353,6 +353,6 @@ def _triangulated(parts: NDArray[np.object_]) -> list[FloatArray]:
 
 
 def ring_segments(rings: Sequence[FloatArray]) -> FloatArray:
-    """Ends (2 N, 2) of the segments that closed rings are made of, world meters."""
+    """End points (2 N, 2) of the segments of closed rings, world meters."""
     ends = [np.repeat(ring, 2, axis=0)[1:-1] for ring in rings]
     return np.concatenate([np.zeros((0, 2)), *ends])

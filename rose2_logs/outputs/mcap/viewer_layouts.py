@@ -1,4 +1,4 @@
-"""How Foxglove and RViz2 open an annotated log: a layout and a configuration with everything in sight."""
+"""A Foxglove layout and an RViz2 configuration that show an annotated log with everything in view."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from rose2_logs.outputs.mcap.ros_messages import MARKER_LAYERS
 from rose2_logs.system.files import replacing
 
 MARGIN = 1.1
-"""Of what is in sight, over the rooms themselves."""
+"""Size of the view relative to the rooms."""
 RVIZ_VIEW_PX = (1100, 850)
-"""Width and height of RViz's view of the world in the window that the configuration asks for."""
+"""Width and height of RViz's 3D view in the window that the configuration asks for."""
 RVIZ_WINDOW_PX = (1500, 950)
 FOXGLOVE_ASPECT = 1.3
-"""Width over height of Foxglove's large panel in a window of usual shape."""
+"""Width over height of Foxglove's large panel in a typical window."""
 MAP_ALPHA = 0.7
 TRANSIENT_LOCAL, VOLATILE = "Transient Local", "Volatile"
 RELIABLE, BEST_EFFORT = "Reliable", "Best Effort"
@@ -27,18 +27,18 @@ RELIABLE, BEST_EFFORT = "Reliable", "Best Effort"
 
 @dataclass(frozen=True, eq=False)
 class MapScene:
-    """What is to be seen.
+    """What the viewers should show.
 
     Attributes
     ----------
     frame_id : str
         Frame of the map.
     map_topic : str
-        Where the map is sent.
+        Topic of the map.
     low_m, high_m : (2,) float
-        Corners of the part of the world to look at, meters.
+        Corners of the area to show, meters.
     qos : str
-        Quality of service that all these topics are offered with, in rosbag2's spelling.
+        Quality of service that all these topics are offered with, in rosbag2's notation.
     """
 
     frame_id: str
@@ -49,33 +49,33 @@ class MapScene:
 
     @property
     def center_m(self) -> tuple[float, float]:
-        """Middle of what is in sight."""
+        """Center of the area to show."""
         x, y = ((self.low_m + self.high_m) / 2).tolist()
         return x, y
 
     def height_m(self, aspect: float) -> float:
-        """Height of the least view of some width over height that shows everything."""
+        """Height of the smallest view with a given width over height that shows everything."""
         width, height = self.high_m - self.low_m
         return MARGIN * float(max(width / aspect, height, 1.0))
 
 
 def foxglove_path(log: Path) -> Path:
-    """Where the layout of an annotated log stands."""
+    """Path of the Foxglove layout of an annotated log."""
     return log.with_suffix(".foxglove.json")
 
 
 def rviz_path(log: Path) -> Path:
-    """Where the configuration for an annotated log stands."""
+    """Path of the RViz2 configuration of an annotated log."""
     return log.with_suffix(".rviz")
 
 
 def bag_metadata_path(log: Path) -> Path:
-    """Where rosbag2 looks for the description of the bag that an annotated log makes."""
+    """Path at which rosbag2 looks for the description of a bag."""
     return log.with_name("metadata.yaml")
 
 
 def write_layouts(log: Path, scene: MapScene) -> None:
-    """Write layout and configuration beside an annotated log.
+    """Write layout and configuration next to an annotated log.
 
     Raises
     ------
@@ -89,7 +89,7 @@ def write_layouts(log: Path, scene: MapScene) -> None:
 
 
 def foxglove_layout(scene: MapScene) -> dict[str, Any]:
-    """Make a layout: rooms over the map, the clean map, coverage and number of rooms, the robot's frames."""
+    """Make a Foxglove layout: rooms over the map, clean map, coverage, number of rooms, robot frames."""
     rooms = {
         scene.map_topic: {"visible": True, "colorMode": "map", "alpha": MAP_ALPHA},
         "/rose2/markers": {
@@ -139,7 +139,7 @@ def _foxglove_world(title: str, scene: MapScene, topics: dict[str, Any]) -> dict
     return {
         "foxglovePanelTitle": title,
         "cameraState": {
-            # Seen straight from above, without perspective; the distance is the height of what is in sight.
+            # From straight above, without perspective; the distance equals the height of the view.
             "perspective": False,
             "phi": 0,
             "thetaOffset": 0,
@@ -174,7 +174,7 @@ def _foxglove_plot(title: str, path: str) -> dict[str, Any]:
 
 
 def rviz_config(scene: MapScene) -> dict[str, Any]:
-    """Make a configuration of RViz2: the maps, the markers over them, the frames, seen from above."""
+    """Make an RViz2 configuration: the maps, the markers over them, the frames, seen from above."""
     x, y = scene.center_m
     width, height = RVIZ_VIEW_PX
     displays = [
@@ -255,7 +255,7 @@ def _rviz_map(name: str, topic: str, scene: MapScene, *, is_on: bool, colors: st
 
 
 def _rviz_topic(topic: str, scene: MapScene) -> dict[str, Any]:
-    """Ask for what is offered: a subscriber that asks for more is not served."""
+    """Request exactly the quality of service that is offered: requesting more gets no messages."""
     durability, reliability = offered(scene.qos)
     return {
         "Depth": 1,
@@ -267,9 +267,9 @@ def _rviz_topic(topic: str, scene: MapScene) -> dict[str, Any]:
 
 
 def offered(qos: str) -> tuple[str, str]:
-    """Durability and reliability of a topic, as RViz spells them, from rosbag2's list of its publishers.
+    """Durability and reliability of a topic, in RViz's notation, from rosbag2's list of its publishers.
 
-    Numbers, up to the release Iron, are those of rmw: 1 is transient local and reliable.
+    Up to the release Iron they are numbers of rmw: 1 is transient local and reliable.
     """
     try:
         profiles = yaml.safe_load(qos)

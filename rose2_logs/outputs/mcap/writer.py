@@ -1,6 +1,6 @@
-"""An MCAP file written from messages, and from chunks of another file, which go in compressed as they are.
+"""Writing an MCAP file from messages and from chunks of another file, which are copied compressed.
 
-The mcap package's own writer takes messages only, so that a copy would decompress and compress everything.
+The writer of the mcap package accepts only messages, so a copy would decompress and compress everything.
 """
 
 from __future__ import annotations
@@ -35,23 +35,23 @@ from mcap.records import (
 from rose2_logs.io.mcap.records import INDEX, INDEX_ENTRY, MAGIC, RECORD
 
 CHUNK_BYTES = 1 << 20
-"""Messages are compressed together from this size on; as the mcap package's writer does."""
+"""Size of uncompressed messages from which a chunk is written, as in the writer of the mcap package."""
 COPIED_AT_ONCE = 16 << 20
 """Bytes of a chunk that are in memory at a time while it is copied."""
 
-# Head of a record and what a message begins with, for one call: channel, sequence, log time, publish time.
+# Record head and start of a message, packed in one call: channel, sequence, log time, publish time.
 _MESSAGE = struct.Struct("<BQHIQQ")
 
 
 class McapWriter:
-    """Writes one indexed MCAP file; `finish` makes it whole, the stream is the caller's.
+    """Writes one indexed MCAP file; `finish` completes it, and the caller closes the stream.
 
     Parameters
     ----------
     stream : binary file
-        At its beginning.
+        Positioned at its start.
     profile, library : str
-        Of the header.
+        For the header.
     """
 
     def __init__(self, stream: IO[bytes], profile: str, library: str) -> None:
@@ -63,7 +63,7 @@ class McapWriter:
         self._chunks: list[ChunkIndex] = []
         self._attachments: list[AttachmentIndex] = []
         self._metadata: list[MetadataIndex] = []
-        # The chunk in the making: its records, and the log time and offset of each message by channel.
+        # The current chunk: its records, and the log time and offset of each message by channel.
         self._records = bytearray()
         self._entries: dict[int, list[tuple[int, int]]] = {}
         self._compressor = zstandard.ZstdCompressor()
@@ -71,7 +71,7 @@ class McapWriter:
         self._write_record(Header(profile, library))
 
     def register_schema(self, name: str, encoding: str, data: bytes, wanted_id: int | None = None) -> int:
-        """Add a schema and return its id: the wanted one, which is not 0, if it is free."""
+        """Add a schema and return its id: the wanted one, which must not be 0, if it is free."""
         number = _free_id(wanted_id, self._schemas)
         self._schemas[number] = Schema(id=number, name=name, encoding=encoding, data=data)
         self._write_record(self._schemas[number])
@@ -85,7 +85,7 @@ class McapWriter:
         metadata: dict[str, str],
         wanted_id: int | None = None,
     ) -> int:
-        """Add a channel and return its id: the wanted one, 0 too, if it is free; schema 0 is none."""
+        """Add a channel and return its id: the wanted one if it is free; schema 0 means no schema."""
         number = _free_id(wanted_id, self._channels)
         self._channels[number] = Channel(
             id=number, topic=topic, message_encoding=message_encoding, schema_id=schema_id, metadata=metadata
@@ -101,7 +101,7 @@ class McapWriter:
         publish_time: int,
         sequence: int,
     ) -> None:
-        """Add one message to the chunk in the making; log time and publish time in nanoseconds."""
+        """Add one message to the current chunk; log time and publish time in nanoseconds."""
         self._entries.setdefault(channel_id, []).append((log_time, len(self._records)))
         length = _MESSAGE.size - RECORD.size + len(data)
         self._records += _MESSAGE.pack(Opcode.MESSAGE, length, channel_id, sequence, log_time, publish_time)
@@ -110,21 +110,21 @@ class McapWriter:
             self.flush()
 
     def copy_chunk(self, source: IO[bytes], index: ChunkIndex) -> None:
-        """Copy a chunk with its message index, which follows it, as they are.
+        """Copy a chunk and the message index that follows it, unchanged.
 
         Parameters
         ----------
         source : binary file
-            Holds the chunk.
+            File that contains the chunk.
         index : ChunkIndex
-            Where it lies, from the source's summary. Its channels must be registered under the same ids.
+            Where it is, from the source's summary. Its channels must be registered under the same ids.
 
         Raises
         ------
         OSError
             If the file ends before the chunk does, or cannot be read or written.
         ValueError
-            If the message index is damaged; nothing is written then.
+            If the message index is damaged; then nothing is written.
         """
         source.seek(index.chunk_start_offset + index.chunk_length)
         counts = _indexed_messages(_read(source, index.message_index_length))
@@ -167,7 +167,7 @@ class McapWriter:
         self._metadata.append(MetadataIndex(offset=offset, length=length, name=name))
 
     def flush(self) -> None:
-        """Write the chunk in the making, if it holds a message."""
+        """Write the current chunk, if it has messages."""
         if not self._entries:
             return
         times = [time for entries in self._entries.values() for time, _ in entries]
@@ -230,7 +230,7 @@ class McapWriter:
         for place in places:
             place.write(summary)
         written: bytes = summary.end()  # type: ignore[no-untyped-call]
-        # The checksum of the summary covers the footer up to where it stands.
+        # The checksum of the summary covers the footer up to the checksum itself.
         footer = RecordBuilder()
         Footer(summary_start=summary_start, summary_offset_start=offsets_start, summary_crc=0).write(footer)
         checked: bytes = footer.end()[:-4]  # type: ignore[no-untyped-call]
@@ -253,7 +253,7 @@ class McapWriter:
         )
 
     def _write_record(self, record: Any) -> tuple[int, int]:
-        """Write a record; returns its offset and length."""
+        """Write a record and return its offset and length."""
         builder = RecordBuilder()
         record.write(builder)
         offset, data = self._offset, builder.end()  # type: ignore[no-untyped-call]
@@ -274,12 +274,12 @@ def _free_id(wanted: int | None, taken: dict[int, Any]) -> int:
 def _read(source: IO[bytes], length: int) -> bytes:
     data = source.read(length)
     if len(data) != length:
-        raise OSError("the log ends within a chunk")
+        raise OSError("the log ends in the middle of a chunk")
     return data
 
 
 def _indexed_messages(message_index: bytes) -> Counter[int]:
-    """Messages by channel that a row of message index records counts; ValueError if it is no such row."""
+    """Number of messages by channel in consecutive message index records; ValueError if they are damaged."""
     counts: Counter[int] = Counter()
     place = 0
     while place < len(message_index):

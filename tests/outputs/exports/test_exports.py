@@ -18,6 +18,7 @@ import shapely
 import yaml
 from drawn_plans import LEFT, RIGHT, two_rooms_plan
 from PIL import Image
+from rose2_logs.runs.folder import RunResults
 from shapely.geometry import shape
 
 from rose2_logs.config.parameters import OccupancyParameters
@@ -27,7 +28,6 @@ from rose2_logs.model.occupancy import GridGeometry
 from rose2_logs.model.room_plan import PlanMap
 from rose2_logs.outputs.exports.dxf import LAYERS
 from rose2_logs.outputs.exports.formats import FORMATS, planned_files, write_plan
-from rose2_logs.runs.folder import RunResults
 
 
 @pytest.fixture(params=[0.0, 0.4], ids=["straight", "turned"])
@@ -224,7 +224,7 @@ def test_a_real_plan_is_read_back(real_plan, tmp_path: Path):
 
 
 def test_an_unknown_format_is_named(plan, tmp_path: Path):
-    with pytest.raises(ParameterError, match="there are: geojson, svg, dxf, map_server, graph"):
+    with pytest.raises(ParameterError, match="choose one of geojson, svg, dxf, map_server, graph"):
         planned_files(["pdf"], tmp_path, "two")
 
 

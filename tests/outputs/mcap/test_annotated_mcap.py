@@ -177,7 +177,7 @@ def test_channels_of_other_encodings_attachments_and_empty_channels_are_kept(tmp
 
 def test_an_annotated_log_is_not_annotated_again_and_nothing_is_left_behind(tmp_path):
     once = annotate(save_run(tmp_path / "run"), tmp_path / "out")
-    with pytest.raises(OutputError, match="holds /rose2/"):
+    with pytest.raises(OutputError, match="already has /rose2/"):
         annotate(once, tmp_path / "again")
     assert not [file for file in (tmp_path / "again").rglob("*") if file.is_file()]
 
