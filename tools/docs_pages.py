@@ -46,9 +46,7 @@ def commands_page() -> str:
     """Every command with its arguments and options, as its help tells them."""
     group: Any = typer.main.get_command(app)
     lines = ["# Commands", "", _text(group.help), ""]
-    lines += [
-        "Exit codes: 0 done; 1 a fault of the tool; 2 a log, a file or an option cannot be used (one line"
-    ]
+    lines += ["Exit codes: 0 done; 1 internal error; 2 a log, a file or an option cannot be used (one line"]
     lines += ["says which); 130 interrupted.", "", *_options_table(group.params)]
     for name, command in group.commands.items():
         lines += ["", f"## {name}", "", _text(command.help), ""]

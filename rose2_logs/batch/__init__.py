@@ -1,1 +1,1 @@
-"""Many logs into one folder: by workers here or on a cluster; stopped, it can go on later."""
+"""Many logs into one folder of results: by workers on this machine or on a cluster; can be resumed."""

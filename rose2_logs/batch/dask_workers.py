@@ -1,4 +1,4 @@
-"""Workers of a Dask cluster: its scheduler gives the log of one that is lost to another."""
+"""Workers of a Dask cluster, whose scheduler gives the log of a lost worker to another one."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from rose2_logs.system.workers import WorkerError
 logger = logging.getLogger(__name__)
 
 CONNECT_TIMEOUT_S = 10.0
-"""For the scheduler to answer at all."""
+"""Maximum time for the scheduler to answer."""
 LOOK_EVERY_S = 2.0
-"""Between two looks at whether the scheduler is still there and has workers."""
+"""Time between two checks whether the scheduler still answers and has workers."""
 
 
 class DaskWorkers:
-    """The workers of a Dask cluster; a context manager that cancels what is left and lets the cluster go.
+    """The workers of a Dask cluster; a context manager that cancels what is left and disconnects.
 
     Parameters
     ----------
     address : str
-        Of the scheduler, ``tcp://HOST:8786`` or ``HOST:8786``, or the path of its scheduler file.
+        Address of the scheduler, ``tcp://HOST:8786`` or ``HOST:8786``, or the path of its scheduler file.
 
     Raises
     ------
@@ -77,14 +77,14 @@ class DaskWorkers:
         self._client.close(timeout=CONNECT_TIMEOUT_S)
 
     def submit(self, task: LogTask) -> None:
-        """Take a task."""
+        """Accept a task."""
         key = f"rose2-logs-{task.name}-{uuid.uuid4().hex}"
         future = self._client.submit(analyze_on_worker, task, self._topic, key=key, pure=False)
         self._tasks[future] = task
         future.add_done_callback(self._told.put)
 
     def events(self) -> Iterator[Progress | LogOutcome]:
-        """Yield what the workers tell until no task is left; tasks may be submitted meanwhile.
+        """Yield what the workers report until no task is left; more may be submitted in the meantime.
 
         Raises
         ------
@@ -106,7 +106,7 @@ class DaskWorkers:
                 yield self._outcome(told, self._tasks.pop(told))
 
     def _look(self) -> None:
-        """Find out what would make the wait endless."""
+        """Notice what would make the wait endless."""
         lost = any(future.status in ("lost", "cancelled") for future in self._tasks)
         if lost or self._client.status in ("closing", "closed"):
             raise self._is_gone()
@@ -123,7 +123,7 @@ class DaskWorkers:
 
     def _is_gone(self) -> WorkerError:
         return WorkerError(
-            f"the Dask scheduler at {self._address} is gone; the same command again goes on with the rest"
+            f"the Dask scheduler at {self._address} is gone; the same call again analyzes the rest"
         )
 
     def _outcome(self, future: Any, task: LogTask) -> LogOutcome:
@@ -151,7 +151,7 @@ class DaskWorkers:
 
 
 def analyze_on_worker(task: LogTask, topic: str) -> LogOutcome:
-    """Do a task in a Dask worker, with its progress told through the scheduler."""
+    """Carry out a task in a Dask worker; its progress is reported through the scheduler."""
     from distributed import get_worker
 
     worker = get_worker()

@@ -1,4 +1,4 @@
-"""The tables of all logs as one data set, partitioned by log, and a table that sums up the logs."""
+"""The tables of all logs as one data set, partitioned by log, and a summary with one row per log."""
 
 from __future__ import annotations
 
@@ -26,21 +26,21 @@ SUMMARY_COLUMNS: dict[str, tuple[pa.DataType, str]] = {
     "log": (pa.string(), "name of the log: its folder under logs/, its partition under tables/"),
     "status": (pa.string(), "done or failed"),
     "reason": (pa.string(), "why it failed"),
-    "source": (pa.string(), "where the log lies"),
+    "source": (pa.string(), "path or URL of the log"),
     "size_bytes": (pa.int64(), "size of the log"),
     "sha256": (pa.string(), "fingerprint of the log"),
     "method": (pa.string(), "segmentation method"),
     "version": (pa.string(), "version of rose2-logs"),
     "snapshots": (pa.int32(), "maps that were analyzed"),
     "invalid_maps": (pa.int32(), "maps that could not be analyzed"),
-    "first_log_time_ns": (pa.int64(), "of the first map, nanoseconds since the epoch"),
-    "last_log_time_ns": (pa.int64(), "of the last map, nanoseconds since the epoch"),
+    "first_log_time_ns": (pa.int64(), "log time of the first map, nanoseconds since the epoch"),
+    "last_log_time_ns": (pa.int64(), "log time of the last map, nanoseconds since the epoch"),
     "coverage_first": (
         pa.float64(),
         "known free area of the first map over that of the last, share in [0, 1]",
     ),
     "rooms_last": (pa.int32(), "rooms of the last map"),
-    "tracks": (pa.int32(), "rooms over the run"),
+    "tracks": (pa.int32(), "distinct rooms over the run"),
     "splits": (pa.int32(), "rooms that split"),
     "merges": (pa.int32(), "rooms that merged"),
     "run_s": (pa.float64(), "wall-clock time of the analysis, seconds"),
@@ -53,8 +53,8 @@ Row = dict[str, Any]
 def publish_tables(out: Path, name: str) -> None:
     """Make the tables of a finished log part of the data set: ``tables/TABLE/log=NAME/TABLE.parquet``.
 
-    They share the bytes on the disk with those in the log's folder where the file system can. Of a log that
-    was not projected back there is no such table.
+    They are hard links to those in the log's folder where the file system has such. A log that was analyzed
+    without back projection has no table of it.
 
     Raises
     ------
@@ -81,7 +81,7 @@ def publish_tables(out: Path, name: str) -> None:
 
 
 def withdraw_tables(out: Path, names: Sequence[str]) -> None:
-    """Take out of the data set what belongs to none of the finished logs.
+    """Remove from the data set what belongs to none of the finished logs.
 
     Raises
     ------
@@ -96,7 +96,7 @@ def withdraw_tables(out: Path, names: Sequence[str]) -> None:
 
 
 def summary_row(out: Path, name: str) -> Row:
-    """Sum up the results of a finished log; one whose summary somebody damaged counts as failed."""
+    """Make the row of a finished log; one whose summary.json cannot be read counts as failed."""
     path = out / LOGS_FOLDER / name / SUMMARY
     try:
         kept = json.loads(path.read_text(encoding="utf-8"))
@@ -126,8 +126,8 @@ def summary_row(out: Path, name: str) -> Row:
 
 
 def failed_row(name: str, source: str, reason: str) -> Row:
-    """Sum up a log that failed."""
-    # A name that is not UTF-8 may stand in it.
+    """Make the row of a log that failed."""
+    # It may hold a name that is not UTF-8.
     told = " ".join(reason.split()).encode(errors="backslashreplace").decode()
     known = {"log": name, "status": "failed", "source": source, "reason": told}
     return dict.fromkeys(SUMMARY_COLUMNS) | known

@@ -1,4 +1,4 @@
-"""A batch from beginning to end: planned, worked off, put in place; stopped, it leaves whole results only."""
+"""A batch: planned, carried out, its results put in place. A stopped one leaves only whole results."""
 
 from __future__ import annotations
 
@@ -16,10 +16,9 @@ from typing import Protocol
 
 from rose2_logs.batch import dataset
 from rose2_logs.batch.finding import find_logs
-from rose2_logs.batch.folders import LOGS_FOLDER, locked, put_in_place, work_folder
+from rose2_logs.batch.folders import LOGS_FOLDER, assign_names, locked, put_in_place, work_folder
 from rose2_logs.batch.local_workers import LocalWorkers
 from rose2_logs.batch.location import Location
-from rose2_logs.batch.names import assign_names
 from rose2_logs.batch.options import BatchOptions
 from rose2_logs.batch.record import Record, Signature, deciding_settings, local_signature, read_record
 from rose2_logs.batch.task import LogOutcome, LogTask, Progress
@@ -39,13 +38,13 @@ class LogState:
     Attributes
     ----------
     name : str
-        Of its folder and partition.
+        Name of its folder and of its partition of the data set.
     status : str
         ``done``, ``up to date`` or ``failed``.
     row : dict
-        As in the summary table.
+        Its row of the summary.
     outcome : LogOutcome, optional
-        What its worker told; none if none had to look at it.
+        What its worker reported; None if no worker was needed.
     """
 
     name: str
@@ -56,7 +55,7 @@ class LogState:
 
 @dataclass(frozen=True)
 class BatchResult:
-    """What became of a batch: its logs by name, and the files of the summary, which tells of all logs."""
+    """The outcome of a batch: what became of its logs, sorted by name, and the files of the summary."""
 
     out: Path
     states: tuple[LogState, ...]
@@ -64,44 +63,44 @@ class BatchResult:
 
     @property
     def failed(self) -> tuple[LogState, ...]:
-        """The logs that failed."""
+        """Logs that could not be analyzed."""
         return tuple(state for state in self.states if state.status == "failed")
 
 
 class Listener(Protocol):
-    """Told of a batch's progress."""
+    """Shows the progress of a batch."""
 
     def begin(self, logs: int, up_to_date: int) -> None:
-        """Hear of how many logs it is about, and how many of these there is nothing to do for."""
+        """Show how many logs there are and how many of them are up to date; called once, first."""
         ...
 
     def progress(self, told: Progress) -> None:
-        """Hear how far a log is."""
+        """Show how far a log is."""
         ...
 
     def retry(self, name: str, reason: str) -> None:
-        """Hear that a log is tried again, and why."""
+        """Show that a log is tried again, and why."""
         ...
 
     def finished(self, state: LogState) -> None:
-        """Hear what became of a log."""
+        """Show what became of a log."""
         ...
 
 
 class Workers(AbstractContextManager["Workers"], Protocol):
-    """Does tasks somewhere else."""
+    """Processes, here or on other machines, that analyze logs."""
 
     def submit(self, task: LogTask) -> None:
-        """Take a task."""
+        """Accept a task."""
         ...
 
     def events(self) -> Iterator[Progress | LogOutcome]:
-        """Yield what the workers tell until no task is left; tasks may be submitted meanwhile."""
+        """Yield what the workers report until no task is left; more may be submitted in the meantime."""
         ...
 
 
 def run_batch(arguments: Sequence[str], out: Path, options: BatchOptions, listener: Listener) -> BatchResult:
-    """Analyze many logs into one folder.
+    """Analyze many logs, each to a folder of its own, with one data set and one summary of all.
 
     Each log's results go to ``out/logs/NAME``, as `analyze_log` writes them; the tables of all logs to
     ``out/tables``, partitioned by log; one row per log to ``out/summary.parquet`` and ``out/summary.csv``.
@@ -115,7 +114,7 @@ def run_batch(arguments: Sequence[str], out: Path, options: BatchOptions, listen
     out : path
         Where to; it is made. Workers on other machines must see it at the same path.
     options : BatchOptions
-        How.
+        What to take from each log, how to analyze it, and by which workers.
     listener : Listener
         To show progress.
 
@@ -126,10 +125,10 @@ def run_batch(arguments: Sequence[str], out: Path, options: BatchOptions, listen
     ParameterError
         If the scheduler does not answer.
     OutputError
-        If the folder cannot be used, another batch is writing to it, or holds results of other settings that
-        may not be replaced.
+        If the folder cannot be used, another batch is writing to it, or it holds results of other options
+        that may not be replaced.
     WorkerError
-        If the scheduler is lost along the way.
+        If the scheduler is lost.
     """
     # A path holds one of the two slashes of a URL.
     if re.match(r"[a-z][a-z0-9+.-]+:/", str(out)):
@@ -141,14 +140,14 @@ def run_batch(arguments: Sequence[str], out: Path, options: BatchOptions, listen
         batch = _Batch(out, work, options, listener)
         tasks = batch.plan(logs)
         try:
-            batch.work_off(tasks)
+            batch.carry_out(tasks)
         finally:
             files = batch.sum_up()
     return BatchResult(out, tuple(sorted(batch.states, key=lambda state: state.name)), files)
 
 
 class _Batch:
-    """The state of a batch that runs: what stands, what is under way, what became of the logs so far."""
+    """A running batch: earlier results, tasks under way, and what became of the logs so far."""
 
     def __init__(self, out: Path, work: Path, options: BatchOptions, listener: Listener) -> None:
         self.states: list[LogState] = []
@@ -162,9 +161,9 @@ class _Batch:
         self._records = {folder.name: read_record(folder) for folder in folders}
 
     def plan(self, logs: Sequence[Location]) -> list[LogTask]:
-        """Name the logs, and find out for which there is something to do."""
+        """Name the logs, and make a task of each that is not up to date."""
         by_address = {record.address: name for name, record in self._records.items() if record is not None}
-        looks = {log: _look_at(log) for log in logs}
+        looks = {log: _local_look(log) for log in logs}
         names = assign_names(logs, by_address, self._records)
         moved = self._moved(looks, by_address)
         self._check_settings({*names.values(), *moved.values()})
@@ -187,8 +186,8 @@ class _Batch:
         # Large logs first, so that none is left alone at the end.
         return [task for _, task in sorted(tasks, key=lambda each: -each[0])]
 
-    def work_off(self, tasks: Sequence[LogTask]) -> None:
-        """Have the tasks done, and put in place what comes out."""
+    def carry_out(self, tasks: Sequence[LogTask]) -> None:
+        """Have the tasks carried out, and put their results in place."""
         if not tasks:
             return
         under_way = {task.name: task for task in tasks}
@@ -235,14 +234,14 @@ class _Batch:
         }
 
     def _standing(self, name: str) -> Record | None:
-        """Record of results that stand and are of the same settings."""
+        """Record of earlier results that were made with the same options."""
         record = self._records.get(name)
         if record is None or self._options.rerun or record.difference(self._settings):
             return None
         return record
 
     def _is_whole(self, name: str) -> bool:
-        """Whether results that stand have all the files that are wanted now."""
+        """Whether earlier results have all the files that are wanted now."""
         wanted = [SUMMARY, *(f"{table}.parquet" for table in TABLES)]
         asked, record = self._options.run, self._records.get(name)
         if asked.recording and record is not None and record.layers != asked.layers:
@@ -255,7 +254,7 @@ class _Batch:
         return all(next(folder.glob(each), None) for each in wanted)
 
     def _check_settings(self, names: set[str]) -> None:
-        """A data set is of one kind: results of other settings are replaced, or nothing is done."""
+        """Refuse to mix results of different options in one data set, unless they may be replaced."""
         others = {
             name: difference
             for name, record in self._records.items()
@@ -264,13 +263,13 @@ class _Batch:
         if others and not self._may_replace:
             name, difference = next(iter(others.items()))
             raise OutputError(
-                f"{self._out}: holds results of other settings ({len(others)} logs; {name}: {difference}); "
+                f"{self._out}: holds results of other options ({len(others)} logs; {name}: {difference}); "
                 "choose another folder, or allow overwriting to analyze the logs given now again "
                 "(overwrite=True)"
             )
         if left := sorted(set(others) - names):
             logger.warning(
-                "%d logs that are not among those given now keep results of other settings (%s: %s)",
+                "%d logs that are not among those given now keep results of other options (%s: %s)",
                 len(left),
                 left[0],
                 others[left[0]],
@@ -284,7 +283,7 @@ class _Batch:
         return DaskWorkers(self._options.scheduler)
 
     def _take(self, task: LogTask, outcome: LogOutcome) -> None:
-        """Put what came out of a task in its place."""
+        """Put the results of a task in place and report it."""
         name = task.known_name if outcome.status == "unchanged" else task.name
         folder = self._out / LOGS_FOLDER / name
         try:
@@ -306,8 +305,8 @@ class _Batch:
         self._listener.finished(self.states[-1])
 
 
-def _look_at(log: Location) -> Signature | None:
-    """Signature of a log on this machine. What is elsewhere, or cannot be read, is the workers' business."""
+def _local_look(log: Location) -> Signature | None:
+    """Signature of a log on this machine; None if it is elsewhere or cannot be read: a worker will see."""
     if log.is_remote:
         return None
     try:

@@ -16,7 +16,7 @@ from rose2_logs.io.discovery import MAP_ENDINGS, STORAGE_ENDINGS, is_bag, is_sto
 
 
 def find_logs(arguments: Sequence[str], out: Path) -> list[Location]:
-    """Find the logs that arguments mean.
+    """Find the logs that arguments stand for.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def find_logs(arguments: Sequence[str], out: Path) -> list[Location]:
         returned: opening it tells why.
     """
     found: dict[str, Location] = {}
-    # Many arguments lie in one folder: it is looked at once.
+    # Many arguments lie in the same folder, which is looked at only once.
     is_bag_at = cache(_is_bag_at)
     for argument in arguments:
         path = _local_path(argument)

@@ -1,4 +1,4 @@
-"""Worker processes on this machine: each does log after log; one that dies takes only its own with it."""
+"""Worker processes on this machine: each analyzes log after log; one that dies fails only its own log."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from rose2_logs.batch.task import LogOutcome, LogTask, Progress, analyze_task
 from rose2_logs.system.workers import limit_process_to_one_thread, usable_processes
 
 DEATH_TIMEOUT_S = 5.0
-"""For a process that has closed its pipe to be gone, so that its exit code can be told."""
+"""Waited for a process that has closed its pipe to end, so that its exit code is known."""
 
 
 class LocalWorkers:
-    """A pool of worker processes, started as they are needed; a context manager that ends them.
+    """A pool of worker processes, started when needed; a context manager that ends them.
 
     Parameters
     ----------
     count : int
-        Most processes at a time, see `usable_processes`.
+        Maximum number of processes, see `usable_processes`.
     """
 
     def __init__(self, count: int) -> None:
@@ -46,11 +46,11 @@ class LocalWorkers:
             worker.end()
 
     def submit(self, task: LogTask) -> None:
-        """Take a task; it is begun when those before it are."""
+        """Accept a task; tasks are begun in their order."""
         self._waiting.append(task)
 
     def events(self) -> Iterator[Progress | LogOutcome]:
-        """Yield what the workers tell until no task is left; tasks may be submitted meanwhile."""
+        """Yield what the workers report until no task is left; more may be submitted in the meantime."""
         while self._waiting or self._busy:
             while self._waiting and len(self._busy) < self._count:
                 worker = self._idle.pop() if self._idle else _Worker()
@@ -82,12 +82,12 @@ class _Worker:
 
     def begin(self, task: LogTask) -> None:
         self._task = task
-        # To a process that has just died nothing can be sent; `told` finds out.
+        # The process may have just died, which `told` will notice.
         with suppress(OSError):
             self.connection.send(task)
 
     def told(self) -> Progress | LogOutcome:
-        """Receive what the process tells; of one that died, the outcome of its task."""
+        """Receive what the process reports; if it died, the outcome of its task."""
         try:
             told: Progress | LogOutcome = self.connection.recv()
         except (EOFError, OSError):
@@ -112,7 +112,7 @@ class _Worker:
 
 
 def _serve(connection: Connection) -> None:
-    """Do the tasks that come through a pipe, one by one, until it is closed."""
+    """Carry out the tasks that come through a pipe, one by one, until it is closed."""
     # Ctrl-C reaches the whole group of processes; the parent ends its workers itself.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()

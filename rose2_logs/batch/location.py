@@ -1,4 +1,4 @@
-"""Where a log lies, and from the command line's arguments to the logs that they mean."""
+"""Where a log lies: a path or a URL."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rose2_logs.system.files import readable
 
 WEB_SCHEMES = ("http://", "https://")
 _SIGNED = re.compile("signature|token|credential|^sig$", re.IGNORECASE)
-"""Names of query parameters of URLs that were signed for a while, by the large object stores."""
+"""Names of query parameters in the signed URLs of the large object stores."""
 
 
 @dataclass(frozen=True, order=True)
@@ -28,12 +28,12 @@ class Location:
 
     @property
     def is_remote(self) -> bool:
-        """Whether it is a URL, which fsspec opens."""
+        """Whether it is a URL, to be opened by fsspec."""
         return "://" in self.target
 
     @property
     def address(self) -> str:
-        """The path or URL without passwords and signatures: what a log is known by, and what may be shown."""
+        """The path or URL without passwords and signatures, which identifies a log and may be shown."""
         if not self.is_remote:
             return readable(self.target)
         if "::" in self.target:

@@ -1,4 +1,4 @@
-"""What is kept beside a log's results so that a batch can go on: which log, how it looked, the settings."""
+"""What is kept beside the results of a log so that a batch can be resumed: log, signature, options."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def deciding_settings(options: RunOptions) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Signature:
-    """How the files of a log look from outside: what can be told without reading them.
+    """What is known of the files of a log without reading them.
 
     The log's fingerprint is the SHA-256 of all its bytes (`provenance.fingerprint`), which a run computes
     anyway. It need not be computed again as long as the signature is the same. Of local files the signature
@@ -55,7 +55,7 @@ class Signature:
 
     @property
     def size_bytes(self) -> int:
-        """Of all files, as far as known."""
+        """Size of all files, as far as known."""
         return sum(size or 0 for _, size, _ in self.files)
 
     def proves_unchanged_since(self, earlier: Signature) -> bool:
@@ -89,20 +89,20 @@ def local_signature(log: Path) -> Signature:
 
 @dataclass(frozen=True)
 class Record:
-    """Of one log's results.
+    """What is kept beside the results of one log.
 
     Attributes
     ----------
     address : str
-        Where the log lay.
+        Path or URL of the log.
     signature : Signature
-        How it looked.
+        Signature of the log.
     sha256 : str
-        Its fingerprint.
+        Fingerprint of the log.
     settings : dict
         `deciding_settings`.
     layers : tuple of str
-        Those of the recording, if there is one.
+        Layers of the recording, if there is one.
     """
 
     address: str
@@ -122,7 +122,7 @@ class Record:
         write_json(folder / RECORD, dataclasses.asdict(self))
 
     def difference(self, settings: dict[str, Any]) -> str:
-        """Tell the first of the settings that are not those of the record, or nothing."""
+        """Describe the first of the settings that differs from that of the record; empty if none does."""
         for name in (*settings, *self.settings):
             before, now = self.settings.get(name), settings.get(name)
             if before != now:
@@ -133,7 +133,7 @@ class Record:
 
 
 def read_record(folder: Path) -> Record | None:
-    """Read what is kept beside a log's results; None if there is nothing that can be used."""
+    """Read the record beside the results of a log; None if there is none that can be used."""
     try:
         kept = json.loads((folder / RECORD).read_text(encoding="utf-8"))
         files = tuple((name, size, tuple(version)) for name, size, version in kept["signature"]["files"])

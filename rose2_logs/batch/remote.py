@@ -1,4 +1,4 @@
-"""Logs behind URLs, by fsspec: listed, told apart by what their server says of them, and fetched."""
+"""Logs behind URLs, by fsspec: listed, identified by what their server says of them, and fetched."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ VERSION_KEYS = (
     "mtime",
     "updated",
 )
-"""What servers and object stores call the version of a file in fsspec's answers; any one is enough."""
+"""What servers and object stores call the version of a file in the answers of fsspec; one is enough."""
 CONNECT_TIMEOUT_S, SILENCE_TIMEOUT_S = 30.0, 60.0
-"""Of HTTP: as long as bytes come, a log of any size may take its time."""
+"""Of HTTP; a download may take any time as long as bytes arrive."""
 PASSING_STATUS = (408, 429)
-"""Answers of HTTP that refuse for the time being: too slow, too many."""
+"""HTTP codes of errors that may pass: timeout, too many requests."""
 
 
 class TransferError(LogError):
@@ -54,7 +54,7 @@ class RemoteFile:
     name : str
         Path relative to the folder that the log is fetched into.
     size_bytes : int or None
-        None if the server does not tell.
+        None if the server does not say.
     version : tuple of str
         What the server says of its version, as ``key=value``; empty if nothing.
     """
@@ -66,7 +66,7 @@ class RemoteFile:
 
 
 def check(url: str) -> None:
-    """Find out whether what it takes to open a URL is installed.
+    """Check that the packages are installed that opening a URL takes.
 
     Raises
     ------
@@ -194,7 +194,7 @@ def _file_system(url: str) -> tuple[Any, str]:
 
 @contextmanager
 def _asking(url: str) -> Iterator[None]:
-    """Tell what goes wrong on the way as a log's error; the kinds of failure are those of many libraries."""
+    """Turn any failure into an error about the log; each library behind fsspec has its own."""
     shown = Location(url).address
     try:
         yield
@@ -209,7 +209,7 @@ def _asking(url: str) -> Iterator[None]:
         raise
     except Exception as error:
         status = getattr(error, "status", None)
-        # What HTTP's errors say of themselves holds the URL with its signature.
+        # The text of an HTTP error holds the URL with its signature.
         told = f"HTTP {status}" if isinstance(status, int) else str(error).replace(url, shown)
         refused = isinstance(status, int) and 400 <= status < 500 and status not in PASSING_STATUS
         kind = LogError if refused else TransferError

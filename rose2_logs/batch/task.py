@@ -1,4 +1,4 @@
-"""One log as one task: what a worker is told, what it does, what it tells back."""
+"""One log as one task: what is sent to a worker, what the worker does, what it sends back."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ from rose2_logs.system.warnings import PACKAGE, WarningLog, collect_warnings
 RETRY_PAUSE_S = 2.0
 """Before the second try after a fault of storage or network; doubled for each further one."""
 REPORT_EVERY_S = 0.5
-"""Least time between two reports of a log's progress: what an eye can follow."""
+"""Minimum time between two reports of a log's progress: what an eye can follow."""
 MOST_WARNINGS = 5
-"""Warnings that are told of one log; the rest are counted."""
+"""Maximum number of warnings of one log that are shown; the rest are counted."""
 RUNNING = "running"
 TRANSIENT = frozenset(
     {
@@ -58,32 +58,32 @@ TRANSIENT = frozenset(
 
 @dataclass(frozen=True)
 class LogTask:
-    """What a worker is told: plain values only, so that it reaches another process or machine.
+    """A log to analyze, as it is sent to a worker: plain values only, which reach another process or machine.
 
     Attributes
     ----------
     log : Location
         The log.
     name : str
-        Of its results' folder.
+        Name of its folder of results.
     work : path
-        Folder of this batch's unfinished results. Its file `RUNNING` is there as long as the batch.
+        Folder for unfinished results of this batch. Its file `RUNNING` exists as long as the batch runs.
     options : RunOptions
         What to take from the log, how to analyze it, what to write.
     known : Record, optional
-        Of results that stand: nothing is done if they are of this very log.
+        Record of earlier results: nothing is done if they are those of this very log.
     known_name : str
-        Of those results' folder. If it is another than `name`, the log may have moved since, or be a new one.
+        Name of their folder. If it is not `name`, the log may have moved since, or be a new one.
     is_whole : bool
-        Whether those results have all the files that are wanted now.
+        Whether the earlier results have all the files that are wanted now.
     may_replace : bool
-        Whether results that stand may be replaced if the log is not the same any more.
+        Whether the earlier results may be replaced if the log has changed.
     home : path, optional
-        The folder in which the results will stand.
+        Folder to which the results will be moved.
     attempt : int
         Number of the try, from 1.
     version : str
-        Of the package that made the task.
+        Version of rose2-logs that made the task.
     """
 
     log: Location
@@ -99,7 +99,7 @@ class LogTask:
     version: str = __version__
 
     def stands_by(self, signature: Signature | None) -> bool:
-        """Whether the signature of the log is enough to know that its results stand as they are."""
+        """Whether the signature of the log is enough to know that its earlier results are still right."""
         if self.known is None or signature is None or not self.is_whole or self.known_name != self.name:
             return False
         return signature.proves_unchanged_since(self.known.signature)
@@ -107,7 +107,7 @@ class LogTask:
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a log is: the share of its time, in [0, 1], that is done."""
+    """How far a log is: the share of its duration, in [0, 1], that has been analyzed."""
 
     name: str
     share: float
@@ -120,23 +120,24 @@ class LogOutcome:
     Attributes
     ----------
     name : str
-        Of the log.
+        Name of its folder of results.
     status : str
-        ``done``: results lie in `results`; ``unchanged``: those that stand are of this very log; ``failed``.
+        ``done``: there are new results; ``unchanged``: the earlier ones are those of this very log; or
+        ``failed``.
     results : path, optional
-        Folder with the whole results, to be put in its place.
+        Folder with the new results, complete, to be put in place.
     record : Record, optional
-        To be kept from now on, of an unchanged log.
+        The new record of an unchanged log.
     reason : str
         Why it failed, in one line.
     is_transient : bool
-        Whether another try may succeed.
+        Whether it may succeed if it is tried again.
     tries : int
-        How often the log was begun for this outcome.
+        Number of times the log was begun for this outcome.
     details : str
         The traceback of a failure.
     warnings : tuple of str
-        What was told along the way.
+        Warnings about the log.
     host : str
         Name of the machine that did the work.
     """
@@ -154,21 +155,21 @@ class LogOutcome:
 
 
 class BatchOverError(Rose2LogsError):
-    """The batch that this work was for has ended."""
+    """The batch that this task belongs to has ended."""
 
 
 Report = Callable[[Progress], None]
 
 
 def analyze_task(task: LogTask, report: Report) -> LogOutcome:
-    """Do a task; whatever goes wrong becomes part of the outcome.
+    """Carry out a task; whatever goes wrong becomes part of the outcome.
 
     Parameters
     ----------
     task : LogTask
         The log and what to do with it.
     report : callable
-        Told of the progress.
+        Called with the progress.
     """
     with collect_warnings() as warning_log, _own_messages():
         try:
@@ -215,7 +216,7 @@ def _analyze(task: LogTask, report: Report, warning_log: WarningLog) -> LogOutco
         try:
             return _analyze_local(task, path, signature, report)
         except Rose2LogsError as error:
-            # A copy's place would tell nothing.
+            # Where the copy lay is of no use to anybody.
             if task.log.is_remote and str(path) in str(error):
                 raise type(error)(str(error).replace(str(path), task.log.address)) from error
             raise
@@ -260,7 +261,7 @@ def _analyze_local(task: LogTask, path: Path, signature: Signature, report: Repo
 
 
 def _confirmed(task: LogTask, known: Record, signature: Signature) -> Record:
-    """Record of results that stand, as their log lies and looks now."""
+    """Record of earlier results with the address and signature that their log has now."""
     return dataclasses.replace(_record(task, signature, known.sha256), layers=known.layers)
 
 
@@ -271,7 +272,7 @@ def _record(task: LogTask, signature: Signature, sha256: str) -> Record:
 
 @contextmanager
 def _local_copy(log: Location) -> Iterator[Path]:
-    """Path of a log on this machine: of one behind a URL that of a copy, which goes afterwards."""
+    """Give the path of a log on this machine: for one behind a URL that of a copy, deleted afterwards."""
     if not log.is_remote:
         yield Path(log.target)
         return
@@ -283,9 +284,9 @@ def _local_copy(log: Location) -> Iterator[Path]:
 
 @contextmanager
 def _attempt_folder(task: LogTask) -> Iterator[Path]:
-    """Make a folder for this try alone; it goes if the try fails.
+    """Make a folder for this try alone, which is deleted if the try fails.
 
-    Its name tells machine and process, for a person who looks.
+    Its name holds those of the machine and the process, for people who look for them.
     """
     if not (task.work / RUNNING).exists():
         raise OutputError(
@@ -306,7 +307,7 @@ def _attempt_folder(task: LogTask) -> Iterator[Path]:
 
 @contextmanager
 def _own_messages() -> Iterator[None]:
-    """Keep this package's messages from what else shows messages in this process: they are sent back."""
+    """Keep the messages of this package from other handlers in this process: they are sent back instead."""
     logger = logging.getLogger(PACKAGE)
     before, logger.propagate = logger.propagate, False
     try:

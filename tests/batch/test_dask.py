@@ -137,5 +137,5 @@ def test_a_scheduler_that_is_lost_ends_the_batch_in_one_line(cluster, tmp_path):
     assert (code, told) == (2, "")
     assert "Traceback" not in err
     assert err.splitlines()[-1].startswith("error: the Dask scheduler at")
-    assert err.splitlines()[-1].endswith("is gone; the same command again goes on with the rest")
+    assert err.splitlines()[-1].endswith("is gone; the same call again analyzes the rest")
     assert set(summary(out)) == {path.name for path in out.glob("logs/*")} < {"slow", "one_run", "two_run"}

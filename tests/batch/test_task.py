@@ -90,12 +90,12 @@ def test_warnings_are_gathered_and_counted(work, log, monkeypatch):
     assert outcome.warnings == (*(f"trouble {number}" for number in range(MOST_WARNINGS)), "3 more warnings")
 
 
-def test_a_fault_of_the_tool_is_told_as_one_with_its_traceback(work, log, monkeypatch):
+def test_an_internal_error_is_told_as_one_with_its_traceback(work, log, monkeypatch):
     """For --debug."""
     monkeypatch.setattr("rose2_logs.workflows.analyze.analyze_log", lambda *_: 1 // 0)
     outcome = analyze_task(LogTask(log, "maps", work, QUIET), ignore)
     assert outcome.reason.startswith("ZeroDivisionError: ")
-    assert outcome.reason.endswith("(a fault of rose2-logs)")
+    assert outcome.reason.endswith("(internal error of rose2-logs)")
     assert "Traceback" in outcome.details
     assert not outcome.is_transient
 

@@ -129,7 +129,9 @@ def test_every_command_has_the_options_and_help_tells_the_exit_codes(cli):
         assert all(option in out for option in ("--quiet", "--verbose", "--json-log"))
     code, out, _ = cli("--help")
     told = " ".join(out.split())
-    assert all(part in told for part in ("Exit codes", "0 done", "1 a fault", "2 a log", "130 interrupted"))
+    assert all(
+        part in told for part in ("Exit codes", "0 done", "1 internal error", "2 a log", "130 interrupted")
+    )
 
 
 def test_a_folder_that_cannot_be_written_to_is_one_line(tmp_path):

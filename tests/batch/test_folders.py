@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rose2_logs.batch.folders import LONGEST_BYTES, assign_names, safe_name
 from rose2_logs.batch.location import Location
-from rose2_logs.batch.names import LONGEST_BYTES, assign_names, safe_name
 
 
 def names_of(*targets: str, known: dict[str, str] | None = None, taken: tuple[str, ...] = ()) -> list[str]:

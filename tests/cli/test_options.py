@@ -1,0 +1,83 @@
+"""Options of the command line are those of the library, which itself knows nothing of flags."""
+
+from __future__ import annotations
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+import typer
+
+from rose2_logs.batch.options import BatchOptions
+from rose2_logs.cli.flags import flag_of, with_flags
+from rose2_logs.cli.main import app
+from rose2_logs.config.run_options import RunOptions, options_of
+
+PACKAGE = Path(__file__).parents[2] / "rose2_logs"
+COMMANDS = typer.main.get_command(app).commands
+OTHERS = [path for path in sorted(PACKAGE.rglob("*.py")) if not path.is_relative_to(PACKAGE / "cli")]
+
+
+def flags(command: str) -> set[str]:
+    return {flag for each in COMMANDS[command].params for flag in each.opts if flag.startswith("-")}
+
+
+@pytest.mark.parametrize(
+    ("kind", "name", "command"),
+    [
+        (kind, name, command)
+        for kind in (RunOptions, BatchOptions)
+        for name, about in options_of(kind).items()
+        for command in about.commands
+    ],
+)
+def test_help_shows_each_option(cli, kind: type, name: str, command: str):
+    code, out, _ = cli(command, "--help")
+    assert (code, f"{flag_of(name, options_of(kind)[name])} " in out) == (0, True)
+
+
+def test_commands_have_no_option_that_is_not_theirs():
+    assert "--live" in flags("analyze") - flags("batch")
+    assert "--scheduler" in flags("batch") - flags("analyze")
+
+
+@pytest.mark.parametrize("name", ["home", "origin", "journal"])
+def test_options_for_programs_have_no_flag(name: str):
+    assert f"--{name}" not in flags("analyze") | flags("batch")
+
+
+def texts(path: Path) -> list[str]:
+    """Texts in a module: not its docstrings, and no word alone, as an argument of another program is."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    told = {id(each.value) for each in ast.walk(tree) if isinstance(each, ast.Expr)}
+    strings = [each for each in ast.walk(tree) if isinstance(each, ast.Constant) and id(each) not in told]
+    return [each.value for each in strings if isinstance(each.value, str) and " " in each.value]
+
+
+@pytest.mark.parametrize("path", OTHERS, ids=lambda path: path.relative_to(PACKAGE).as_posix())
+def test_no_message_of_the_library_names_a_flag(path: Path):
+    known = set().union(*(flags(command) for command in COMMANDS))
+    for text in texts(path):
+        assert not known.intersection(re.findall(r"(?<![\w-])--?[a-z][a-z-]*", text)), text
+
+
+@pytest.mark.parametrize(
+    ("message", "shown"),
+    [
+        ("choose another folder or allow overwriting (overwrite=True)", "(--overwrite)"),
+        ("analyze it again without annotated_log=False", "without --no-mcap"),
+        ("choose one (topic='/map')", "(--topic '/map')"),
+        ("start_s=nan: it must be", "--start nan: it must be"),
+        ("raise the parameter reading.map_max_cells", "raise --set reading.map_max_cells"),
+        ("/data/topic=7/run.mcap: cannot be read", "/data/topic=7/run.mcap: cannot be read"),
+    ],
+)
+def test_messages_name_options_as_flags_on_the_command_line(message: str, shown: str):
+    assert with_flags(message).endswith(shown) or with_flags(message).startswith(shown)
+
+
+def test_one_definition_makes_option_and_value(cli, tmp_path: Path):
+    """A flag that turns off what is on by default does."""
+    _, _, err = cli("analyze", tmp_path / "x.bag", "-o", tmp_path, "--bag", "--no-mcap", "--no-rrd")
+    assert "--bag makes a ROS 2 bag" in err
