@@ -176,7 +176,6 @@ class _Batch:
                 task,
                 is_whole=self._is_whole(known_name),
                 may_replace=self._may_replace,
-                home=self._out / LOGS_FOLDER / name,
             )
             if task.stands_by(look):
                 self.states.append(LogState(name, "up to date", dataset.summary_row(self._out, name)))

@@ -20,7 +20,7 @@ class BatchOptions:
     ----------
     run : RunOptions
         What to take from each log, how to analyze it, what to write. Its `workers`, `overwrite`, `resume`,
-        `live`, `journal`, `origin` and `home` have no meaning here.
+        `live`, `journal` and `origin` have no meaning here.
 
     Raises
     ------

@@ -78,8 +78,6 @@ class LogTask:
         Whether the earlier results have all the files that are wanted now.
     may_replace : bool
         Whether the earlier results may be replaced if the log has changed.
-    home : path, optional
-        Folder to which the results will be moved.
     attempt : int
         Number of the try, from 1.
     version : str
@@ -94,7 +92,6 @@ class LogTask:
     known_name: str = ""
     is_whole: bool = False
     may_replace: bool = False
-    home: Path | None = None
     attempt: int = 1
     version: str = __version__
 
@@ -240,7 +237,7 @@ def _analyze_local(task: LogTask, path: Path, signature: Signature, report: Repo
             )
     with _attempt_folder(task) as folder:
         # A log that was stopped is analyzed anew, in another folder: nothing is to be kept for it.
-        options = dataclasses.replace(task.options, journal=False, origin=task.log.address, home=task.home)
+        options = dataclasses.replace(task.options, journal=False, origin=task.log.address)
         reported = 0.0
 
         def on_snapshot(_: object, share: float) -> None:

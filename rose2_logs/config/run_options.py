@@ -11,7 +11,6 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from numbers import Integral, Real
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rose2_logs.config.baselines import METHODS
@@ -316,9 +315,6 @@ class RunOptions:
     journal: bool = option(True, "Keep what is found on the way, so that a stopped run can be resumed.")
     origin: str | None = option(
         None, "What the summary names as the log, for a log that was copied to be read; by default its path."
-    )
-    home: Path | None = option(  # noqa: RUF009 (it calls `field`)
-        None, "Folder to which the results will be moved afterwards, if they will."
     )
 
     def __post_init__(self) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import glob
 import hashlib
-import os
 import platform
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -61,29 +60,6 @@ def _image_of(file: Path) -> tuple[Path, ...]:
         return ()
     found = [file.parent / image] if isinstance(image, str) else []
     return tuple(each for each in found if each.is_file())
-
-
-def log_location(log: Path, folder: Path) -> dict[str, str | None]:
-    """Tell where a log lies, so that it is found again from anywhere, also after a move with its results.
-
-    Parameters
-    ----------
-    log : path
-        The log, or a pattern.
-    folder : path
-        Of its results.
-
-    Returns
-    -------
-    dict
-        The path as ``absolute``, and as ``from_results``: as seen from the folder, None on another drive.
-    """
-    absolute = log.resolve()
-    try:
-        seen = Path(os.path.relpath(absolute, folder.resolve())).as_posix()
-    except ValueError:
-        return {"absolute": str(absolute), "from_results": None}
-    return {"absolute": str(absolute), "from_results": seen}
 
 
 def fingerprint(path: Path) -> dict[str, Any]:

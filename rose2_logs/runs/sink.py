@@ -36,8 +36,6 @@ class RunInfo:
         What is known of the input: format, size in bytes, SHA-256 fingerprint; JSON values only.
     origin : str, optional
         Where the log comes from if `log_path` is but a copy.
-    location : dict, optional
-        Where the log lies on this machine, see `provenance.log_location`; none of a copy.
     """
 
     log_path: Path
@@ -47,7 +45,6 @@ class RunInfo:
     versions: dict[str, str]
     provenance: dict[str, Any]
     origin: str | None = None
-    location: dict[str, str | None] | None = None
 
 
 class Sink:

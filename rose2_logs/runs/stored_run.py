@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
@@ -14,13 +13,12 @@ import shapely
 from numpy.typing import NDArray
 
 from rose2_logs.config.parameters import OccupancyParameters, Parameters
-from rose2_logs.errors import LogError, ParameterError, ResultsError
+from rose2_logs.errors import ParameterError, ResultsError
 from rose2_logs.io.discovery import ANNOTATED_ENDING
 from rose2_logs.model.analysis import Walls
 from rose2_logs.model.occupancy import GridGeometry
 from rose2_logs.model.room_plan import PlanMap, PlanRoom, RoomPlan
 from rose2_logs.model.rooms import Doorway
-from rose2_logs.runs.provenance import log_files
 from rose2_logs.runs.summary import RESULTS_FORMAT, SUMMARY
 from rose2_logs.runs.tables import BACK_PROJECTED, TABLES, Row, unpack_image
 from rose2_logs.system.files import require_utf8
@@ -130,29 +128,6 @@ class StoredRun:
         # One that the summary does not name is of an earlier run.
         name = f"{BACK_PROJECTED}.parquet"
         return name in self.summary["files"] and (self.folder / name).is_file()
-
-    def find_log(self) -> str:
-        """Find the log: where it was, or where it lay as seen from the results, or as it was given.
-
-        Raises
-        ------
-        LogError
-            If there is none of its size.
-        """
-        given, location = str(self.summary["log"]), self.summary.get("log_location") or {}
-        beside = location.get("from_results")
-        found = [location.get("absolute"), beside and os.path.normpath(self.folder.resolve() / beside), given]
-        candidates = list(dict.fromkeys(str(each) for each in found if each))
-        size = self.summary["input"].get("size_bytes")
-        held = {each: sum(file.stat().st_size for file in log_files(Path(each))) for each in candidates}
-        of_its_size = [each for each in candidates if held[each] and held[each] == size]
-        if of_its_size:
-            return of_its_size[0]
-        if others := [each for each in candidates if held[each]]:
-            raise LogError(
-                f"{others[0]} is not the log that the results are of: {held[others[0]]} bytes, not {size}"
-            )
-        raise LogError(f"there is no log at {' or '.join(candidates)}")
 
     def table(self, name: str, columns: list[str] | None = None, snapshot: int | None = None) -> pa.Table:
         """Read a table, or some of its columns, or its rows of one map.

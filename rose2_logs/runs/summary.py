@@ -63,7 +63,6 @@ def write_summary(
     content = {
         "results_format": RESULTS_FORMAT,
         "log": info.origin or str(info.log_path),
-        "log_location": info.location,
         "topic": info.topic,
         "method": info.method,
         "input": info.provenance,

@@ -20,7 +20,7 @@ from rose2_logs.outputs.mcap.viewer_layouts import bag_metadata_path, foxglove_p
 from rose2_logs.runs.history import RunHistory, RunSummary
 from rose2_logs.runs.journal import JournaledWorkers
 from rose2_logs.runs.output_folder import OutputFolder
-from rose2_logs.runs.provenance import fingerprint, log_location, software_versions
+from rose2_logs.runs.provenance import fingerprint, software_versions
 from rose2_logs.runs.sink import RunInfo, Sink, abandoned_on_error
 from rose2_logs.runs.store import RunStore, table_path
 from rose2_logs.runs.stream import SnapshotWorkers, TrackedStream, start_workers
@@ -137,7 +137,7 @@ def _analyze_log(
             len(reader.source.log_times(reader.topic)),
             reader.topic,
         )
-        info = _run_info(path, folder, reader, options)
+        info = _run_info(path, reader, options)
         made = output.made(_facts(info, options), overwrite=options.overwrite, resume=options.resume)
         with made as (work, journal):
             planned = _planned_files(work, path, options)
@@ -219,8 +219,7 @@ def _tell_progress(
         on_snapshot(step, (step.snapshot.log_time_ns - first_ns) / max(last_ns - first_ns, 1))
 
 
-def _run_info(path: Path, folder: Path, reader: LogReader, options: RunOptions) -> RunInfo:
-    is_copy = options.origin is not None and "://" in options.origin
+def _run_info(path: Path, reader: LogReader, options: RunOptions) -> RunInfo:
     return RunInfo(
         path,
         reader.topic,
@@ -229,7 +228,6 @@ def _run_info(path: Path, folder: Path, reader: LogReader, options: RunOptions) 
         software_versions(),
         {"format": reader.info.format, **fingerprint(path)},
         options.origin,
-        None if is_copy else log_location(path, options.home or folder),
     )
 
 

@@ -83,24 +83,22 @@ def test_the_same_comparison_gives_the_same_tables(cli, results, tmp_path: Path)
         assert (tmp_path / "one" / table).read_bytes() == (tmp_path / "two" / table).read_bytes()
 
 
-def test_without_the_annotated_log_the_map_comes_from_the_log(cli, results, tmp_path: Path):
-    """With --no-mcap the log is read once more; where it is gone or another one, a line says so."""
+def test_a_comparison_needs_neither_the_annotated_log_nor_the_log(cli, results, tmp_path: Path):
+    """The last maps, rooms and walls are stored with the results, and nothing is analyzed again."""
+    assert cli("compare", *results, "-o", tmp_path / "with", "--no-rrd")[0] == 0
     for result in results:
         (result / f"{result.name}.rose2.mcap").unlink()
-    assert cli("compare", *results, "-o", tmp_path / "out", "--no-rrd")[0] == 0
-    save_map(tmp_path / "maps", "before", three_rooms()[:, :150])
-    code, _, err = cli("compare", *results, "-o", tmp_path / "other", "--no-rrd")
-    assert (code, "is not the log that the results are of" in err) == (2, True)
-    (tmp_path / "maps" / "before.yaml").unlink()
-    code, _, err = cli("compare", *results, "-o", tmp_path / "other", "--no-rrd")
-    assert (code, "--no-mcap" in err, len(err.splitlines())) == (2, True, 1)
-    assert not (tmp_path / "other").exists()
+    for file in (tmp_path / "maps").iterdir():
+        file.unlink()
+    assert cli("compare", *results, "-o", tmp_path / "without", "--no-rrd")[0] == 0
+    for table in ("room_changes.parquet", "wall_changes.parquet"):
+        assert (tmp_path / "with" / table).read_bytes() == (tmp_path / "without" / table).read_bytes()
 
 
 def test_what_cannot_be_compared_is_told_in_a_line(cli, results, tmp_path: Path):
     """No results, the folder above them, an earlier comparison."""
     code, _, err = cli("compare", tmp_path / "nowhere", results[1], "-o", tmp_path / "out")
-    assert (code, "holds no summary.json; analyze writes" in err) == (2, True)
+    assert (code, "holds no summary.json; an analysis writes" in err) == (2, True)
     code, _, err = cli("compare", results[0].parent, results[1], "-o", tmp_path / "out")
     assert (code, f"did you mean {results[1]}" in err) == (2, True)
     assert cli("compare", *results, "-o", tmp_path / "out", "--no-rrd")[0] == 0
@@ -117,27 +115,3 @@ def test_a_comparison_that_replaces_one_leaves_nothing_of_it(cli, results, tmp_p
     code, said, _ = cli("compare", *results[::-1], "-o", out, "--no-rrd", "--overwrite")
     assert (code, "comparison.rrd" in said) == (0, False)
     assert sorted(file.name for file in out.iterdir()) == sorted(FILES[:-1])
-
-
-def test_the_log_is_found_from_anywhere_and_after_moves(cli, tmp_path: Path, monkeypatch):
-    """Given by a relative path; then from another folder, moved together with the results, or these alone."""
-    project = tmp_path / "project"
-    save_map(project / "maps", "plan", three_rooms())
-    monkeypatch.chdir(project)
-    assert cli("analyze", "maps/plan.yaml", "-o", "results", "--no-rrd", "--no-mcap")[0] == 0
-    monkeypatch.chdir(tmp_path)
-
-    def compared(results: Path, name: str) -> tuple[int, str]:
-        code, _, err = cli("compare", results, results, "-o", tmp_path / name, "--no-rrd")
-        return code, err
-
-    assert compared(project / "results" / "plan", "elsewhere") == (0, "")
-    (project / "results" / "plan").rename(tmp_path / "alone")
-    assert compared(tmp_path / "alone", "results_moved") == (0, "")
-    (tmp_path / "alone").rename(project / "results" / "plan")
-    moved = project.rename(tmp_path / "archive")
-    assert compared(moved / "results" / "plan", "both_moved") == (0, "")
-    image = moved / "maps" / "plan.png"
-    image.write_bytes(image.read_bytes() + b" ")
-    code, err = compared(moved / "results" / "plan", "other_log")
-    assert (code, "is not the log that the results are of" in err) == (2, True)

@@ -42,7 +42,7 @@ def test_commands_have_no_option_that_is_not_theirs():
     assert "--scheduler" in flags("batch") - flags("analyze")
 
 
-@pytest.mark.parametrize("name", ["home", "origin", "journal"])
+@pytest.mark.parametrize("name", ["origin", "journal"])
 def test_options_for_programs_have_no_flag(name: str):
     assert f"--{name}" not in flags("analyze") | flags("batch")
 

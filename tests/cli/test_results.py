@@ -57,7 +57,7 @@ def test_segment_writes_the_same_formats(cli, tmp_path: Path):
         (["figure", "RESULTS", "--snapshot", "99"], "snapshot 99"),
         (["figure", "RESULTS", "--coverage", "50"], "half is 0.5"),
         (["figure", "RESULTS", "--coverage", "0.5", "--last"], "exclude each other"),
-        (["export", "RESULTS", "--format", "pdf"], "there are: geojson"),
+        (["export", "RESULTS", "--format", "pdf"], "choose one of geojson"),
         (["export", "nowhere", "--format", "dxf"], "nowhere"),
     ],
 )
