@@ -17,7 +17,7 @@ from rose2_logs.drawing.drawing import Drawing
 from rose2_logs.drawing.hatching import hatch_cells
 from rose2_logs.drawing.map_painter import WHITE, MapPainter, tinted_cells
 from rose2_logs.drawing.palette import track_color
-from rose2_logs.drawing.shapes import Color, Picture, Text
+from rose2_logs.drawing.shapes import Color, Lines, Picture, Shape, Text
 from rose2_logs.drawing.sheet import Key, arranged, captioned, legend, stacked, text_line, tiled
 from rose2_logs.evaluation.along import RunPoint
 from rose2_logs.evaluation.benchmark import CaseResult
@@ -44,7 +44,7 @@ STRIPE_GAP, STRIPE_WIDTH = 8.0, 2.5
 """Found rooms without a partner are striped: their color alone might pass for a true room's."""
 BORDER_COLOR: Color = (70, 70, 70)
 MARK_COLORS: dict[Mark, Color] = {
-    Mark.RIGHT: (222, 236, 222),
+    Mark.RIGHT: (208, 234, 208),
     Mark.MERGED: (214, 39, 40),
     Mark.SPLIT: (255, 150, 20),
     Mark.LEAKED: (150, 80, 200),
@@ -263,13 +263,13 @@ class CasePictures:
 
 
 def _tile(panels: Sequence[Drawing], result: CaseResult) -> Drawing:
-    """Draw panels of a case, small, without numbers, under a line with its name and figures."""
+    """Draw panels of a case, small, without borders and numbers, under a line with its name and figures."""
     width, height = TILE_PX
     page, scores = Drawing(width * len(panels), height), result.scores
     for number, panel in enumerate(panels):
         scale = min(width / panel.width, height / panel.height)
         bare = Drawing(panel.width, panel.height)
-        bare.add(*(shape for shape in panel.shapes if not isinstance(shape, Text)))
+        bare.add(*(shape for shape in panel.shapes if not _is_small(shape)))
         left = (number + 0.5) * width - scale * panel.width / 2
         page.lay(bare, left, (height - scale * panel.height) / 2, scale)
     # As pixels: the maps of all cases would take too much memory.
@@ -280,3 +280,7 @@ def _tile(panels: Sequence[Drawing], result: CaseResult) -> Drawing:
         f"gt {scores.iou_gt:.1f})   rooms {scores.rooms_seg:.0f}/{scores.rooms_gt:.0f}"
     )
     return captioned(tile, text, TILE_CAPTION_PX)
+
+
+def _is_small(shape: Shape) -> bool:
+    return isinstance(shape, Text) or (isinstance(shape, Lines) and shape.color == BORDER_COLOR)

@@ -15,7 +15,7 @@ from rose2_logs.drawing.shapes import Area, Color, Lines, Picture, Text
 from rose2_logs.model.labels import distinct_labels
 from rose2_logs.model.occupancy import UNKNOWN, FloatArray, GridGeometry
 
-UNKNOWN_GRAY, FREE_GRAY, OCCUPIED_GRAY = 232, 255, 25
+UNKNOWN_GRAY, FREE_GRAY, OCCUPIED_GRAY = 216, 255, 25
 WHITE, INK = (255, 255, 255), (25, 25, 25)
 OUTLINE_SHADE, HATCH_SHADE = 0.6, 0.8
 """Shares of the brightness of a room's color."""

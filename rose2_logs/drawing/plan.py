@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
@@ -23,7 +23,7 @@ from rose2_logs.drawing.map_painter import (
 )
 from rose2_logs.drawing.palette import track_color
 from rose2_logs.drawing.shapes import Area, Color, Lines, Text
-from rose2_logs.drawing.sheet import Key, legend
+from rose2_logs.drawing.sheet import Key, legend, side_by_side, stacked
 from rose2_logs.model.room_plan import PlanRoom, RoomPlan, predicted_parts
 from rose2_logs.model.room_quality import UNSURE_SIGN, unsure_sign
 from rose2_logs.system.text import percent
@@ -35,6 +35,10 @@ MARGIN_M = 0.5
 SCALE_BAR_SHARE = 0.25
 """The scale bar is the longest round length below this share of the plan's width."""
 ROUND_LENGTHS_M = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
+SIDE_PX, GAP_PX = 900.0, 12.0
+"""Width of the map in the picture of a segmentation, and the gap to the next."""
+WIDE = 1.5
+"""Width over height from which a map is drawn above its rooms and not beside them."""
 LEGEND_FONT = 0.85
 """Size of the legend's texts over that of the rooms' names."""
 
@@ -139,6 +143,39 @@ def draw_plan(
     if style.has_legend:
         _add_legend(painter, plan, style, has_predicted=bool(predicted))
     return painter.drawing
+
+
+def draw_segmentation(plan: RoomPlan) -> Drawing:
+    """Draw a map as it was recorded, and below or beside it with its rooms, walls and doorways.
+
+    Parameters
+    ----------
+    plan : RoomPlan
+        With a map.
+
+    Raises
+    ------
+    ValueError
+        If it has none.
+    """
+    if plan.map is None:
+        raise ValueError("a plan without a map has no segmentation to be drawn")
+    corners = plan.map.cropped().geometry.corners_m()
+    x0, y0, x1, y1 = plan.bounds_m
+    low = np.minimum(corners.min(axis=0), (x0, y0)).tolist()
+    high = np.maximum(corners.max(axis=0), (x1, y1)).tolist()
+    bounds: Bounds = (low[0], low[1], high[0], high[1])
+    unlabeled = replace(plan.map, labels=np.zeros_like(plan.map.labels))
+    recorded = RoomPlan(plan.title, plan.frame_id, (), (), None, unlabeled)
+    style = replace(FIGURE, width=SIDE_PX, has_walls=True, tells=False)
+    parts = [
+        draw_plan(recorded, replace(style, has_legend=False), bounds),
+        draw_plan(plan, style, bounds),
+    ]
+    is_wide = parts[0].width > WIDE * parts[0].height
+    drawing = stacked(parts, GAP_PX) if is_wide else side_by_side(parts, GAP_PX)
+    drawing.title = plan.title
+    return drawing
 
 
 def _lay_map(painter: MapPainter, plan: RoomPlan, style: PlanStyle, colors: Mapping[int, Color]) -> set[int]:
