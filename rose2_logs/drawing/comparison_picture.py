@@ -115,7 +115,9 @@ def _layout(
     labels = np.zeros(snapshot.cells.shape, np.int32)
     below = PlanMap(motion.grid(snapshot.geometry), snapshot.cells, labels)
     plan = RoomPlan(layout.name, "", rooms, (), None, below)
-    return draw_plan(plan, LAYOUT_STYLE, bounds, {track: track_color(group_of[track]) for track in layout.tracks})
+    return draw_plan(
+        plan, LAYOUT_STYLE, bounds, {track: track_color(group_of[track]) for track in layout.tracks}
+    )
 
 
 def _first(row: tuple[int, object, float]) -> int:

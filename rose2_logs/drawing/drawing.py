@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from rose2_logs.drawing import PRINT_WIDTH_PX
 from rose2_logs.drawing.image_files import write_image
 from rose2_logs.drawing.pixels import as_pixels
 from rose2_logs.drawing.shapes import Page
@@ -14,8 +15,6 @@ from rose2_logs.drawing.svg import as_svg
 from rose2_logs.errors import ParameterError
 from rose2_logs.system.files import replacing
 
-PRINT_WIDTH_PX = 1800
-"""Width of a drawing as PNG: 15 cm, a text's width, at 300 dots an inch."""
 ENDINGS = (".png", ".svg")
 
 
@@ -79,4 +78,6 @@ class Drawing(Page):
 
     def __repr__(self) -> str:
         many = "" if len(self.shapes) == 1 else "s"
-        return f"Drawing({self.title!r}, {self.width:.0f} x {self.height:.0f}, {len(self.shapes)} shape{many})"
+        return (
+            f"Drawing({self.title!r}, {self.width:.0f} x {self.height:.0f}, {len(self.shapes)} shape{many})"
+        )

@@ -113,8 +113,7 @@ def draw_panels(cells: NDArray[np.int8], comparison: Comparison) -> tuple[Drawin
     window = _with_margin(known_window(shown), shown.shape)
     # From here on row 0 lies at the bottom, as in a grid.
     cells, truth, found, marks = (
-        np.flipud(values[window])
-        for values in (cells, comparison.truth, comparison.found, comparison.marks)
+        np.flipud(values[window]) for values in (cells, comparison.truth, comparison.found, comparison.marks)
     )
     true_colors = {number: track_color(number) for number in range(1, int(comparison.truth.max()) + 1)}
     found_colors, alone = _found_colors(comparison.partner_of_found, len(true_colors))
@@ -157,7 +156,9 @@ class _Panel:
         self._painter = MapPainter((0, 0, width, height), float(np.ceil(scale * width)), tallest=np.inf)
         self.drawing = self._painter.drawing
 
-    def tint(self, labels: NDArray[np.integer] | None, colors: dict[int, Color], opacity: float = 1.0) -> None:
+    def tint(
+        self, labels: NDArray[np.integer] | None, colors: dict[int, Color], opacity: float = 1.0
+    ) -> None:
         """Draw the map, the cells of labels in their colors."""
         self._painter.picture(tinted_cells(self._cells, labels, colors, opacity), self._grid)
 
@@ -184,7 +185,8 @@ def _borders(labels: NDArray[np.integer], occupied: BoolArray) -> FloatArray:
         changes = np.diff(np.pad(labels, around), axis=axis) != 0
         walls = np.pad(occupied, around)
         changes &= ~(walls[1:] | walls[:-1]) if axis == 0 else ~(walls[:, 1:] | walls[:, :-1])
-        first, last = straight_runs(*np.nonzero(changes), (axis, 1 - axis))
+        row, column = np.nonzero(changes)
+        first, last = straight_runs(row, column, (axis, 1 - axis))
         last[:, 1 - axis] += 1
         found.append(np.stack([first, last], axis=1)[..., ::-1])
     return np.concatenate(found).astype(np.float64)

@@ -94,7 +94,9 @@ def hatch_unseen(step: TrackedSnapshot) -> tuple[FloatArray, NDArray[np.intp]]:
         height, width = cells.shape
         inside = (row >= 0) & (column >= 0) & (row < height) & (column < width)
         there: BoolArray = cells[row.clip(0, height - 1), column.clip(0, width - 1)] == UNKNOWN
-        return there | ~inside  # beyond the canvas all is
+        # Beyond the canvas all is.
+        there |= ~inside
+        return there
 
     stretches, line = stretches_of(lines, is_unknown, geometry.resolution_m)
     is_long = np.hypot(*(stretches[:, 1] - stretches[:, 0]).T) >= HATCH_MIN_M
@@ -102,7 +104,7 @@ def hatch_unseen(step: TrackedSnapshot) -> tuple[FloatArray, NDArray[np.intp]]:
 
 
 def hatch_cells(mask: BoolArray, gap: float) -> FloatArray:
-    """Lines (N, 2, 2) over the cells of a mask (H, W), a gap apart, all in cells from the first cell's corner.
+    """Lines (N, 2, 2) over the cells of a mask (H, W), a gap apart, all in cells from the first one's corner.
 
     They rise at 45 degrees where row 0 lies at the bottom.
     """

@@ -140,7 +140,8 @@ def tinted_cells(
     )
     table = np.round(table).astype(np.uint8)
     if labels is None or not numbers:
-        return table[0][cells.view(np.uint8)]
+        grays: NDArray[np.uint8] = table[0][cells.view(np.uint8)]
+        return grays
     row = np.zeros(max(present) + 1, np.uint16)
     row[numbers] = np.arange(1, len(numbers) + 1)
     colored: NDArray[np.uint8] = table[row[labels], cells.view(np.uint8)]

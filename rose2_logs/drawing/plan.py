@@ -29,7 +29,7 @@ from rose2_logs.model.room_quality import UNSURE_SIGN, unsure_sign
 from rose2_logs.system.text import percent
 
 SEEN_OPACITY, PREDICTED_OPACITY, SHAPE_OPACITY = 0.55, 0.22, 0.5
-"""Of the color on seen cells, on unseen parts, and on whole shapes where no cell is known to be the room's."""
+"""Of the color on seen cells, on unseen parts, and on shapes where no cell is known to be the room's."""
 WALL_COLOR: Color = (40, 70, 190)
 MARGIN_M = 0.5
 SCALE_BAR_SHARE = 0.25

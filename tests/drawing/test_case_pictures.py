@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
+from rose2_logs.drawing.case_pictures import COLUMNS, ROWS, CasePictures
 from saved_maps import RESOLUTION_M, two_rooms
 
-from rose2_logs.drawing.case_pictures import COLUMNS, ROWS, CasePictures
 from rose2_logs.drawing.image_files import write_label_image
 from rose2_logs.evaluation.benchmark import CaseResult
 from rose2_logs.evaluation.cases import Case

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
 from rose2_logs.drawing.case_picture import (
     MARK_COLORS,
     SIDE_MIN_PX,
@@ -13,6 +12,7 @@ from rose2_logs.drawing.case_picture import (
     room_colors,
     text_line,
 )
+
 from rose2_logs.evaluation.case_errors import Mark, compare
 from rose2_logs.evaluation.scores import score
 

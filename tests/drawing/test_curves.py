@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
 from rose2_logs.drawing.curves import (
     BOTTOM_PX,
     HEIGHT_PX,
@@ -17,6 +16,7 @@ from rose2_logs.drawing.curves import (
     draw_along,
     draw_curves,
 )
+
 from rose2_logs.evaluation.along import RunPoint
 from rose2_logs.evaluation.scores import Scores
 

@@ -109,9 +109,7 @@ def run_charts(results: Run) -> list[Chart]:
             [
                 ("free", snapshots["free_area_m2"].astype(float), GREEN),
                 ("rooms, seen", snapshots["rooms_area_m2"].astype(float), BLUE),
-                (
-                    "rooms with predicted parts", snapshots["rooms_predicted_area_m2"].astype(float), ORANGE
-                ),
+                ("rooms with predicted parts", snapshots["rooms_predicted_area_m2"].astype(float), ORANGE),
             ],
         ),
         _coverage_chart(axes[1], percent("coverage")),
