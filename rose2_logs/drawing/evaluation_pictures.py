@@ -116,7 +116,7 @@ def draw_panels(cells: NDArray[np.int8], comparison: Comparison) -> tuple[Drawin
         np.flipud(values[window]) for values in (cells, comparison.truth, comparison.found, comparison.marks)
     )
     true_colors = {number: track_color(number) for number in range(1, int(comparison.truth.max()) + 1)}
-    found_colors, alone = _found_colors(comparison.partner_of_found, len(true_colors))
+    found_colors, alone = _found_colors(comparison, len(true_colors))
     panels = [_Panel(cells) for _ in range(4)]
     panels[0].tint(None, {})
     panels[1].rooms(truth, true_colors, [])
@@ -125,9 +125,10 @@ def draw_panels(cells: NDArray[np.int8], comparison: Comparison) -> tuple[Drawin
     return panels[0].drawing, panels[1].drawing, panels[2].drawing, panels[3].drawing
 
 
-def _found_colors(partner: NDArray[np.intp], used: int) -> tuple[dict[int, Color], list[int]]:
+def _found_colors(comparison: Comparison, used: int) -> tuple[dict[int, Color], list[int]]:
     """Color of each found room, its partner's where it has one; and which rooms have none."""
-    alone = (np.flatnonzero(partner[1:] == 0) + 1).tolist()
+    partner, present = comparison.partner_of_found, np.unique(comparison.found)
+    alone = [number for number in present.tolist() if number and not partner[number]]
     colors = {number: track_color(other) for number, other in enumerate(partner.tolist()) if other}
     return colors | {number: track_color(used + 1 + place) for place, number in enumerate(alone)}, alone
 
