@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from PIL import Image as PillowImage
 
 from rose2_logs.config.parameters import Parameters
-from rose2_logs.drawing.case_picture import room_colors
+from rose2_logs.drawing.palette import label_colors
 from rose2_logs.drawing.pixels import as_pixels
 from rose2_logs.drawing.plan import PANEL, draw_plan
 from rose2_logs.io import open_log
@@ -107,7 +107,7 @@ class Painter:
     def rooms(self, labels: NDArray[np.int32], image: Image) -> Image:
         """Fill the rooms of a label image (H, W) of the canvas with colors of their own."""
         part = self._scaled(labels[self._window])
-        colors = room_colors(int(labels.max(initial=0))).astype(float)
+        colors = label_colors(int(labels.max(initial=0))).astype(float)
         blended = ROOM_OPACITY * colors[part] + (1 - ROOM_OPACITY) * image
         return np.where((part > 0)[..., None], blended, image).astype(np.uint8)
 
@@ -261,7 +261,7 @@ def comparison_picture(log: Path) -> tuple[str, Image]:
 
 def _spread_colors(count: int) -> list[Color]:
     colors: list[Color] = [GRAY]
-    colors += [(int(r), int(g), int(b)) for r, g, b in room_colors(count)[1:]]
+    colors += [(int(r), int(g), int(b)) for r, g, b in label_colors(count)[1:]]
     return colors
 
 

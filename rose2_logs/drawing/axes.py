@@ -20,11 +20,12 @@ class Axis:
     high: float
     is_log: bool
 
-    def share(self, value: float) -> float:
-        """Where a value lies, 0 at the low end and 1 at the high one."""
+    def share(self, values: FloatArray) -> FloatArray:
+        """Where values lie, 0 at the low end and 1 at the high one."""
         if self.is_log:
-            return float(np.log(value / self.low) / np.log(self.high / self.low))
-        return (value - self.low) / (self.high - self.low)
+            logarithms: FloatArray = np.log(values / self.low) / np.log(self.high / self.low)
+            return logarithms
+        return (values - self.low) / (self.high - self.low)
 
     def ticks(self) -> list[float]:
         """Return the values that are marked, round ones."""

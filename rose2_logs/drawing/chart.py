@@ -1,4 +1,8 @@
-"""Charts as SVG within an HTML page, which gives text and axes their color: so they fit light and dark."""
+"""Charts: curves, lanes of states and lanes of shares over one axis.
+
+On an HTML page text and axes take their colors from the page's style, by their kind, so that charts fit light
+and dark.
+"""
 
 from __future__ import annotations
 
@@ -7,47 +11,95 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
+import shapely
 
 from rose2_logs.drawing.axes import Axis, axis_of
-from rose2_logs.drawing.svg import escape, quoteattr
+from rose2_logs.drawing.drawing import Drawing
+from rose2_logs.drawing.shapes import Area, Color, Dot, Lines, Shape, Text
 from rose2_logs.model.occupancy import FloatArray, IntArray
 
-WIDTH, HEIGHT = 420.0, 210.0
-LEFT, RIGHT, TOP, BOTTOM = 44.0, 12.0, 10.0, 36.0
-"""Space around the axes."""
 TICK_GAP_MIN = 34.0
 """Marks of the horizontal axis that would stand closer are thinned."""
 POINTS_MAX = 800
 """Of longer curves so many points are drawn, evenly taken: more than a screen shows."""
 DOTS_MAX = 60
 """Curves of more points are drawn without dots."""
-LANE = 9.0
-"""Height of a room's lane."""
+LANE, LANE_FONT = 9.0, 8.0
+"""Height of a room's lane, and size of its name."""
+LANE_MIN_WIDTH = 1.5
+"""A room that was there for a moment is drawn so wide."""
 SHARE_LANE = 15.0
 """Height of a lane in which a share rises."""
 LAST_WIDTH = 4.0
 """The last share, which nothing follows, is drawn so wide."""
 TINT_OPACITY = 0.18
 """How strongly the rest of such a lane is tinted: what is still to come."""
+INK, GRID_COLOR, MARK_COLOR = (60, 68, 76), (217, 222, 228), (91, 101, 112)
+LINE_COLORS: tuple[Color, ...] = (
+    (31, 119, 180),
+    (214, 39, 40),
+    (44, 160, 44),
+    (255, 127, 14),
+    (148, 103, 189),
+    (140, 86, 75),
+    (23, 190, 207),
+)
+
+
+@dataclass(frozen=True)
+class ChartStyle:
+    """Size of a chart, and what it tells by itself.
+
+    Attributes
+    ----------
+    width, height : float
+        Of the page; lanes are as high as they need.
+    left, right, top, bottom : float
+        Space around the axes.
+    font : float
+        Size of the texts.
+    line, dot : float
+        Width of curves and radius of their points.
+    is_whole : bool
+        Whether title and names of the curves stand in it, on white; otherwise the page around it tells them.
+    """
+
+    width: float
+    height: float
+    left: float
+    right: float
+    top: float
+    bottom: float
+    font: float
+    line: float
+    dot: float
+    is_whole: bool
+
+
+ON_PAGE = ChartStyle(420.0, 210.0, 44.0, 12.0, 10.0, 36.0, 11.0, 1.8, 2.4, is_whole=False)
+WHOLE = ChartStyle(900.0, 360.0, 60.0, 190.0, 40.0, 50.0, 14.0, 2.0, 3.0, is_whole=True)
 
 
 @dataclass(frozen=True, eq=False)
-class Series:
+class Curve:
     """One curve.
 
     Attributes
     ----------
     name : str
-    values : (N,) float
-        NaN where there is none; the curve has a gap there.
-    color : str
-        As CSS has it.
+    x, y : (N,) float
+        Its points; where y is NaN the curve has a gap.
+    color : Color, optional
+        By default one of `LINE_COLORS`.
+    is_joined : bool
+        Whether a line joins them in their order.
     """
 
     name: str
-    values: FloatArray
-    color: str
+    x: FloatArray
+    y: FloatArray
+    color: Color | None = None
+    is_joined: bool = True
 
 
 @dataclass(frozen=True)
@@ -66,11 +118,10 @@ class ShareLane:
     Attributes
     ----------
     name, text : str
-        What stands beside it, and what it says when pointed at.
+        What stands beside it, and what it says when the pointer is over it.
     shares : (N,) float
         In [0, 1].
-    color : str
-        As CSS has it.
+    color : Color
     reached : int, optional
         Index of the value that is marked by a line across the lane.
     """
@@ -78,73 +129,72 @@ class ShareLane:
     name: str
     text: str
     shares: FloatArray
-    color: str
+    color: Color
     reached: int | None = None
 
 
 def line_chart(
-    x: FloatArray,
-    series: Sequence[Series],
+    curves: Sequence[Curve],
     *,
     title: str,
     x_label: str,
     marks: Sequence[Mark] = (),
     x_range: tuple[float, float] | None = None,
     y_range: tuple[float, float] | None = None,
-) -> str:
-    """Draw curves over one axis.
+    log_x: bool = False,
+    log_y: bool = False,
+    style: ChartStyle = WHOLE,
+) -> Drawing:
+    """Draw curves with axes and grid.
 
     Parameters
     ----------
-    x : (N,) float
-        Common to all curves, without NaN; at least one.
-    series : sequence of Series
+    curves : sequence of Curve
+        At least one, with at least one point.
     title, x_label : str
-        What it shows, for those who cannot see it; what the axis is.
+        What it shows; what the horizontal axis is.
     marks : sequence of Mark
     x_range, y_range : (float, float), optional
-        Ends of the axes; by default round numbers around the values, the vertical one from 0.
+        Ends of the axes; by default round numbers around the values, the vertical one from 0 or, on a
+        logarithmic axis, the power of ten below.
+    log_x, log_y : bool
+        Whether an axis is logarithmic: then all its values are above 0.
+    style : ChartStyle
     """
-    x_axis = axis_of(x, False) if x_range is None else Axis(*x_range, is_log=False)
-    if y_range is None:
-        known = np.concatenate([each.values for each in series])
-        y_axis = axis_of(np.append(known[np.isfinite(known)], 0.0), False)
-        y_axis = Axis(0.0, y_axis.high, is_log=False)
+    x = np.concatenate([curve.x for curve in curves])
+    y = np.concatenate([curve.y for curve in curves])
+    y = y[np.isfinite(y)]
+    x_axis = axis_of(x, log_x) if x_range is None else Axis(*x_range, log_x)
+    if y_range is not None:
+        y_axis = Axis(*y_range, log_y)
+    elif log_y:
+        y_axis = axis_of(y, True)
     else:
-        y_axis = Axis(*y_range, is_log=False)
-    chosen = np.unique(np.linspace(0, len(x) - 1, min(len(x), POINTS_MAX)).round().astype(int))
-    columns = LEFT + (x - x_axis.low) / (x_axis.high - x_axis.low) * (WIDTH - LEFT - RIGHT)
-    are_counts = all(np.array_equal(each.values, np.round(each.values)) for each in series)
+        y_axis = Axis(0.0, axis_of(np.append(y, 0.0), False).high, is_log=False)
+    chart = _Chart(style, style.height, title, x_axis, y_axis)
+    are_counts = np.array_equal(y, np.round(y))
     rows = [value for value in y_axis.ticks() if not are_counts or value == round(value)]
-    parts = [*_frame(x_axis, y_axis, rows, x_label, HEIGHT), *_marks(marks, x_axis, HEIGHT)]
-    for each in series:
-        shares = (each.values - y_axis.low) / (y_axis.high - y_axis.low)
-        heights = HEIGHT - BOTTOM - shares * (HEIGHT - TOP - BOTTOM)
-        parts.append(
-            f'<path class="curve" stroke="{escape(each.color)}" '
-            f'd="{_path(columns[chosen], heights[chosen])}"/>'
-        )
-        if len(x) <= DOTS_MAX:
-            parts += [
-                f'<circle cx="{column:.1f}" cy="{row:.1f}" r="2.4" fill="{escape(each.color)}">'
-                f"<title>{escape(each.name)}: {value:.3g} at {place:.4g}</title></circle>"
-                for column, row, value, place in zip(columns, heights, each.values, x, strict=True)
-                if np.isfinite(value)
-            ]
-    return _svg(title, HEIGHT, parts)
+    chart.frame(x_label, rows)
+    chart.marks(marks)
+    for number, curve in enumerate(curves):
+        chart.curve(curve, curve.color or LINE_COLORS[number % len(LINE_COLORS)])
+    if style.is_whole:
+        chart.names(title, curves)
+    return chart.page
 
 
 def lane_chart(
     x: FloatArray,
     states: IntArray,
     names: Sequence[str],
-    colors: Sequence[Mapping[str, str]],
+    colors: Sequence[Mapping[str, Color]],
     *,
     title: str,
     x_label: str,
     marks: Sequence[Mark] = (),
     x_range: tuple[float, float] | None = None,
-) -> str:
+    style: ChartStyle = ON_PAGE,
+) -> Drawing:
     """Draw when each room was there and in which state, a lane each.
 
     Parameters
@@ -158,31 +208,26 @@ def lane_chart(
         Of the rooms.
     colors : sequence of R mappings
         For each room, the color of each state by the state's name.
-    title, x_label, marks, x_range
+    title, x_label, marks, x_range, style
         As of `line_chart`.
     """
     x_axis = axis_of(x, False) if x_range is None else Axis(*x_range, is_log=False)
-    height = TOP + BOTTOM + LANE * len(names)
-    parts = [*_frame(x_axis, None, (), x_label, height), *_marks(marks, x_axis, height)]
+    chart = _Chart(style, style.top + style.bottom + LANE * len(names), title, x_axis)
+    chart.frame(x_label)
+    chart.marks(marks)
     ends = np.append(x[1:], x_axis.high)
     for lane, (name, color) in enumerate(zip(names, colors, strict=True)):
-        y = TOP + LANE * lane
-        parts.append(
-            f'<text class="lane" x="{LEFT - 5:.0f}" y="{y + 0.8 * LANE:.1f}" text-anchor="end">'
-            f"{escape(name)}</text>"
-        )
+        y = style.top + LANE * lane
+        chart.row_name(name, y + LANE / 2, LANE_FONT, kind="lane")
         edges = np.flatnonzero(np.diff(states[lane], prepend=0, append=0)).tolist()
         for first, stop in pairwise(edges):
             if not states[lane, first]:
                 continue
             state, tint = list(color.items())[states[lane, first] - 1]
-            left, right = (_column(value, x_axis) for value in (x[first], ends[stop - 1]))
-            parts.append(
-                f'<rect x="{left:.1f}" y="{y + 1:.1f}" width="{max(right - left, 1.5):.1f}" '
-                f'height="{LANE - 2:.1f}" rx="1.5" fill="{escape(tint)}">'
-                f"<title>{escape(name)}: {escape(state)}</title></rect>"
-            )
-    return _svg(title, height, parts)
+            left, right = chart.columns(np.array([x[first], ends[stop - 1]])).tolist()
+            bar = shapely.box(left, y + 1, max(right, left + LANE_MIN_WIDTH), y + LANE - 1)
+            chart.page.add(Area(bar, tint, title=f"{name}: {state}"))
+    return chart.page
 
 
 def share_lanes(
@@ -192,7 +237,8 @@ def share_lanes(
     title: str,
     x_label: str,
     x_range: tuple[float, float] | None = None,
-) -> str:
+    style: ChartStyle = ON_PAGE,
+) -> Drawing:
     """Draw how shares rise from nothing to the whole, a lane each, one below the other.
 
     Parameters
@@ -200,94 +246,124 @@ def share_lanes(
     x : (N,) float
         Common to all lanes, ascending; at least one. A share holds until the next.
     lanes : sequence of ShareLane
-    title, x_label, x_range
+    title, x_label, x_range, style
         As of `line_chart`.
     """
     x_axis = axis_of(x, False) if x_range is None else Axis(*x_range, is_log=False)
-    height = TOP + BOTTOM + SHARE_LANE * len(lanes)
-    parts = _frame(x_axis, None, (), x_label, height)
-    columns = np.array([_column(value, x_axis) for value in x.tolist()])
+    chart = _Chart(style, style.top + style.bottom + SHARE_LANE * len(lanes), title, x_axis)
+    chart.frame(x_label)
+    columns = chart.columns(x)
     for number, lane in enumerate(lanes):
-        bottom = TOP + SHARE_LANE * (number + 1) - 1
-        parts += _share_lane(columns, lane, bottom - SHARE_LANE + 2, bottom)
-    return _svg(title, height, parts)
+        top = style.top + SHARE_LANE * number
+        chart.row_name(lane.name, top + SHARE_LANE / 2)
+        chart.page.add(*_share_lane(columns, lane, top + 1, top + SHARE_LANE - 1))
+    return chart.page
 
 
-def _share_lane(columns: FloatArray, lane: ShareLane, top: float, bottom: float) -> list[str]:
-    """Name, tint from the first share on, the shares as steps, and the line across."""
-    fill = escape(lane.color)
-    parts = [f'<text x="{LEFT - 5:.0f}" y="{bottom - 2:.1f}" text-anchor="end">{escape(lane.name)}</text>']
+def _share_lane(columns: FloatArray, lane: ShareLane, top: float, bottom: float) -> list[Shape]:
+    """Tint from the first share on, the shares as steps, and the line across."""
+    shapes: list[Shape] = []
     seen = np.flatnonzero(lane.shares > 0)
     if len(seen):
         left, right = float(columns[seen[0]]), float(columns[-1]) + LAST_WIDTH
-        parts.append(
-            f'<rect x="{left:.1f}" y="{top:.1f}" width="{right - left:.1f}" '
-            f'height="{bottom - top:.1f}" fill="{fill}" fill-opacity="{TINT_OPACITY:g}"/>'
-        )
+        shapes.append(Area(shapely.box(left, top, right, bottom), lane.color, TINT_OPACITY))
         # Where the share stays the same nothing needs to be drawn.
         steps = seen[0] + np.flatnonzero(np.diff(lane.shares[seen[0] :], prepend=0.0))
         rows = bottom - lane.shares[steps] * (bottom - top)
-        path = "".join(f"H{x:.1f}V{y:.1f}" for x, y in zip(columns[steps], rows, strict=True))
-        parts.append(
-            f'<path fill="{fill}" d="M{left:.1f} {bottom:.1f}{path}H{right:.1f}V{bottom:.1f}Z">'
-            f"<title>{escape(lane.text)}</title></path>"
-        )
+        corners = np.column_stack([np.repeat(columns[steps], 2)[1:], np.repeat(rows, 2)[:-1]])
+        rim = [[left, bottom], [left, float(rows[0])], *corners.tolist()]
+        rim += [[right, float(rows[-1])], [right, bottom]]
+        shapes.append(Area(shapely.Polygon(rim), lane.color, title=lane.text))
     if lane.reached is not None:
-        parts.append(f'<path class="axis" d="M{columns[lane.reached]:.1f} {top:.1f}V{bottom:.1f}"/>')
-    return parts
+        shapes.append(_upright(float(columns[lane.reached]), top, bottom, "axis", INK))
+    return shapes
 
 
-def _svg(title: str, height: float, parts: Sequence[str]) -> str:
-    head = (
-        f'<svg class="chart" viewBox="0 0 {WIDTH:.0f} {height:.0f}" role="img" aria-label={quoteattr(title)}>'
-    )
-    return "\n".join([head, *parts, "</svg>"])
+def _upright(x: float, top: float, bottom: float, kind: str, color: Color, title: str = "") -> Lines:
+    return Lines(shapely.LineString([(x, top), (x, bottom)]), color, 1.0, kind, title)
 
 
-def _frame(
-    x_axis: Axis, y_axis: Axis | None, rows: Sequence[float], x_label: str, height: float
-) -> list[str]:
-    """Axes with their marks and numbers."""
-    bottom, right = height - BOTTOM, WIDTH - RIGHT
-    parts = []
-    columns = [(value, _column(value, x_axis)) for value in x_axis.ticks()]
-    step = (
-        max(1, int(np.ceil(TICK_GAP_MIN / max(abs(columns[1][1] - columns[0][1]), 1e-9))))
-        if len(columns) > 1
-        else 1
-    )
-    for value, column in columns[::step]:
-        parts.append(f'<path class="grid" d="M{column:.1f} {TOP:.0f}V{bottom:.1f}"/>')
-        parts.append(f'<text x="{column:.1f}" y="{bottom + 14:.1f}" text-anchor="middle">{value:g}</text>')
-    for value in rows:
-        row = bottom - y_axis.share(value) * (bottom - TOP) if y_axis is not None else bottom
-        parts.append(f'<path class="grid" d="M{LEFT:.0f} {row:.1f}H{right:.0f}"/>')
-        parts.append(f'<text x="{LEFT - 5:.0f}" y="{row + 4:.1f}" text-anchor="end">{value:g}</text>')
-    parts.append(f'<path class="axis" d="M{LEFT:.0f} {TOP:.0f}V{bottom:.1f}H{right:.0f}"/>')
-    middle = (LEFT + right) / 2
-    parts.append(f'<text x="{middle:.0f}" y="{height - 5:.1f}" text-anchor="middle">{escape(x_label)}</text>')
-    return parts
+class _Chart:
+    """A page with axes that things are drawn along.
 
+    Parameters
+    ----------
+    style : ChartStyle
+    height : float
+        Of the page.
+    title : str
+    x_axis : Axis
+    y_axis : Axis, optional
+    """
 
-def _marks(marks: Sequence[Mark], x_axis: Axis, height: float) -> list[str]:
-    return [
-        f'<path class="mark {escape(mark.kind)}" d="M{_column(mark.x, x_axis):.1f} {TOP:.0f}'
-        f'V{height - BOTTOM:.1f}">'
-        f"<title>{escape(mark.text)}</title></path>"
-        for mark in marks
-    ]
+    def __init__(
+        self, style: ChartStyle, height: float, title: str, x_axis: Axis, y_axis: Axis | None = None
+    ) -> None:
+        paper = (255, 255, 255) if style.is_whole else None
+        self.page = Drawing(style.width, height, title, paper, "" if style.is_whole else "chart")
+        self._style, self._x_axis, self._y_axis = style, x_axis, y_axis
+        self._left, self._right = style.left, style.width - style.right
+        self._top, self._bottom = style.top, height - style.bottom
 
+    def columns(self, values: FloatArray) -> FloatArray:
+        """Where values of the horizontal axis stand on the page."""
+        return self._left + self._x_axis.share(values) * (self._right - self._left)
 
-def _column(value: float, x_axis: Axis) -> float:
-    return LEFT + x_axis.share(value) * (WIDTH - LEFT - RIGHT)
+    def _rows(self, values: FloatArray) -> FloatArray:
+        shares = np.zeros_like(values) if self._y_axis is None else self._y_axis.share(values)
+        return self._bottom - shares * (self._bottom - self._top)
 
+    def row_name(self, text: str, y: float, font: float | None = None, kind: str = "") -> None:
+        """Write what a row is, left of the axes."""
+        self.page.add(Text(text, self._left - 5, y, font or self._style.font, "end", color=INK, kind=kind))
 
-def _path(columns: NDArray[np.float64], rows: NDArray[np.float64]) -> str:
-    """Path data with gaps where a value is missing."""
-    parts, pen_down = [], False
-    for column, row in zip(columns.tolist(), rows.tolist(), strict=True):
-        known = np.isfinite(row)
-        if known:
-            parts.append(f"{'L' if pen_down else 'M'}{column:.1f} {row:.1f}")
-        pen_down = bool(known)
-    return "".join(parts)
+    def frame(self, x_label: str, rows: Sequence[float] = ()) -> None:
+        """Draw axes with their ticks and numbers."""
+        font, left, right, top, bottom = self._style.font, self._left, self._right, self._top, self._bottom
+        ticks = self._x_axis.ticks()
+        columns = self.columns(np.array(ticks)).tolist()
+        gap = abs(columns[1] - columns[0]) if len(columns) > 1 else TICK_GAP_MIN
+        step = max(1, int(np.ceil(TICK_GAP_MIN / max(gap, 1e-9))))
+        for value, column in zip(ticks[::step], columns[::step], strict=True):
+            self.page.add(_upright(column, top, bottom, "grid", GRID_COLOR))
+            self.page.add(Text(f"{value:g}", column, bottom + 0.9 * font, font, color=INK))
+        for value, row in zip(rows, self._rows(np.array(rows, float)).tolist(), strict=True):
+            self.page.add(Lines(shapely.LineString([(left, row), (right, row)]), GRID_COLOR, 1.0, "grid"))
+            self.row_name(f"{value:g}", row)
+        corner = shapely.LineString([(left, top), (left, bottom), (right, bottom)])
+        self.page.add(Lines(corner, INK, 1.0, "axis"))
+        self.page.add(Text(x_label, (left + right) / 2, self.page.height - 0.8 * font, font, color=INK))
+
+    def marks(self, marks: Sequence[Mark]) -> None:
+        """Draw vertical lines at values of the horizontal axis."""
+        columns = self.columns(np.array([mark.x for mark in marks]))
+        for mark, column in zip(marks, columns.tolist(), strict=True):
+            kind = f"mark {mark.kind}"
+            self.page.add(_upright(column, self._top, self._bottom, kind, MARK_COLOR, mark.text))
+
+    def curve(self, curve: Curve, color: Color) -> None:
+        """Draw a curve, with dots where there are few."""
+        count = len(curve.x)
+        points = np.column_stack([self.columns(curve.x), self._rows(curve.y)]).round(1)
+        known = np.isfinite(curve.y)
+        if curve.is_joined:
+            chosen = np.unique(np.linspace(0, count - 1, min(count, POINTS_MAX)).round().astype(int))
+            runs = np.split(chosen, np.flatnonzero(np.diff(known[chosen])) + 1)
+            lines = [shapely.LineString(points[run]) for run in runs if known[run[0]] and len(run) > 1]
+            self.page.add(Lines(shapely.MultiLineString(lines), color, self._style.line))
+        if count <= DOTS_MAX or not curve.is_joined:
+            for place in np.flatnonzero(known).tolist():
+                x, y = points[place].tolist()
+                told = f"{curve.name}: {curve.y[place]:.3g} at {curve.x[place]:.4g}"
+                self.page.add(Dot(x, y, self._style.dot, color, told))
+
+    def names(self, title: str, curves: Sequence[Curve]) -> None:
+        """Write the title above the axes, and the names of the curves beside them."""
+        font = self._style.font
+        self.page.add(Text(title, self._left, self._top / 2, 1.2 * font, "start", color=INK))
+        for number, curve in enumerate(curves):
+            y = self._top + (number + 0.5) * 1.6 * font
+            color = curve.color or LINE_COLORS[number % len(LINE_COLORS)]
+            sign = shapely.LineString([(self._right + 10, y), (self._right + 34, y)])
+            self.page.add(Lines(sign, color, self._style.line))
+            self.page.add(Text(curve.name, self._right + 42, y, font, "start", color=INK))

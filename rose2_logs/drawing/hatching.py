@@ -1,30 +1,82 @@
-"""The parts of rooms that nobody has seen yet, as lines to hatch them with."""
+"""Hatching of shapes, and of the parts of rooms that nobody has seen yet."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
 
-import cv2
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from rose2_logs.model.labels import straight_runs
-from rose2_logs.model.occupancy import UNKNOWN, BoolArray, FloatArray, GridGeometry
+from rose2_logs.model.occupancy import UNKNOWN, BoolArray, FloatArray
 from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot
 
-HATCH_STEP_M = 0.4
-"""Distance of the lines along a row of cells: told from a fill, and a niche of a meter gets some."""
+HATCH_GAP_M = 0.28
+"""Distance of the lines in a recording: told from a fill, and a niche of a meter gets some."""
 HATCH_MIN_M = 0.3
 """Shorter lines are left out: gaps between rays and the inside of walls and chairs."""
 
 
+def hatching(shape: BaseGeometry, gap: float) -> BaseGeometry:
+    """Lines through a shape on a page, a gap apart, which rise at 45 degrees there.
+
+    They lie at multiples of the gap, so those of shapes side by side go on in one another.
+    """
+    lines, _ = hatch_lines([shape], gap, (1.0, 1.0))
+    return shapely.multilinestrings(shapely.linestrings(lines))
+
+
+def hatch_lines(
+    shapes: Sequence[BaseGeometry], gap: float, across: tuple[float, float]
+) -> tuple[FloatArray, NDArray[np.intp]]:
+    """Find the lines through polygons or multipolygons, as scan lines fill them.
+
+    Parameters
+    ----------
+    shapes : sequence of N shapely geometries
+        May be empty.
+    gap : float
+        Distance of the lines, in the unit of the shapes.
+    across : (float, float)
+        Direction across the lines.
+
+    Returns
+    -------
+    lines : (K, 2, 2) float
+        Ends.
+    shape : (K,) int
+        Index of the shape of each.
+    """
+    rings, of_shape = _rings(shapes)
+    points, ring = shapely.get_coordinates(rings, return_index=True)
+    # Sides cross the lines whose number lies between those of their ends, the upper one left out.
+    side = np.flatnonzero(np.diff(ring) == 0)
+    number = points @ np.array(across) / np.hypot(*across) / gap
+    low, high = np.minimum(number[side], number[side + 1]), np.maximum(number[side], number[side + 1])
+    first = np.ceil(low).astype(np.intp)
+    counts = np.ceil(high).astype(np.intp) - first
+    crossing = np.repeat(side, counts)
+    line = np.repeat(first - np.cumsum(counts) + counts, counts) + np.arange(len(crossing))
+    begin, end = number[crossing], number[crossing + 1]
+    share = ((line - begin) / (end - begin))[:, None]
+    crossings = (1 - share) * points[crossing] + share * points[crossing + 1]
+    # Along a line the shape begins at one crossing and ends at the next.
+    shape = of_shape[ring[crossing]]
+    along = crossings @ np.array([across[1], -across[0]])
+    order = np.lexsort((along, line, shape))
+    return crossings[order].reshape(-1, 2, 2), shape[order][::2]
+
+
+def _rings(shapes: Sequence[BaseGeometry]) -> tuple[NDArray[np.object_], NDArray[np.intp]]:
+    """Rings of all polygons of some shapes, and the shape of each."""
+    parts, of_shape = shapely.get_parts(np.array(shapes, object), return_index=True)
+    rings, of_part = shapely.get_rings(parts, return_index=True)
+    return rings, of_shape[of_part]
+
+
 def hatch_unseen(step: TrackedSnapshot) -> tuple[FloatArray, NDArray[np.intp]]:
     """Hatch what the rooms' shapes hold of unknown cells.
-
-    The lines lie on the diagonals of the grid, so those of neighboring rooms go on in one another.
 
     Returns
     -------
@@ -33,92 +85,70 @@ def hatch_unseen(step: TrackedSnapshot) -> tuple[FloatArray, NDArray[np.intp]]:
     room : (N,) int
         Index of the room of each.
     """
-    geometry = step.analysis.geometry
-    period = max(2, round(HATCH_STEP_M / geometry.resolution_m))
-    shortest = HATCH_MIN_M / np.sqrt(2) / geometry.resolution_m
-    shapes = cells_within(step.analysis.rooms.polygons, geometry)
-    hatched = _to_hatch(step.snapshot.cells, shapes, period)
-    # Cells of all rooms together, each room's moved so far along the rows that no line reaches the next.
-    apart = hatched.cells.shape[0] + hatched.cells.shape[1]
-    rows, columns = [np.zeros(0, np.intp)], [np.zeros(0, np.intp)]
-    for room, inside, corner in shapes:
-        top, left = corner[0] - hatched.corner[0], corner[1] - hatched.corner[1]
-        window = hatched.cells[top : top + inside.shape[0], left : left + inside.shape[1]]
-        row, column = np.divmod(np.flatnonzero(inside & window), inside.shape[1])
-        rows.append(row + top)
-        columns.append(column + (left + room * apart))
-    first, last = straight_runs(np.concatenate(rows), np.concatenate(columns), (1, -1))
-    is_long = last[:, 0] - first[:, 0] >= shortest
-    ends = np.stack([first[is_long], last[is_long]], axis=1)
-    rooms, column = np.divmod(ends[..., 1], apart)
-    lines = geometry.cell_centers(ends[..., 0] + hatched.corner[0], column + hatched.corner[1])
-    return lines.reshape(-1, 4), rooms[:, 0]
+    # As on a page, where y goes down.
+    lines, room = hatch_lines(step.analysis.rooms.polygons, HATCH_GAP_M, (1.0, -1.0))
+    cells, geometry = step.snapshot.cells, step.analysis.geometry
+
+    def is_unknown(points_m: FloatArray) -> BoolArray:
+        row, column = geometry.world_to_cell(points_m).T
+        height, width = cells.shape
+        inside = (row >= 0) & (column >= 0) & (row < height) & (column < width)
+        there: BoolArray = cells[row.clip(0, height - 1), column.clip(0, width - 1)] == UNKNOWN
+        # Beyond the canvas all is.
+        there |= ~inside
+        return there
+
+    stretches, line = stretches_of(lines, is_unknown, geometry.resolution_m)
+    is_long = np.hypot(*(stretches[:, 1] - stretches[:, 0]).T) >= HATCH_MIN_M
+    return stretches[is_long].reshape(-1, 4), room[line[is_long]]
 
 
-class Covered(NamedTuple):
-    """Cells of a grid, continued beyond its canvas, that a shape covers.
+def hatch_cells(mask: BoolArray, gap: float) -> FloatArray:
+    """Lines (N, 2, 2) over the cells of a mask (H, W), a gap apart, all in cells from the first one's corner.
 
-    Attributes
-    ----------
-    number : int
-        Index of the shape.
-    inside : (h, w) bool
-        Within the shape's box.
-    corner : (int, int)
-        Row and column of the box's first cell; negative beyond the canvas.
+    They rise at 45 degrees where row 0 lies at the bottom.
     """
+    height, width = mask.shape
+    lines, _ = hatch_lines([shapely.box(0, 0, width, height)], gap, (1.0, -1.0))
 
-    number: int
-    inside: BoolArray
-    corner: tuple[int, int]
+    def is_inside(points: FloatArray) -> BoolArray:
+        column, row = np.floor(points).astype(np.intp).T
+        found: BoolArray = mask[row.clip(0, height - 1), column.clip(0, width - 1)]
+        return found
 
-
-def cells_within(shapes: Sequence[BaseGeometry], geometry: GridGeometry) -> list[Covered]:
-    """Find the cells that each of some shapes covers, those without any point left out."""
-    parts, shape = shapely.get_parts(np.array(shapes, object), return_index=True)
-    rings, part = shapely.get_rings(parts, return_index=True)
-    points, ring = shapely.get_coordinates(rings, return_index=True)
-    if not len(points):
-        return []
-    cells = geometry.world_to_grid(points) / geometry.resolution_m - 0.5
-    number, begins = np.unique(shape[part[ring]], return_index=True)
-    lows = np.floor(np.minimum.reduceat(cells, begins)).astype(int)
-    sizes = np.ceil(np.maximum.reduceat(cells, begins)).astype(int) - lows + 1
-    counts = np.diff(np.append(begins, len(points)))
-    corners = np.rint(cells - np.repeat(lows, counts, axis=0)).astype(np.int32)
-    ring_begins = np.flatnonzero(np.diff(ring)) + 1
-    found = []
-    for index, begin, count, low, size in zip(
-        number.tolist(), begins.tolist(), counts.tolist(), lows.tolist(), sizes.tolist(), strict=True
-    ):
-        inside = np.zeros((size[1], size[0]), np.uint8)
-        own = ring_begins[
-            np.searchsorted(ring_begins, begin, "right") : np.searchsorted(ring_begins, begin + count)
-        ]
-        # Rings within rings are holes to fillPoly, as they are to the shape.
-        cv2.fillPoly(inside, np.split(corners[begin : begin + count], own - begin), 1)
-        found.append(Covered(index, inside.view(bool), (low[1], low[0])))
-    return found
+    return stretches_of(lines, is_inside, 1.0)[0]
 
 
-class _Part(NamedTuple):
-    """Some cells of a grid, from the row and column of its corner on, which may lie beyond the canvas."""
+def stretches_of(
+    lines: FloatArray, is_inside: Callable[[FloatArray], BoolArray], step: float
+) -> tuple[FloatArray, NDArray[np.intp]]:
+    """Cut lines to their stretches over what is asked for.
 
-    cells: BoolArray
-    corner: tuple[int, int]
+    Parameters
+    ----------
+    lines : (N, 2, 2) float
+        Ends.
+    is_inside : callable
+        From points (K, 2) to a mask (K,).
+    step : float
+        So far apart it is asked along the lines.
 
-
-def _to_hatch(cells: NDArray[np.int8], shapes: Sequence[Covered], period: int) -> _Part:
-    """Unknown cells on every so many diagonals, in the box of all shapes; beyond the canvas all are."""
-    if not shapes:
-        return _Part(np.zeros((0, 0), bool), (0, 0))
-    top, left = (min(each.corner[axis] for each in shapes) for axis in (0, 1))
-    bottom, right = (max(each.corner[axis] + each.inside.shape[axis] for each in shapes) for axis in (0, 1))
-    marked = np.zeros((bottom - top, right - left), bool)
-    for row in range(min(period, len(marked))):
-        marked[row::period, -(row + top + left) % period :: period] = True
-    rows = slice(*np.clip([top, bottom], 0, cells.shape[0]).tolist())
-    columns = slice(*np.clip([left, right], 0, cells.shape[1]).tolist())
-    there = marked[rows.start - top : rows.stop - top, columns.start - left : columns.stop - left]
-    there &= cells[rows, columns] == UNKNOWN
-    return _Part(marked, (top, left))
+    Returns
+    -------
+    stretches : (K, 2, 2) float
+        Ends.
+    line : (K,) int
+        Index of the line of each.
+    """
+    counts = np.ceil(np.hypot(*(lines[:, 1] - lines[:, 0]).T) / step).astype(np.intp)
+    line = np.repeat(np.arange(len(lines)), counts)
+    number = np.arange(len(line)) - np.repeat(np.cumsum(counts) - counts, counts)
+    begin, along = lines[line, 0], lines[line, 1] - lines[line, 0]
+    inside = is_inside(begin + ((number + 0.5) / counts[line])[:, None] * along)
+    # A stretch begins and ends where the sample before and after is outside or of another line.
+    is_new = np.diff(line, prepend=-1) != 0
+    first = np.flatnonzero(inside & (is_new | ~np.roll(inside, 1)))
+    last = np.flatnonzero(inside & (np.roll(is_new, -1) | ~np.roll(inside, -1)))
+    line = line[first]
+    shares = np.stack([number[first], number[last] + 1], axis=1) / counts[line, None]
+    return begin[first, None] + shares[..., None] * along[first, None], line

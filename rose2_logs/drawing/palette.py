@@ -4,6 +4,11 @@ from __future__ import annotations
 
 import colorsys
 
+import numpy as np
+from numpy.typing import NDArray
+
+from rose2_logs.drawing.shapes import Color
+
 GOLDEN_RATIO = 0.618033988749895
 """Steps of the hue by this share of the circle keep any number of successive colors well apart."""
 FIRST_HUE = 0.58
@@ -15,7 +20,7 @@ STATE_TINTS = {FORMING: 0.3, SHAPED: 0.65, SETTLED: 1.0}
 """States of a room's history, and the share of its color, on white, that each is shown with."""
 
 
-def state_colors(track: int) -> dict[str, tuple[int, int, int]]:
+def state_colors(track: int) -> dict[str, Color]:
     """Colors of a track while its room forms, once its shape was right, and once its area has settled."""
     red, green, blue = track_color(track)
     return {
@@ -28,9 +33,20 @@ def state_colors(track: int) -> dict[str, tuple[int, int, int]]:
     }
 
 
-def track_color(track: int) -> tuple[int, int, int]:
+def track_color(track: int) -> Color:
     """Red, green, blue in 0..255 of a track; it depends on the track's number alone."""
     hue = (FIRST_HUE + track * GOLDEN_RATIO) % 1.0
     kind = (track // 5) % len(SATURATIONS)
     red, green, blue = colorsys.hsv_to_rgb(hue, SATURATIONS[kind], VALUES[kind])
     return round(red * 255), round(green * 255), round(blue * 255)
+
+
+def label_colors(count: int) -> NDArray[np.uint8]:
+    """Colors (count + 1, 3) of the labels of an image, RGB: those of tracks; label 0 has none, black."""
+    return np.array([(0, 0, 0), *(track_color(number) for number in range(1, count + 1))], np.uint8)
+
+
+def shaded(color: Color, share: float) -> Color:
+    """Return a color with a share of its brightness."""
+    red, green, blue = (round(value * share) for value in color)
+    return red, green, blue

@@ -2,39 +2,45 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
+from rose2_logs.drawing.drawing import Drawing
+from rose2_logs.drawing.fonts import text_width
+from rose2_logs.drawing.hatching import hatching
+from rose2_logs.drawing.map_painter import (
+    DOORWAY_COLOR,
+    INK,
+    WHITE,
+    Bounds,
+    MapPainter,
+    simpler,
+    tinted_cells,
+)
 from rose2_logs.drawing.palette import track_color
-from rose2_logs.drawing.shapes import Area, Color, Drawing, Lines, Picture, Text, hatching
-from rose2_logs.model.labels import distinct_labels
-from rose2_logs.model.room_plan import PlanMap, PlanRoom, RoomPlan, predicted_parts
+from rose2_logs.drawing.shapes import Area, Color, Lines, Text
+from rose2_logs.drawing.sheet import Key, legend, side_by_side, stacked
+from rose2_logs.model.room_plan import PlanRoom, RoomPlan, predicted_parts
 from rose2_logs.model.room_quality import UNSURE_SIGN, unsure_sign
 from rose2_logs.system.text import percent
 
-UNKNOWN_GRAY, FREE_GRAY, OCCUPIED_GRAY = 232, 255, 25
 SEEN_OPACITY, PREDICTED_OPACITY, SHAPE_OPACITY = 0.55, 0.22, 0.5
-"""Of the color on seen cells, on unseen parts, and on whole shapes where there is no map."""
-OUTLINE_DARKER, HATCH_DARKER = 0.6, 0.8
-"""Shares of the brightness of a room's color."""
-DOORWAY_COLOR: Color = (205, 45, 20)
-LABEL_GRAY: Color = (25, 25, 25)
+"""Of the color on seen cells, on unseen parts, and on shapes where no cell is known to be the room's."""
+WALL_COLOR: Color = (40, 70, 190)
 MARGIN_M = 0.5
-TALLEST = 1.3
-"""A plan is at most so many times as high as wide; a higher one is drawn narrower."""
 SCALE_BAR_SHARE = 0.25
 """The scale bar is the longest round length below this share of the plan's width."""
 ROUND_LENGTHS_M = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
-HOLE_MIN = 60.0
-"""Holes in a room's shape are drawn from this area on, square units of the page: no single cells."""
-LETTER_EM = 0.56
-"""Usual width of a letter in sizes of the font."""
-
-Bounds = tuple[float, float, float, float]
+SIDE_PX, GAP_PX = 900.0, 12.0
+"""Width of the map in the picture of a segmentation, and the gap to the next."""
+WIDE = 1.5
+"""Width over height from which a map is drawn above its rooms and not beside them."""
+LEGEND_FONT = 0.85
+"""Size of the legend's texts over that of the rooms' names."""
 
 
 @dataclass(frozen=True)
@@ -57,10 +63,12 @@ class PlanStyle:
         Whether rooms are told by name and area where they have room for it, and not by number only.
     has_legend : bool
         Whether a strip below holds a scale bar and what the signs mean.
+    has_walls : bool
+        Whether the segments of walls are drawn, where the plan knows them.
     picture_most_px : int
         Pixels along the longer side of the map's picture, at most.
     tells : bool
-        Whether rooms say what they are when they are pointed at.
+        Whether rooms say what they are when the pointer is over them.
     """
 
     width: float = 800.0
@@ -70,6 +78,7 @@ class PlanStyle:
     detail: float = 0.3
     has_names: bool = True
     has_legend: bool = True
+    has_walls: bool = False
     picture_most_px: int = 4000
     tells: bool = True
 
@@ -80,7 +89,12 @@ PANEL = PlanStyle(
 )
 
 
-def draw_plan(plan: RoomPlan, style: PlanStyle = FIGURE, bounds_m: Bounds | None = None) -> Drawing:
+def draw_plan(
+    plan: RoomPlan,
+    style: PlanStyle = FIGURE,
+    bounds_m: Bounds | None = None,
+    colors: Mapping[int, Color] | None = None,
+) -> Drawing:
     """Draw a plan.
 
     Parameters
@@ -89,66 +103,90 @@ def draw_plan(plan: RoomPlan, style: PlanStyle = FIGURE, bounds_m: Bounds | None
     style : PlanStyle
     bounds_m : (x0, y0, x1, y1), optional
         Part of the world to show, so that several plans can be compared; by default all of the plan.
+    colors : mapping of int to Color, optional
+        Color of each room by its number; by default that of its track.
     """
     x0, y0, x1, y1 = plan.bounds_m if bounds_m is None else bounds_m
-    x0, y0, x1, y1 = x0 - MARGIN_M, y0 - MARGIN_M, x1 + MARGIN_M, y1 + MARGIN_M
-    scale = min(style.width / (x1 - x0), TALLEST * style.width / (y1 - y0))
-    left = (style.width - (x1 - x0) * scale) / 2
-    height = (y1 - y0) * scale
-    strip = 3 * style.font if style.has_legend else 0.0
-    drawing = Drawing(style.width, height + strip, plan.title)
-
-    # From world meters to the page.
-    matrix = np.array([[scale, 0.0, left - x0 * scale], [0.0, -scale, y1 * scale]])
-
-    def on_page(shape: BaseGeometry) -> BaseGeometry:
-        return shapely.transform(shape, lambda xy: xy @ matrix[:, :2].T + matrix[:, 2])
-
-    if plan.map is not None:
-        drawing.add(Area(shapely.box(0, 0, style.width, height), (UNKNOWN_GRAY,) * 3))
-        drawing.add(_picture(plan.map.cropped(), matrix, style.picture_most_px))
-    shapes = {room.number: _simpler(on_page(room.shape), style.detail) for room in plan.rooms}
-    predicted = predicted_parts(plan)
+    bounds = x0 - MARGIN_M, y0 - MARGIN_M, x1 + MARGIN_M, y1 + MARGIN_M
+    painter = MapPainter(bounds, style.width, plan.title)
+    colors = {room.number: track_color(room.number) for room in plan.rooms} if colors is None else colors
+    tinted = _lay_map(painter, plan, style, colors)
+    shapes = {room.number: simpler(painter.on_page(room.shape), style.detail) for room in plan.rooms}
+    predicted = {
+        number: simpler(painter.on_page(part), style.detail) for number, part in predicted_parts(plan).items()
+    }
     # Names stand on what was seen.
-    seen = dict(shapes)
+    seen = shapes | {number: shapes[number].difference(part) for number, part in predicted.items()}
     for room in plan.rooms:
-        shape, color = shapes[room.number], track_color(room.number)
-        if plan.map is None:
-            drawing.add(Area(shape, color, SHAPE_OPACITY, _told(room)))
-        elif room.number in predicted:
-            part = _simpler(on_page(predicted[room.number]), style.detail)
-            seen[room.number] = shape.difference(part)
-            lines = Lines(hatching(part, style.hatch_gap), _darker(color, HATCH_DARKER), 0.7 * style.line)
-            drawing.add(Area(part, color, PREDICTED_OPACITY), lines)
+        number = room.number
+        if number not in tinted:
+            painter.area(seen[number], colors[number], SHAPE_OPACITY, _told(room) if style.tells else "")
+        if number in predicted:
+            painter.area(predicted[number], colors[number], PREDICTED_OPACITY)
+            lines = hatching(predicted[number], style.hatch_gap)
+            painter.hatch(lines, colors[number], 0.7 * style.line)
     for number, shape in shapes.items():
-        drawing.add(Lines(shape, _darker(track_color(number)), style.line))
-    doors = on_page(shapely.MultiLineString([door.ends_m for door in plan.doorways]))
-    drawing.add(Lines(doors, (255, 255, 255), 4 * style.line), Lines(doors, DOORWAY_COLOR, 2.4 * style.line))
-    if plan.map is not None and style.tells:
-        # Nothing to be seen, but pointed at they tell what they are.
-        white = (255, 255, 255)
-        drawing.add(*(Area(shapes[room.number], white, 0.0, _told(room)) for room in plan.rooms))
+        painter.outline(shape, colors[number], style.line)
+    if style.has_walls and plan.walls_m is not None:
+        painter.lines(plan.walls_m, WALL_COLOR, 1.5 * style.line)
+    doors = np.array([door.ends_m for door in plan.doorways]).reshape(-1, 2, 2)
+    painter.lines(doors, DOORWAY_COLOR, 2.4 * style.line, rim=0.8 * style.line)
+    if style.tells:
+        # Nothing to be seen, but under the pointer they say what they are.
+        for room in plan.rooms:
+            if room.number in tinted:
+                painter.area(shapes[room.number], WHITE, 0.0, _told(room))
     if style.font:
         for room in plan.rooms:
             name_on = seen[room.number] if seen[room.number].area else shapes[room.number]
-            drawing.add(*_label(room, name_on, style))
+            _write_name(painter, room, name_on, style)
     if style.has_legend:
-        # Rays may go on beyond the plan.
-        drawing.add(Area(shapely.box(0, height, style.width, height + strip), drawing.paper))
-        drawing.add(*_legend(plan, style, scale, height, has_predicted=bool(predicted)))
+        _add_legend(painter, plan, style, has_predicted=bool(predicted))
+    return painter.drawing
+
+
+def draw_segmentation(plan: RoomPlan) -> Drawing:
+    """Draw a map as it was recorded, and below or beside it with its rooms, walls and doorways.
+
+    Parameters
+    ----------
+    plan : RoomPlan
+        With a map.
+
+    Raises
+    ------
+    ValueError
+        If it has none.
+    """
+    if plan.map is None:
+        raise ValueError("a plan without a map has no segmentation to be drawn")
+    corners = plan.map.cropped().geometry.corners_m()
+    x0, y0, x1, y1 = plan.bounds_m
+    low = np.minimum(corners.min(axis=0), (x0, y0)).tolist()
+    high = np.maximum(corners.max(axis=0), (x1, y1)).tolist()
+    bounds: Bounds = (low[0], low[1], high[0], high[1])
+    unlabeled = replace(plan.map, labels=np.zeros_like(plan.map.labels))
+    recorded = RoomPlan(plan.title, plan.frame_id, (), (), None, unlabeled)
+    style = replace(FIGURE, width=SIDE_PX, has_walls=True, tells=False)
+    parts = [
+        draw_plan(recorded, replace(style, has_legend=False), bounds),
+        draw_plan(plan, style, bounds),
+    ]
+    is_wide = parts[0].width > WIDE * parts[0].height
+    drawing = stacked(parts, GAP_PX) if is_wide else side_by_side(parts, GAP_PX)
+    drawing.title = plan.title
     return drawing
 
 
-def _simpler(shape: BaseGeometry, detail: float) -> BaseGeometry:
-    """Return a shape on the page without what is too small to be read there."""
-    parts = []
-    for part in shapely.get_parts(shape.simplify(detail)):
-        if part.is_empty:
-            continue
-        rings = shapely.polygons(shapely.get_rings(part))
-        holes = [ring.exterior for ring in rings[1:] if ring.area >= HOLE_MIN]
-        parts.append(shapely.Polygon(rings[0].exterior, holes))
-    return shapely.MultiPolygon(parts)
+def _lay_map(painter: MapPainter, plan: RoomPlan, style: PlanStyle, colors: Mapping[int, Color]) -> set[int]:
+    """Lay the map on the page; return the numbers of the rooms that its cells show."""
+    if plan.map is None:
+        return set()
+    below = plan.map.cropped()
+    painter.ground()
+    pixels = tinted_cells(below.cells, below.labels, colors, SEEN_OPACITY)
+    painter.picture(pixels, below.geometry, style.picture_most_px)
+    return {room.number for room in plan.rooms} & set(np.unique(below.labels).tolist())
 
 
 def _told(room: PlanRoom) -> str:
@@ -158,101 +196,54 @@ def _told(room: PlanRoom) -> str:
     return f"{room.name}: {room.area_m2:.1f} m² seen of {room.predicted_area_m2:.1f} m²{sure}"
 
 
-def _picture(below: PlanMap, to_page: NDArray[np.float64], most_px: int) -> Picture:
-    """Cells as a picture; reduced where they are more than the page can show."""
-    import cv2
-
-    cells, labels = below.cells, below.labels
-    # The color of each value of a cell, one row for each room after that of none.
-    values = np.arange(2**8)
-    gray = np.interp(values, (0, 100), (FREE_GRAY, OCCUPIED_GRAY))
-    gray[values > 100] = UNKNOWN_GRAY
-    numbers = [number for number in distinct_labels(labels)[0].tolist() if number > 0]
-    tints = np.array([track_color(number) for number in numbers], float).reshape(-1, 1, 3)
-    tinted = (1 - SEEN_OPACITY) * gray[:, None] + SEEN_OPACITY * tints
-    table = np.concatenate([np.repeat(gray[:, None], 3, axis=1)[None], tinted])
-    row = np.zeros(max([0, *numbers]) + 1, np.uint16)
-    row[numbers] = np.arange(1, len(numbers) + 1)
-    pixels = np.round(table).astype(np.uint8)[row[labels], cells.view(np.uint8)]
-    height, width = cells.shape
-    block = -(-max(height, width) // most_px)
-    size = (-(-width // block), -(-height // block))
-    if block > 1:
-        pixels = np.asarray(cv2.resize(pixels, size, interpolation=cv2.INTER_AREA), np.uint8)
-    geometry = below.geometry
-    meters = np.array([width / size[0], height / size[1]]) * geometry.resolution_m
-    to_world = np.column_stack([geometry.rotation * meters, geometry.origin_xy_m])
-    linear = to_page[:, :2] @ to_world
-    linear[:, 2] += to_page[:, 2]
-    return Picture(pixels, linear)
-
-
-def _label(room: PlanRoom, shape: BaseGeometry, style: PlanStyle) -> list[Text]:
-    """Name and area of a room where they have room, else its number."""
+def _write_name(painter: MapPainter, room: PlanRoom, shape: BaseGeometry, style: PlanStyle) -> None:
+    """Write name and area of a room where they have room, else its number."""
     if shape.is_empty:
-        return []
+        return
     circle = shapely.maximum_inscribed_circle(shape, tolerance=0.5)
     (x, y), radius = shapely.get_coordinates(circle)[0].tolist(), float(shapely.length(circle))
     area = f"{room.area_m2:.0f} m²" if room.area_m2 >= 10 else f"{room.area_m2:.1f} m²"
-    font, rim = style.font, 0.14 * style.font
+    font = style.font
     sign = unsure_sign(room.wall_support)
     number, name = f"{room.number}{sign}", f"{room.name}{sign}"
-    if not style.has_names:
-        return [Text(number, x, y, font, is_bold=True, rim=rim)]
-    name = name if _fits(name, font, radius, lines=2) else number
     small = 0.8 * font
-    if _fits(area, small, radius, lines=2):
-        return [
-            Text(name, x, y - 0.5 * font, font, is_bold=True, rim=rim),
-            Text(area, x, y + 0.6 * font, small, rim=rim),
-        ]
-    return [Text(number, x, y, font, is_bold=True, rim=rim)]
+    if not (style.has_names and _fits(area, small, radius, lines=2)):
+        painter.name(number, x, y, font)
+        return
+    painter.name(name if _fits(name, font, radius, lines=2) else number, x, y - 0.5 * font, font)
+    painter.name(area, x, y + 0.6 * font, small, is_bold=False)
 
 
 def _fits(text: str, font: float, radius: float, lines: int) -> bool:
-    return bool(np.hypot(LETTER_EM * font * len(text), lines * font) <= 2 * radius)
+    return bool(np.hypot(text_width(text, font), lines * font) <= 2 * radius)
 
 
-def _legend(
-    plan: RoomPlan, style: PlanStyle, scale: float, top: float, *, has_predicted: bool
-) -> list[Area | Lines | Text]:
-    """Scale bar, and what the signs mean, in the strip below the plan."""
-    font, line = 0.85 * style.font, style.line
-    y = top + 1.7 * style.font
-    shapes: list[Area | Lines | Text] = []
-    longest = SCALE_BAR_SHARE * style.width / scale
+def _add_legend(painter: MapPainter, plan: RoomPlan, style: PlanStyle, *, has_predicted: bool) -> None:
+    """Put a scale bar, and what the signs mean, in a strip below the plan."""
+    page, font = painter.drawing, LEGEND_FONT * style.font
+    longest = SCALE_BAR_SHARE * style.width / painter.scale
     length_m = max((length for length in ROUND_LENGTHS_M if length <= longest), default=ROUND_LENGTHS_M[0])
-    x, x1 = font, font + length_m * scale
-    tick = 0.35 * font
-    bar = [[(x, y), (x1, y)], [(x, y - tick), (x, y + tick)], [(x1, y - tick), (x1, y + tick)]]
-    shapes.append(Lines(shapely.MultiLineString(bar), LABEL_GRAY, 1.3 * line))
-    shapes.append(Text(f"{length_m:g} m", x1 + 0.6 * font, y, font, is_centered=False))
-    x = x1 + 0.6 * font + 6 * LETTER_EM * font
-    example = plan.rooms[0].number if plan.rooms else 1
-    color = track_color(example)
-    signs: list[tuple[str, str]] = [("room", "room, seen" if plan.map is not None else "room")]
-    signs += [("predicted", "predicted, unseen")] if has_predicted else []
-    signs += [("doorway", "doorway")] if plan.doorways else []
-    signs += [("unsure", "unsure, little wall around")] if any(room.is_unsure for room in plan.rooms) else []
-    for sign, text in signs:
-        box = shapely.box(x, y - 0.5 * font, x + 1.8 * font, y + 0.5 * font)
-        if sign == "doorway":
-            shapes.append(Lines(shapely.LineString([(x, y), (x + 1.8 * font, y)]), DOORWAY_COLOR, 2.4 * line))
-        elif sign == "unsure":
-            shapes.append(Text(f"7{UNSURE_SIGN}", x + 0.9 * font, y, font, is_bold=True))
-        elif sign == "predicted":
-            shapes += [
-                Area(box, color, PREDICTED_OPACITY),
-                Lines(hatching(box, style.hatch_gap), _darker(color, HATCH_DARKER), 0.7 * line),
-                Lines(box, _darker(color), line),
-            ]
-        else:
-            shapes += [Area(box, color, SEEN_OPACITY), Lines(box, _darker(color), line)]
-        shapes.append(Text(text, x + 2.3 * font, y, font, is_centered=False))
-        x += 2.3 * font + (len(text) + 2.5) * LETTER_EM * font
-    return shapes
-
-
-def _darker(color: Color, share: float = OUTLINE_DARKER) -> Color:
-    red, green, blue = (round(value * share) for value in color)
-    return red, green, blue
+    label = f"{length_m:g} m"
+    x, tick = font + length_m * painter.scale, 0.35 * font
+    color = track_color(plan.rooms[0].number if plan.rooms else 1)
+    keys = []
+    if plan.rooms:
+        keys.append(Key("room, seen" if plan.map is not None else "room", color, opacity=SEEN_OPACITY))
+    if has_predicted:
+        keys.append(Key("predicted, unseen", color, "hatched", PREDICTED_OPACITY))
+    if plan.doorways:
+        keys.append(Key("doorway", DOORWAY_COLOR, "line"))
+    if style.has_walls and plan.walls_m is not None and len(plan.walls_m):
+        keys.append(Key("wall segment", WALL_COLOR, "line"))
+    if any(room.is_unsure for room in plan.rooms):
+        keys.append(Key("unsure, little wall around", kind="sign", sign=f"7{UNSURE_SIGN}"))
+    strip = legend(keys, style.width, font, indent=x + text_width(label, font) + 3 * font)
+    top = page.height
+    page.height += strip.height + 1.4 * style.font
+    # Rays may go on beyond the plan.
+    page.add(Area(shapely.box(0, top, style.width, page.height), page.paper or WHITE))
+    page.lay(strip, 0.0, top + 0.7 * style.font)
+    y = top + 0.7 * style.font + 0.8 * font
+    bar = [[(font, y), (x, y)], [(font, y - tick), (font, y + tick)], [(x, y - tick), (x, y + tick)]]
+    page.add(Lines(shapely.MultiLineString(bar), INK, 1.3 * style.line))
+    page.add(Text(label, x + 0.6 * font, y, font, "start"))

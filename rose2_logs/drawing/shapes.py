@@ -1,8 +1,10 @@
-"""What a drawing is made of, whatever it is written as: areas, lines, texts and a picture on a page."""
+"""What a drawing is made of, whatever it is written as: areas, lines, dots, texts and pictures on a page."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from typing import Literal
 
 import numpy as np
 import shapely
@@ -21,8 +23,8 @@ class Picture:
 
     Attributes
     ----------
-    pixels : (H, W, 3) uint8
-        RGB, row 0 first.
+    pixels : (H, W, 3) or (H, W, 4) uint8
+        RGB, or RGB and opacity; row 0 first.
     matrix : (2, 3) float
         From the corner of a pixel (column, row, 1) to the page.
     """
@@ -43,7 +45,7 @@ class Area:
     opacity : float
         In [0, 1].
     title : str
-        What a viewer tells when it is pointed at; empty for nothing.
+        What a viewer shows when the pointer is over it; empty for nothing.
     """
 
     shape: BaseGeometry
@@ -63,45 +65,67 @@ class Lines:
     color : Color
     width : float
         Units of the page.
+    kind : str
+        Class in the style of an HTML page, which may give it another color; empty for none.
+    title : str
+        What a viewer shows when the pointer is over it; empty for nothing.
     """
 
     shape: BaseGeometry
     color: Color
     width: float
+    kind: str = ""
+    title: str = ""
+
+
+@dataclass(frozen=True)
+class Dot:
+    """A filled circle around (x, y); its title is shown when the pointer is over it."""
+
+    x: float
+    y: float
+    radius: float
+    fill: Color
+    title: str = ""
 
 
 @dataclass(frozen=True)
 class Text:
-    """One line of text with a pale rim that keeps it readable on anything.
+    """One line of text, with a pale rim that keeps it readable on anything.
 
     Attributes
     ----------
     text : str
     x, y : float
-        Where its middle, or its left end, lies; y at the middle of its height.
+        Where its anchor lies; y at the middle of its height.
     size : float
         Height of the font.
-    is_bold, is_centered : bool
+    anchor : {"start", "middle", "end"}
+        Which part of the text lies at x.
+    is_bold : bool
     color : Color
     rim : float
         Width of the rim, 0 for none.
+    kind : str
+        As of `Lines`.
     """
 
     text: str
     x: float
     y: float
     size: float
+    anchor: Literal["start", "middle", "end"] = "middle"
     is_bold: bool = False
-    is_centered: bool = True
     color: Color = (25, 25, 25)
     rim: float = 0.0
+    kind: str = ""
 
 
-Shape = Picture | Area | Lines | Text
+Shape = Picture | Area | Lines | Dot | Text
 
 
-@dataclass(eq=False)
-class Drawing:
+@dataclass(eq=False, repr=False)
+class Page:
     """A page and what lies on it, the lowest first.
 
     Attributes
@@ -110,36 +134,52 @@ class Drawing:
         Of the page, in its own units; y goes down.
     title : str
         What it shows, for those who cannot see it.
-    paper : Color
+    paper : Color or None
+        None lets what lies below an SVG show through; pixels are white there.
+    kind : str
+        Class of the whole in the style of an HTML page; empty for none.
     shapes : list of Shape
     """
 
     width: float
     height: float
     title: str = ""
-    paper: Color = (255, 255, 255)
+    paper: Color | None = (255, 255, 255)
+    kind: str = ""
     shapes: list[Shape] = field(default_factory=list)
 
     def add(self, *shapes: Shape) -> None:
         """Lay shapes on top."""
         self.shapes += shapes
 
+    def lay(self, page: Page, x: float, y: float, scale: float = 1.0) -> None:
+        """Lay what is on another page on top, its upper left corner at (x, y)."""
+        self.shapes += _moved(page.shapes, x, y, scale)
 
-def hatching(shape: BaseGeometry, gap: float) -> BaseGeometry:
-    """Lines through a shape, rising at 45 degrees, a gap apart from each other on the page."""
-    if shape.is_empty:
-        return shapely.MultiLineString()
-    x0, y0, x1, y1 = shape.bounds
-    step = gap * np.sqrt(2)
-    # Where lines x + y = c cross the box; from a multiple of the step, so that areas side by side fit.
-    sums = np.arange(np.floor((x0 + y0) / step) * step, x1 + y1 + step, step)
-    lines = shapely.linestrings(
-        np.stack(
-            [
-                np.column_stack([sums - y0, np.full_like(sums, y0)]),
-                np.column_stack([sums - y1, np.full_like(sums, y1)]),
-            ],
-            axis=1,
-        )
-    )
-    return shapely.intersection(shapely.multilinestrings(lines), shape)
+
+def _moved(shapes: list[Shape], x: float, y: float, scale: float) -> Iterator[Shape]:
+    """Yield shapes scaled about the page's corner and then shifted."""
+
+    def there(shape: BaseGeometry) -> BaseGeometry:
+        return shapely.transform(shape, lambda xy: xy * scale + (x, y))
+
+    for each in shapes:
+        match each:
+            case Picture():
+                matrix = np.asarray(each.matrix) * scale
+                matrix[:, 2] += (x, y)
+                yield replace(each, matrix=matrix)
+            case Area():
+                yield replace(each, shape=there(each.shape))
+            case Lines():
+                yield replace(each, shape=there(each.shape), width=each.width * scale)
+            case Dot():
+                yield replace(each, x=each.x * scale + x, y=each.y * scale + y, radius=each.radius * scale)
+            case Text():
+                yield replace(
+                    each,
+                    x=each.x * scale + x,
+                    y=each.y * scale + y,
+                    size=each.size * scale,
+                    rim=each.rim * scale,
+                )

@@ -12,7 +12,7 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from rose2_logs.drawing.shapes import Area, Color, Drawing, Lines, Picture, Shape, Text
+from rose2_logs.drawing.shapes import Area, Color, Dot, Lines, Page, Picture, Shape, Text
 
 FONTS = "Helvetica, Arial, 'Liberation Sans', 'DejaVu Sans', sans-serif"
 DECIMALS = 2
@@ -24,29 +24,33 @@ _NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 """Characters that no XML may hold, not even escaped; names in a log may."""
 
 
-def as_svg(drawing: Drawing, *, is_inline: bool = False) -> str:
+def as_svg(page: Page, *, is_inline: bool = False) -> str:
     """Write a drawing.
 
     Parameters
     ----------
-    drawing : Drawing
+    page : Page
     is_inline : bool
         For a place within an HTML page: no XML declaration, and it fills the width it is given.
     """
-    width, height = _number(drawing.width), _number(drawing.height)
+    width, height = _number(page.width), _number(page.height)
     size = "" if is_inline else f' width="{width}" height="{height}"'
     head = (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}"{size} role="img" '
-        f'aria-label={quoteattr(drawing.title)} font-family="{FONTS}">'
+        f'<svg xmlns="http://www.w3.org/2000/svg"{_class(page.kind)} viewBox="0 0 {width} {height}"{size} '
+        f'role="img" aria-label={quoteattr(page.title)} font-family="{FONTS}">'
     )
-    title = "" if is_inline else f"<title>{escape(drawing.title)}</title>"
-    paper = f'<rect width="{width}" height="{height}" fill="{_color(drawing.paper)}"/>'
-    body = "\n".join([head, title + paper, *(_element(shape) for shape in drawing.shapes), "</svg>"])
+    title = "" if is_inline else f"<title>{escape(page.title)}</title>"
+    paper = (
+        ""
+        if page.paper is None
+        else f'<rect width="{width}" height="{height}" fill="{css_color(page.paper)}"/>'
+    )
+    body = "\n".join([head, title + paper, *(_element(shape) for shape in page.shapes), "</svg>"])
     return body if is_inline else f'<?xml version="1.0" encoding="UTF-8"?>\n{body}\n'
 
 
 def png_uri(pixels: NDArray[np.uint8], *, few_colors: bool = False) -> str:
-    """Return pixels (H, W, 3) as a PNG in a data URI, with few colors a third as large."""
+    """Return pixels (H, W, 3 or 4) as a PNG in a data URI, with few colors a third as large."""
     from PIL import Image
 
     stream = io.BytesIO()
@@ -66,16 +70,33 @@ def _element(shape: Shape) -> str:
                 f'preserveAspectRatio="none" style="image-rendering:pixelated" href="{png_uri(pixels)}"/>'
             )
         case Area(geometry, fill, opacity, title):
-            inner = f"><title>{escape(title)}</title></path>" if title else "/>"
             shown = "" if opacity == 1 else f' fill-opacity="{opacity:g}"'
-            return f'<path d="{_path(geometry)}" fill="{_color(fill)}"{shown} fill-rule="evenodd"{inner}'
-        case Lines(geometry, color, thickness):
             return (
-                f'<path d="{_path(geometry)}" fill="none" stroke="{_color(color)}" '
-                f'stroke-width="{_number(thickness)}" stroke-linejoin="round" stroke-linecap="butt"/>'
+                f'<path d="{_path(geometry)}" fill="{css_color(fill)}"{shown} fill-rule="evenodd"'
+                f"{_end('path', title)}"
+            )
+        case Lines(geometry, color, thickness, kind, title):
+            return (
+                f'<path{_class(kind)} d="{_path(geometry)}" fill="none" stroke="{css_color(color)}" '
+                f'stroke-width="{_number(thickness)}" stroke-linejoin="round" stroke-linecap="butt"'
+                f"{_end('path', title)}"
+            )
+        case Dot(x, y, radius, fill, title):
+            return (
+                f'<circle cx="{_number(x)}" cy="{_number(y)}" r="{_number(radius)}" '
+                f'fill="{css_color(fill)}"{_end("circle", title)}'
             )
         case Text():
             return _text(shape)
+
+
+def _end(tag: str, title: str) -> str:
+    """End of an element, with the title that it holds."""
+    return f"><title>{escape(title)}</title></{tag}>" if title else "/>"
+
+
+def _class(kind: str) -> str:
+    return f" class={quoteattr(kind)}" if kind else ""
 
 
 def _text(text: Text) -> str:
@@ -85,9 +106,9 @@ def _text(text: Text) -> str:
         else ""
     )
     return (
-        f'<text x="{_number(text.x)}" y="{_number(text.y + MIDDLE_EM * text.size)}" '
-        f'font-size="{_number(text.size)}" fill="{_color(text.color)}"{rim}'
-        f"{' text-anchor=' + quoteattr('middle') if text.is_centered else ''}"
+        f'<text{_class(text.kind)} x="{_number(text.x)}" y="{_number(text.y + MIDDLE_EM * text.size)}" '
+        f'font-size="{_number(text.size)}" fill="{css_color(text.color)}"{rim}'
+        f"{'' if text.anchor == 'start' else ' text-anchor=' + quoteattr(text.anchor)}"
         f"{' font-weight=' + quoteattr('bold') if text.is_bold else ''}>{escape(text.text)}</text>"
     )
 
@@ -123,5 +144,6 @@ def _number(value: float) -> str:
     return f"{round(value, DECIMALS) + 0.0:.{DECIMALS}f}".rstrip("0").rstrip(".")
 
 
-def _color(color: Color) -> str:
+def css_color(color: Color) -> str:
+    """Return a color as CSS has it."""
     return f"#{color[0]:02x}{color[1]:02x}{color[2]:02x}"

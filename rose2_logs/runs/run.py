@@ -19,7 +19,7 @@ from rose2_logs.runs.tables import BACK_PROJECTED, Row
 from rose2_logs.system.text import percent
 
 if TYPE_CHECKING:
-    from rose2_logs.drawing.shapes import Drawing
+    from rose2_logs.drawing.drawing import Drawing
 
 
 class Run(StoredRun, Sequence["RunSnapshot"]):

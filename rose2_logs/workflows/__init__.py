@@ -1,4 +1,6 @@
 """What a user asks for, from input to written results: one module per command."""
 
-FIGURE_WIDTH_PX = 1800
-"""Default width of a figure as PNG: 15 cm, a text's width, at 300 dots per inch."""
+from rose2_logs.drawing import PRINT_WIDTH_PX
+
+FIGURE_WIDTH_PX = PRINT_WIDTH_PX
+"""Default width of a figure as PNG."""

@@ -57,8 +57,7 @@ def compare_runs(
     OutputError
         If there is a comparison already and it may not be replaced, or a file cannot be written.
     """
-    from rose2_logs.drawing.image_files import write_image
-    from rose2_logs.drawing.layout_picture import draw_layout_comparison
+    from rose2_logs.drawing.comparison_picture import draw_comparison
     from rose2_logs.outputs.comparison_tables import write_comparison_summary, write_comparison_tables
 
     files = tuple(folder / name for name in FILES)
@@ -67,7 +66,7 @@ def compare_runs(
     comparison = compare_stored(Run(folder_a), Run(folder_b), name_a, name_b)
     write_comparison_tables(files[0], files[1], comparison)
     write_comparison_summary(files[2], comparison, folder_a, folder_b)
-    write_image(files[3], draw_layout_comparison(comparison))
+    draw_comparison(comparison).save(files[3], width_px=None)
     if recording:
         from rose2_logs.outputs.rerun.comparison import write_comparison_recording
 

@@ -10,9 +10,8 @@ from typing import Any
 
 from rose2_logs.config.parameters import Parameters
 from rose2_logs.config.run_options import RunOptions, check_option
-from rose2_logs.drawing.case_pictures import CasePictures
-from rose2_logs.drawing.curves import draw_along
-from rose2_logs.drawing.image_files import write_image, write_label_image
+from rose2_logs.drawing.evaluation_pictures import CasePictures, draw_along
+from rose2_logs.drawing.image_files import write_label_image
 from rose2_logs.evaluation.along import RunPoint, along_as_json, along_runs
 from rose2_logs.evaluation.benchmark import CaseResult, evaluate_cases, figures, group_means
 from rose2_logs.evaluation.cases import load_cases
@@ -123,5 +122,5 @@ def evaluate_method(
     runs = along_runs(results) if along else {}
     if pictures is not None:
         for name, points in runs.items():
-            write_image(pictures / f"{name}.along.png", draw_along(f"{name}, {method}", points))
+            draw_along(f"{name}, {method}", points).save(pictures / f"{name}.along.png", width_px=None)
     return Evaluation(method, used, tuple(results), group_means(results), runs, tracks.scores())

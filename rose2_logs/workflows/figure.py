@@ -5,16 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from rose2_logs.drawing.image_files import write_image
-from rose2_logs.drawing.pixels import as_pixels
-from rose2_logs.drawing.svg import as_svg
+from rose2_logs.drawing.drawing import ENDINGS
 from rose2_logs.errors import ParameterError
 from rose2_logs.outputs.exports.formats import planned_files, write_plan
 from rose2_logs.runs.run import Run
-from rose2_logs.system.files import refuse_existing, replacing
+from rose2_logs.system.files import refuse_existing
 from rose2_logs.workflows import FIGURE_WIDTH_PX
-
-PICTURE_ENDINGS = (".png", ".svg")
 
 
 def write_figure(
@@ -63,17 +59,10 @@ def write_figure(
     number = results.choose(snapshot, coverage)
     stem = f"{_stem(results, number)}.back_projected" if back_projected else _stem(results, number)
     out = folder / f"{stem}.figure.png" if out is None else out
-    kind = out.suffix.lower()
-    if kind not in PICTURE_ENDINGS:
-        raise ParameterError(f"{out}: a figure is {' or '.join(PICTURE_ENDINGS)}; let its name end so")
+    if out.suffix.lower() not in ENDINGS:
+        raise ParameterError(f"{out}: a figure is {' or '.join(ENDINGS)}; let its name end so")
     refuse_existing([out], overwrite=overwrite)
-    drawing = results.figure(number, back_projected=back_projected)
-    if kind == ".png":
-        write_image(out, as_pixels(drawing, width_px))
-    else:
-        with replacing(out) as part:
-            part.write_text(as_svg(drawing), encoding="utf-8")
-    return out
+    return results.figure(number, back_projected=back_projected).save(out, width_px)
 
 
 def export_plan(

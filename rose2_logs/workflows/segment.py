@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from rose2_logs.config.parameters import Parameters, ReadingParameters
-from rose2_logs.drawing.image_files import write_image, write_label_image
-from rose2_logs.drawing.room_picture import draw_rooms
+from rose2_logs.drawing.image_files import write_label_image
+from rose2_logs.drawing.plan import draw_segmentation
 from rose2_logs.errors import LogError, ParameterError
 from rose2_logs.io import open_log
 from rose2_logs.io.discovery import IMAGE_ENDINGS
@@ -92,7 +92,7 @@ def segment_map(
     write_label_image(files[0], np.flipud(analysis.rooms.labels))
     plan = plan_of_analysis(snapshot, analysis, analysis.quality, name, parameters.occupancy)
     write_json(files[1], plan_geojson(plan, analysis.walls))
-    write_image(files[2], draw_rooms(snapshot, analysis))
+    draw_segmentation(plan).save(files[2])
     more = write_plan(plan, [each for each in formats if each != "geojson"], folder, name)
     return StaticMapResult(analysis.rooms, folder, (*files, *more))
 

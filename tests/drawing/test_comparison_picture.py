@@ -1,107 +1,97 @@
-"""Comparison pictures: colors of partners, marked errors, readable size, text that fits."""
+"""The picture of two layouts: each in its place, what differs in the colors of the legend."""
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
+import shapely
+from support.drawn_plans import two_rooms_plan
 
-from rose2_logs.drawing.case_picture import (
-    MARK_COLORS,
-    SIDE_MIN_PX,
-    draw_comparison,
-    draw_panels,
-    room_colors,
-    text_line,
-)
-from rose2_logs.evaluation.case_errors import Mark, compare
-from rose2_logs.evaluation.scores import score
+from rose2_logs.comparison.final_layout import FinalLayout
+from rose2_logs.comparison.layouts import LayoutComparison
+from rose2_logs.comparison.placement import PlacedMap, Placement
+from rose2_logs.comparison.room_changes import RoomChange
+from rose2_logs.comparison.wall_changes import WallChange, WallComparison
+from rose2_logs.config.parameters import OccupancyParameters
+from rose2_logs.drawing.comparison_picture import ROOM_COLORS, WALL_COLORS, draw_comparison
+from rose2_logs.drawing.palette import track_color
+from rose2_logs.drawing.shapes import Area, Lines, Picture, Text
+from rose2_logs.model.occupancy import OccupancySnapshot
+from rose2_logs.tracking.registration import RigidMotion
 
-WALL, FREE = 100, 0
+NOTHING = shapely.Polygon()
 
 
 @pytest.fixture
-def drawn():
-    """Cells, truth, found: true rooms 1 and 2; found 3 is room 1 and a half of room 2, found 4 the rest."""
-    cells = np.full((40, 62), -1, np.int8)
-    cells[8:32, 10:52] = WALL
-    cells[10:30, 12:30] = cells[10:30, 32:50] = FREE
-    truth, found = np.zeros(cells.shape, int), np.zeros(cells.shape, int)
-    truth[10:30, 12:30], truth[10:30, 32:50] = 1, 2
-    found[10:30, 12:30] = found[10:18, 32:50] = 3
-    found[18:30, 32:46] = 4
-    return cells, truth, found
+def comparison() -> LayoutComparison:
+    """A has rooms 1 and 2; in B, which lies 3 m to the left of it, the first is 7 and the second is gone."""
+    plan = two_rooms_plan(origin_xy_m=(0.0, 0.0))
+    snapshot = OccupancySnapshot(0, 0, 0, "drawn", plan.map.cells, plan.map.geometry)
+    left, right = (room.shape for room in plan.rooms)
+    moved = dataclasses.replace(plan.map.geometry, origin_xy_m=(-3.0, 0.0))
+    occupancy = OccupancyParameters()
+    b_to_a = RigidMotion.moving(np.zeros(2), np.array([3.0, 0.0]), 0.0)
+    a = FinalLayout("a", PlacedMap(snapshot, occupancy), (1, 2), (left, right), np.array([12.0, 6.0]), None)
+    b = FinalLayout(
+        "b",
+        PlacedMap(dataclasses.replace(snapshot, geometry=moved), occupancy),
+        (7,),
+        (shapely.transform(left, lambda xy: xy - (3.0, 0.0)),),
+        np.array([12.0]),
+        None,
+    )
+    rooms = (
+        RoomChange("same", (1,), (7,), 1.0, 1.0, 1.0, 12.0, 12.0, left, left),
+        RoomChange("missing", (2,), (), 0.0, None, 1.0, 6.0, 0.0, right, NOTHING),
+        RoomChange("unseen", (), (9,), 0.0, None, 0.0, 0.0, 4.0, NOTHING, shapely.box(1, 0, 3, 0.9)),
+    )
+    walls = WallComparison(
+        (
+            WallChange("moved", np.array([1.0, 1, 5, 1]), np.array([1.0, 1.3, 5, 1.3]), 0.3),
+            WallChange("new", None, np.array([5.0, 1, 5, 4])),
+        ),
+        20.0,
+        20.0,
+    )
+    return LayoutComparison(a, b, Placement(b_to_a, 1.0, 1.0, 1.0, 0.1), rooms, walls)
 
 
-def at(panel, row: int, column: int) -> tuple[int, ...]:
-    """Color of a cell of the drawing in a panel, which is cropped to rows 2..37 and columns 4..57."""
-    scale = panel.shape[1] // 54
-    assert panel.shape == (36 * scale, 54 * scale, 3)
-    y, x = int((row - 2 + 0.5) * scale), int((column - 4 + 0.5) * scale)
-    return tuple(panel[y, x].tolist())
+def test_statuses_stand_in_the_legend_in_their_colors(comparison: LayoutComparison):
+    page = draw_comparison(comparison)
+    texts = {each.text for each in page.shapes if isinstance(each, Text)}
+    assert {"same: 1", "missing: 1", "unseen: 1", "wall moved: 4.0 m", "wall new: 3.0 m"} <= texts
+    assert {"what differs", "A: a", "B: b, laid over A"} <= texts
+    fills = [each.fill for each in page.shapes if isinstance(each, Area)]
+    assert fills.count(ROOM_COLORS["missing"]) == 2  # the room, and the legend's box
+    lines = [each for each in page.shapes if isinstance(each, Lines)]
+    assert sum(each.color == WALL_COLORS["moved"] for each in lines) == 3
+    thin, *_, thick = sorted(each.width for each in lines if each.color == WALL_COLORS["moved"])
+    assert thin < thick
 
 
-def test_partners_share_their_color_and_errors_are_marked(drawn):
-    """Found 3 has the color of true room 1 also where it took cells of room 2, which are marked merged."""
-    cells, truth, found = drawn
-    plain, true_panel, found_panel, errors = draw_panels(cells, compare(truth, found), numbered=False)
-    colors = [tuple(color) for color in room_colors(2).tolist()]
-    assert at(true_panel, 12, 14) == at(found_panel, 12, 14) == at(found_panel, 12, 40) == colors[1]
-    assert at(true_panel, 25, 40) == at(found_panel, 25, 40) == colors[2]
-    assert at(errors, 12, 14) == MARK_COLORS[Mark.RIGHT]
-    assert at(errors, 12, 40) == MARK_COLORS[Mark.MERGED]
-    assert at(errors, 25, 48) == MARK_COLORS[Mark.MISSED]
-    assert at(errors, 9, 20) == at(plain, 9, 20) == at(true_panel, 9, 20) == (0, 0, 0)
-    assert at(plain, 4, 5) == at(errors, 4, 5) == (205, 205, 205)
+def test_rooms_are_named_and_partners_share_a_color(comparison: LayoutComparison):
+    """What is the same needs no number in the panel of what differs; 7 of B has the color of 1 of A."""
+    page = draw_comparison(comparison)
+    names = [each.text for each in page.shapes if isinstance(each, Text) and each.is_bold]
+    assert sorted(names) == ["1", "2", "2", "7", "9"]
+    fills = [each for each in page.shapes if isinstance(each, Area) and each.fill == track_color(1)]
+    assert len([each for each in fills if each.shape.area]) == 2
 
 
-def test_a_found_room_without_partner_has_a_color_of_its_own_and_stripes(drawn):
-    """Neither of the true rooms' colors, and white stripes on it."""
-    cells, truth, found = drawn
-    found[18:30, 40:50] = 5
-    found[18:30, 32:40] = 4
-    found[10:18, 32:50] = 4
-    _, _, found_panel, errors = draw_panels(cells, compare(truth, found), numbered=False)
-    scale = found_panel.shape[1] // 54
-    alone = found_panel[(20 - 2) * scale : (28 - 2) * scale, (42 - 4) * scale : (48 - 4) * scale]
-    kinds = {tuple(color) for color in alone.reshape(-1, 3).tolist()}
-    assert len(kinds) == 2
-    assert (255, 255, 255) in kinds
-    assert not kinds & {tuple(color) for color in room_colors(2).tolist()}
-    assert at(errors, 24, 45) == MARK_COLORS[Mark.SPLIT]
+def test_b_lies_where_its_motion_brings_it(comparison: LayoutComparison):
+    """The pictures of both maps cover the same place of the panel of what differs."""
+    page = draw_comparison(comparison)
+    faint = [each for each in page.shapes if isinstance(each, Picture) and each.pixels.shape[2] == 4]
+    assert len(faint) == 2
+    assert faint[0].matrix == pytest.approx(faint[1].matrix)
 
 
-def test_small_maps_are_scaled_up_and_numbers_written(drawn):
-    """The panel is long enough to read; with numbers, pixels within the room change."""
-    cells, truth, found = drawn
-    comparison = compare(truth, found)
-    bare, numbered = draw_panels(cells, comparison, numbered=False), draw_panels(cells, comparison)
-    assert max(bare[0].shape) >= SIDE_MIN_PX
-    assert (bare[1] != numbered[1]).any()
-    assert np.array_equal(bare[3], numbered[3])
-
-
-def test_the_whole_picture_holds_title_panels_and_legend(drawn):
-    """Larger than its four panels; the legend shows each mark's color."""
-    cells, truth, found = drawn
-    comparison = compare(truth, found)
-    picture = draw_comparison(cells, comparison, score(truth, found), "group/name")
-    panel = draw_panels(cells, comparison)[0]
-    assert picture.shape[0] * picture.shape[1] > 4 * panel.shape[0] * panel.shape[1]
-    legend = {tuple(color) for color in picture[-60:].reshape(-1, 3).tolist()}
-    assert set(MARK_COLORS.values()) <= legend
-
-
-def test_a_map_without_any_room_or_known_cell_is_drawn():
-    """Nothing found, nothing true, nothing known: a picture all the same."""
-    none = np.zeros((5, 4), int)
-    picture = draw_comparison(np.full((5, 4), -1, np.int8), compare(none, none), score(none, none), "empty")
-    assert picture.dtype == np.uint8
-
-
-@pytest.mark.parametrize("width", [120, 2000])
-def test_text_fits_its_width(width: int):
-    """A long title on a narrow picture is set smaller instead of running out of it."""
-    line = text_line("a title that is much longer than 120 pixels", width, 20)
-    assert line.shape == (32, width, 3)
-    assert (line[:, -8:] == 255).all()
-    assert (line < 128).any()
+def test_the_title_warns_where_the_runs_do_not_fit(comparison: LayoutComparison):
+    unsure = dataclasses.replace(comparison.placement, runner_up_score=0.95)
+    other = dataclasses.replace(comparison.placement, score=0.1, agreement=0.1)
+    assert "B may lie wrongly" in draw_comparison(dataclasses.replace(comparison, placement=unsure)).title
+    assert "do not seem to be two runs" in draw_comparison(
+        dataclasses.replace(comparison, placement=other)
+    ).title

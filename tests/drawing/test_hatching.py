@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
 import shapely
 from drawn_rooms import drawn, rows
 
-from rose2_logs.drawing.hatching import HATCH_STEP_M, cells_within, hatch_unseen
-from rose2_logs.model.labels import straight_runs
+from rose2_logs.drawing.hatching import HATCH_GAP_M, hatch_cells, hatch_lines, hatch_unseen, hatching
 from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot
 
 RESOLUTION_M = 0.1
@@ -38,9 +35,8 @@ def test_lines_lie_where_a_shape_is_unknown_and_fill_it_evenly(yaw_rad):
     assert set(room) == {0}
     lines = shapely.linestrings(lines_m.reshape(-1, 2, 2))
     assert shapely.within(lines, hidden.buffer(RESOLUTION_M)).all()
-    # Lines on diagonals, so far apart along a row: so many meters to a square meter.
     length_m = shapely.length(lines).sum()
-    assert length_m == pytest.approx(hidden.area * math.sqrt(2) / HATCH_STEP_M, rel=0.2)
+    assert length_m == pytest.approx(hidden.area / HATCH_GAP_M, rel=0.2)
 
 
 def test_rooms_that_are_seen_whole_are_not_hatched():
@@ -60,40 +56,40 @@ def test_what_lies_beyond_the_canvas_is_unknown_too():
     for number, hidden in enumerate((shapely.box(-1.5, 0, 0, 3), polygons[1])):
         own = lines[room == number]
         assert shapely.within(own, hidden.buffer(RESOLUTION_M)).all()
-        assert shapely.length(own).sum() == pytest.approx(hidden.area * math.sqrt(2) / HATCH_STEP_M, rel=0.2)
+        assert shapely.length(own).sum() == pytest.approx(hidden.area / HATCH_GAP_M, rel=0.2)
     assert set(room) == {0, 1}
 
 
-def test_a_shape_may_reach_beyond_the_canvas_and_have_holes():
-    _, analysis = drawn(np.ones((20, 20)), resolution_m=RESOLUTION_M)
-    shape = shapely.box(-1.0, -0.5, 1.5, 1.0).difference(shapely.box(0.0, 0.0, 0.5, 0.5))
-    (number, inside, (row, column)), other = cells_within(
-        (shapely.Polygon(), shape, shape), analysis.geometry
-    )
-    assert (number, other.number, other.corner) == (1, 2, (row, column))
-    assert np.array_equal(other.inside, inside)
-    assert (row, column) == (-6, -11)
-    assert inside.sum() * RESOLUTION_M**2 == pytest.approx(shape.area, abs=RESOLUTION_M * shape.length)
-    assert not inside[2 - row, 2 - column]
-    assert inside[2 - row, -5 - column]
+@pytest.mark.parametrize("gap", [0.5, 2.0])
+def test_hatching_fills_a_shape_evenly(gap: float):
+    """Its lines lie within, rise at 45 degrees and are as long together as the area over the gap."""
+    shape = shapely.Point(3, -2).buffer(20)
+    lines = hatching(shape, gap)
+    assert lines.difference(shape.buffer(1e-6)).is_empty
+    assert lines.length == pytest.approx(shape.area / gap, rel=0.05)
+    ends = shapely.get_coordinates(shapely.get_parts(lines)).reshape(-1, 2, 2)
+    across = np.diff(ends, axis=1)[:, 0]
+    assert across[:, 0] == pytest.approx(-across[:, 1])
 
 
-@pytest.mark.parametrize("step", [(0, 1), (1, 0), (1, 1), (1, -1)])
-def test_runs_hold_every_cell_once_and_cannot_be_longer(step):
-    """Any mask: the cells from each first to its last one are those of the mask."""
-    mask = np.random.default_rng(3).random((12, 15)) < 0.5
-    first, last = straight_runs(*np.nonzero(mask), step)
-    found = np.zeros(mask.shape, int)
-    for begin, end in zip(first, last, strict=True):
-        before = tuple(begin - step)
-        assert not (min(before) >= 0 and before[1] < mask.shape[1] and mask[before])
-        length = np.abs(end - begin).max() + 1
-        cells = begin + np.arange(length)[:, None] * np.array(step)
-        assert (cells[-1] == end).all()
-        found[tuple(cells.T)] += 1
-    assert (found == mask).all()
+def test_shapes_side_by_side_have_lines_that_go_on_in_one_another():
+    """Hatched in two parts or at once, it is the same; a hole and an empty shape have no lines."""
+    whole = shapely.box(0.3, 0.2, 9.1, 7.7)
+    parts = [shapely.box(0.3, 0.2, 4.4, 7.7), shapely.box(4.4, 0.2, 9.1, 7.7), shapely.Polygon()]
+    lines, shape = hatch_lines(parts, 0.7, (1.0, 1.0))
+    together = shapely.union_all(shapely.linestrings(lines))
+    assert together.difference(hatching(whole, 0.7).buffer(1e-6)).is_empty
+    assert together.length == pytest.approx(hatching(whole, 0.7).length)
+    assert set(shape.tolist()) == {0, 1}
+    ring = whole.difference(shapely.box(2, 2, 5, 5))
+    assert not hatching(ring, 0.3).intersects(shapely.box(2.01, 2.01, 4.99, 4.99))
+    assert hatching(shapely.Polygon(), 1.0).is_empty
 
 
-def test_no_cells_make_no_runs():
-    first, last = straight_runs(np.zeros(0, int), np.zeros(0, int), (1, 1))
-    assert first.shape == last.shape == (0, 2)
+def test_cells_of_a_mask_are_hatched():
+    mask = np.zeros((60, 80), bool)
+    mask[10:40, 20:70] = True
+    lines = shapely.linestrings(hatch_cells(mask, 3.0))
+    assert shapely.within(lines, shapely.box(20, 10, 70, 40).buffer(1.0)).all()
+    assert shapely.length(lines).sum() == pytest.approx(mask.sum() / 3.0, rel=0.1)
+    assert hatch_cells(np.zeros((4, 4), bool), 2.0).shape == (0, 2, 2)

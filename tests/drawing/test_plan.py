@@ -14,19 +14,21 @@ import shapely
 from drawn_plans import LEFT, RIGHT, two_rooms_plan
 from PIL import Image
 
+from rose2_logs.drawing.drawing import Drawing
+from rose2_logs.drawing.fonts import text_width
+from rose2_logs.drawing.map_painter import FREE_GRAY, OCCUPIED_GRAY, UNKNOWN_GRAY, tinted_cells
 from rose2_logs.drawing.palette import track_color
 from rose2_logs.drawing.pixels import as_pixels
 from rose2_logs.drawing.plan import (
     FIGURE,
-    FREE_GRAY,
-    LETTER_EM,
     MARGIN_M,
     PANEL,
     SEEN_OPACITY,
-    UNKNOWN_GRAY,
+    WALL_COLOR,
     draw_plan,
+    draw_segmentation,
 )
-from rose2_logs.drawing.shapes import Area, Drawing, Lines, Text, hatching
+from rose2_logs.drawing.shapes import Area, Lines, Picture, Text
 from rose2_logs.drawing.svg import as_svg
 from rose2_logs.model.room_plan import PlanRoom, RoomPlan
 from rose2_logs.model.rooms import Doorway
@@ -95,6 +97,13 @@ def test_unsure_rooms_are_marked_and_the_legend_says_so():
     assert not any("?" in text or "unsure" in text for text in texts(sure, PANEL) + texts(sure, FIGURE))
 
 
+def strip_of(drawing: Drawing) -> float:
+    """Where the strip with the legend begins: its paper covers what lies below."""
+    areas = [each for each in drawing.shapes if isinstance(each, Area) and each.opacity == 1]
+    (paper,) = (each for each in areas if each.fill == drawing.paper)
+    return float(paper.shape.bounds[1])
+
+
 @pytest.mark.parametrize("height_m", [4.0, 400.0])
 def test_the_legend_fits_into_the_page(height_m: float):
     """Of a wide plan and of one that is narrow on its page; signs do not lie upon each other."""
@@ -103,11 +112,11 @@ def test_the_legend_fits_into_the_page(height_m: float):
     doors = (Doorway((1, 1), np.array([[1.0, 0.0], [2.0, 0.0]])),)
     plan = RoomPlan("t", "map", rooms, doors, None, two_rooms_plan().map)
     drawing = draw_plan(plan, FIGURE, shape.bounds)
-    strip = drawing.height - 3 * FIGURE.font
-    words = [
-        each for each in drawing.shapes if isinstance(each, Text) and each.y > strip and not each.is_centered
-    ]
-    ends = [(each.x, each.x + LETTER_EM * each.size * len(each.text)) for each in words]
+    strip = strip_of(drawing)
+    found = [each for each in drawing.shapes if isinstance(each, Text) and each.y > strip]
+    words = sorted((each for each in found if each.anchor == "start"), key=lambda each: each.x)
+    assert len({each.y for each in words}) == 1
+    ends = [(each.x, each.x + text_width(each.text, each.size)) for each in words]
     assert words[-1].text == "unsure, little wall around"
     assert ends[-1][1] < drawing.width
     assert all(end < start for (_, end), (start, _) in pairwise(ends))
@@ -121,7 +130,7 @@ def test_a_ray_beyond_the_plan_does_not_reach_into_the_legend():
     plan = dataclasses.replace(plan, map=dataclasses.replace(plan.map, cells=cells))
     drawing = draw_plan(plan, FIGURE)
     image = as_pixels(drawing, int(FIGURE.width))
-    strip = image[int(drawing.height - 3 * FIGURE.font) + 2 : -1]
+    strip = image[int(strip_of(drawing)) + 2 : -1]
     assert (strip[:4] == 255).all()
     assert (strip[-4:] == 255).all()
 
@@ -151,39 +160,57 @@ def test_an_empty_plan_is_a_page():
     ET.fromstring(as_svg(draw_plan(plan)))
 
 
-@pytest.mark.parametrize("gap", [0.5, 2.0])
-def test_hatching_fills_a_shape_evenly(gap: float):
-    """Its lines lie within, rise at 45 degrees and are as long together as the area over the gap."""
-    shape = shapely.Point(3, -2).buffer(20)
-    lines = hatching(shape, gap)
-    assert lines.difference(shape.buffer(1e-6)).is_empty
-    assert lines.length == pytest.approx(shape.area / gap, rel=0.05)
-    ends = shapely.get_coordinates(shapely.get_parts(lines)).reshape(-1, 2, 2)
-    across = np.diff(ends, axis=1)[:, 0]
-    assert across[:, 0] == pytest.approx(-across[:, 1])
+def test_colors_of_rooms_may_be_given():
+    """As where two layouts are compared, and partners have one color."""
+    plan = two_rooms_plan()
+    drawing = draw_plan(plan, PANEL, colors={LEFT: (200, 10, 10), RIGHT: (10, 10, 200)})
+    (picture,) = (each for each in drawing.shapes if isinstance(each, Picture))
+    red, blue = picture.pixels[10, 10].tolist(), picture.pixels[10, 50].tolist()
+    assert red[0] > red[2] + 50
+    assert blue[2] > blue[0] + 50
 
 
-@pytest.mark.parametrize("turn", [1, -1])
-def test_what_lies_in_a_hole_is_drawn(turn: int):
-    """Whichever part of a room comes first; and in the hole around it there is nothing."""
-    ring = shapely.box(0, 0, 90, 90).difference(shapely.box(20, 20, 70, 70))
-    room = shapely.MultiPolygon([ring, shapely.box(40, 40, 50, 50)][::turn])
-    drawing = Drawing(90.0, 90.0)
-    drawing.add(Area(room, (200, 0, 0)))
-    image = as_pixels(drawing, 90)
-    assert image[10, 10].tolist() == image[45, 45].tolist() == [200, 0, 0]
-    assert image[30, 30].tolist() == [255, 255, 255]
+def test_rooms_without_cells_are_filled_whole():
+    """Where no cell is told to be a room's its shape is filled, but for what was not seen."""
+    plan = two_rooms_plan()
+    plan = dataclasses.replace(
+        plan, map=dataclasses.replace(plan.map, labels=np.zeros_like(plan.map.labels))
+    )
+    drawing = draw_plan(plan, dataclasses.replace(PANEL, detail=0.0))
+    scale = PANEL.width / (plan.bounds_m[2] - plan.bounds_m[0] + 2 * MARGIN_M)
+    areas_m2 = {
+        each.fill: each.shape.area / scale**2
+        for each in drawing.shapes
+        if isinstance(each, Area) and each.opacity == 0.5
+    }
+    assert areas_m2[track_color(LEFT)] == pytest.approx(12.0, abs=0.1)
+    assert areas_m2[track_color(RIGHT)] == pytest.approx(6.0, abs=0.5)
 
 
-def test_a_raised_two_is_drawn():
-    """The square of meters is no empty box: it is there, smaller and higher than a plain two."""
+def test_walls_are_drawn_where_they_are_wanted():
+    plan = two_rooms_plan()
+    for has_walls in (False, True):
+        drawing = draw_plan(plan, dataclasses.replace(FIGURE, has_walls=has_walls))
+        assert (WALL_COLOR in [each.color for each in drawing.shapes if isinstance(each, Lines)]) == has_walls
+        texts = [each.text for each in drawing.shapes if isinstance(each, Text)]
+        assert ("wall segment" in texts) == has_walls
 
-    def ink(text):
-        page = Drawing(100, 40)
-        page.add(Text(text, 50, 20, 24))
-        return as_pixels(page, 100).min(2) < 128
 
-    plain, raised = ink("m2"), ink("m²")
-    assert 0 < raised.sum() < plain.sum()
-    right = slice(int(np.flatnonzero(raised.any(0))[-1]) - 5, None)
-    assert np.flatnonzero(raised[:, right].any(1))[-1] < np.flatnonzero(plain.any(1))[-1] - 3
+def test_a_segmentation_is_drawn_beside_its_map():
+    """The same part of the world twice, once without rooms."""
+    drawing = draw_segmentation(two_rooms_plan())
+    plain, colored = (each for each in drawing.shapes if isinstance(each, Picture))
+    assert plain.pixels.shape == colored.pixels.shape
+    assert np.ptp(plain.pixels.astype(int), axis=2).max() == 0
+    assert np.ptp(colored.pixels.astype(int), axis=2).max() > 50
+    assert np.abs(np.diff([plain.matrix[:, 2], colored.matrix[:, 2]], axis=0)).max() > 200
+    with pytest.raises(ValueError, match="without a map"):
+        draw_segmentation(dataclasses.replace(two_rooms_plan(), map=None))
+
+
+def test_tint_fades_where_a_cell_is_occupied():
+    """Walls stay dark within a room; a label without a color leaves a cell gray."""
+    cells = np.array([[0, 100, -1, 0]], np.int8)
+    pixels = tinted_cells(cells, np.array([[1, 1, 1, 2]]), {1: (255, 0, 0)}, 1.0)
+    assert pixels[0].tolist() == [[255, 0, 0], [OCCUPIED_GRAY] * 3, [255, 0, 0], [FREE_GRAY] * 3]
+    assert tinted_cells(cells)[0, 2].tolist() == [UNKNOWN_GRAY] * 3

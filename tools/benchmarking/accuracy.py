@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 from benchmarking.references import Ablation, Published, load_ablations, load_published
 from benchmarking.robustness import Robustness, check_robustness, sampled
 from rose2_logs.config.parameters import Parameters, load_parameters
-from rose2_logs.drawing.case_pictures import CasePictures
+from rose2_logs.drawing.evaluation_pictures import CasePictures
 from rose2_logs.errors import CasesError
 from rose2_logs.evaluation.along import RunPoint, along_as_json, along_runs
 from rose2_logs.evaluation.benchmark import CaseResult, evaluate_cases, figures, group_means

@@ -11,8 +11,8 @@ import numpy as np
 from benchmarking.accuracy import Accuracy
 from benchmarking.markdown import bold, difference, figures_of, percent, rooms_of, table
 from benchmarking.transforms import TRANSFORMS
-from rose2_logs.drawing.curves import Curve, draw_curves
-from rose2_logs.drawing.image_files import write_image
+from rose2_logs.drawing.chart import Curve, line_chart
+from rose2_logs.drawing.sheet import stacked
 from rose2_logs.evaluation.benchmark import CaseResult, group_means
 from rose2_logs.evaluation.scores import FIGURES, Scores, mean_scores
 from rose2_logs.runs.provenance import software_versions
@@ -128,10 +128,11 @@ def _along(accuracy: Accuracy, group: str, folder: Path) -> list[str]:
         ]
 
     true = Curve("true", coverage, curves("rooms_gt")[0].y)
-    charts = [draw_curves(curves(name), name, "coverage, %", y_range=(0.0, 100.0)) for name in IOU]
-    charts.append(draw_curves([*curves("rooms_seg"), true], "number of rooms", "coverage, %"))
+    label = "coverage, %"
+    charts = [line_chart(curves(name), title=name, x_label=label, y_range=(0.0, 100.0)) for name in IOU]
+    charts.append(line_chart([*curves("rooms_seg"), true], title="number of rooms", x_label=label))
     path = Path("along") / f"{group}.png"
-    write_image(folder / path, np.concatenate(charts))
+    stacked(charts).save(folder / path, width_px=None)
     rows = [
         [points[0].name, f"{points[0].coverage:.1%}", *(_at_a_glance(point.scores) for point in points)]
         for points in zip(*runs.values(), strict=True)

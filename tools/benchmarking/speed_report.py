@@ -12,8 +12,9 @@ from benchmarking.map_times import MapTimes
 from benchmarking.markdown import table
 from benchmarking.scaling import LogTimes, TileTimes
 from benchmarking.speed import GROWING_SIDE, Speed
-from rose2_logs.drawing.curves import Curve, draw_curves
-from rose2_logs.drawing.image_files import write_image
+from rose2_logs.drawing.chart import Curve, line_chart
+from rose2_logs.drawing.drawing import Drawing
+from rose2_logs.drawing.sheet import stacked
 from rose2_logs.runs.summary import write_json
 from rose2_logs.segmentation.pipeline import METHODS
 
@@ -35,7 +36,7 @@ def write_speed_report(speed: Speed, folder: Path) -> Path:
     write_json(folder / "speed.json", speed.as_json())
     lines = ["# Speed", "", *_facts(speed), EXPLAINED, ""]
     if pictures := _charts(speed):
-        write_image(folder / "speed.png", np.concatenate(pictures))
+        stacked(pictures).save(folder / "speed.png", width_px=None)
         lines += ["![times and memory](speed.png)", ""]
     lines += [
         *_groups(speed),
@@ -274,7 +275,7 @@ def _maps(speed: Speed) -> list[str]:
     return ["## All maps", "", *table(head, rows)]
 
 
-def _charts(speed: Speed) -> list[np.ndarray]:
+def _charts(speed: Speed) -> list[Drawing]:
     charts = []
     if speed.maps:
         order = np.arange(1.0, len(speed.maps) + 1)
@@ -287,8 +288,11 @@ def _charts(speed: Speed) -> list[np.ndarray]:
         }
         curves = [Curve(name, order, np.sort(np.array(values))) for name, values in columns.items()]
         charts.append(
-            draw_curves(
-                curves, "seconds of a map on one core", "maps, for each the fastest first", log_y=True
+            line_chart(
+                curves,
+                title="seconds of a map on one core",
+                x_label="maps, for each the fastest first",
+                log_y=True,
             )
         )
     sizes = []
@@ -301,11 +305,20 @@ def _charts(speed: Speed) -> list[np.ndarray]:
         seconds = np.array([row.analysis_s for row in speed.tiles])
         sizes.append(Curve("one building, tiled", cells, seconds))
     if sizes:
-        charts.append(draw_curves(sizes, "seconds of an analysis", "explored cells", log_x=True, log_y=True))
+        charts.append(
+            line_chart(
+                sizes, title="seconds of an analysis", x_label="explored cells", log_x=True, log_y=True
+            )
+        )
     known = [row for row in speed.logs if row.peak_bytes is not None]
     if known:
         charts.append(
-            draw_curves(_memory_curves(known), "peak memory of a run, MB", "maps of the log", log_x=True)
+            line_chart(
+                _memory_curves(known),
+                title="peak memory of a run, MB",
+                x_label="maps of the log",
+                log_x=True,
+            )
         )
     return charts
 

@@ -8,14 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from rose2_logs.drawing.chart import Mark, Series, lane_chart, line_chart
-from rose2_logs.drawing.palette import state_colors
+from rose2_logs.drawing.chart import ON_PAGE, Curve, Mark, lane_chart, line_chart
+from rose2_logs.drawing.palette import state_colors, track_color
+from rose2_logs.drawing.shapes import Color
 from rose2_logs.model.occupancy import BoolArray, FloatArray, IntArray
 from rose2_logs.model.room_quality import UNSURE_SIGN, unsure_sign
-from rose2_logs.outputs.report.words import css, css_color, duration
+from rose2_logs.outputs.report.words import css, duration
 from rose2_logs.runs.run import Run
 
-BLUE, ORANGE, GREEN, VIOLET = "#2f7ed8", "#e07b1a", "#2a9d5c", "#8a5fd0"
+BLUE, ORANGE, GREEN, VIOLET = (47, 126, 216), (224, 123, 26), (42, 157, 92), (138, 95, 208)
 AREAS_MOST = 8
 """Rooms whose area is drawn: the largest of the last map."""
 TRACK_COLUMNS = ["track", "shape_right_snapshot", "area_settled_snapshot", "wall_support"]
@@ -63,21 +64,15 @@ def run_charts(results: Run) -> list[Chart]:
     numbers, present, areas = _rooms(results)
 
     def chart(
-        title: str, meaning: str, series: Sequence[Series], y_range: tuple[float, float] | None = None
+        title: str,
+        meaning: str,
+        curves: Sequence[tuple[str, FloatArray, Color]],
+        y_range: tuple[float, float] | None = None,
     ) -> Chart:
-        drawn = [
-            line_chart(
-                axis.x,
-                series,
-                title=title,
-                x_label=axis.label,
-                marks=axis.marks,
-                x_range=axis.ends,
-                y_range=y_range,
-            )
-            for axis in axes
-        ]
-        return Chart(title, meaning, tuple((each.name, each.color) for each in series), drawn[0], drawn[1])
+        drawn = [_drawn(title, axis, curves, y_range) for axis in axes]
+        return Chart(
+            title, meaning, tuple((name, css(color)) for name, _, color in curves), drawn[0], drawn[1]
+        )
 
     def percent(name: str) -> FloatArray:
         return 100 * snapshots[name].astype(float)
@@ -90,40 +85,38 @@ def run_charts(results: Run) -> list[Chart]:
             "How much of the last layout was there",
             "Share of the last layout in rooms that overlap their last shape by 0.8; mean overlap of all.",
             [
-                Series("share of the layout, %", percent("final_share"), GREEN),
-                Series("mean overlap, %", percent("final_iou"), BLUE),
+                ("share of the layout, %", percent("final_share"), GREEN),
+                ("mean overlap, %", percent("final_iou"), BLUE),
             ],
             whole,
         ),
         chart(
             "How much the layout changed from map to map",
             "Variation of information between the rooms of a map and of the one before; 0 is the same rooms.",
-            [Series("variation, bits", snapshots["variation_bits"].astype(float), VIOLET)],
+            [("variation, bits", snapshots["variation_bits"].astype(float), VIOLET)],
         ),
         chart(
             "Rooms and doorways",
             "",
             [
-                Series("rooms", snapshots["rooms"].astype(float), BLUE),
-                Series("doorways", snapshots["doorways"].astype(float), ORANGE),
+                ("rooms", snapshots["rooms"].astype(float), BLUE),
+                ("doorways", snapshots["doorways"].astype(float), ORANGE),
             ],
         ),
         chart(
             "Area, m²",
             "Known free floor, and the rooms with their predicted parts.",
             [
-                Series("free", snapshots["free_area_m2"].astype(float), GREEN),
-                Series("rooms, seen", snapshots["rooms_area_m2"].astype(float), BLUE),
-                Series(
-                    "rooms with predicted parts", snapshots["rooms_predicted_area_m2"].astype(float), ORANGE
-                ),
+                ("free", snapshots["free_area_m2"].astype(float), GREEN),
+                ("rooms, seen", snapshots["rooms_area_m2"].astype(float), BLUE),
+                ("rooms with predicted parts", snapshots["rooms_predicted_area_m2"].astype(float), ORANGE),
             ],
         ),
         _coverage_chart(axes[1], percent("coverage")),
         chart(
             "Area of the largest rooms, m²",
             "As far as they were seen.",
-            [Series(f"Room {numbers[k]}", areas[k], css_color(int(numbers[k]))) for k in largest],
+            [(f"Room {numbers[k]}", areas[k], track_color(int(numbers[k]))) for k in largest],
         )
         if len(largest)
         else None,
@@ -131,19 +124,28 @@ def run_charts(results: Run) -> list[Chart]:
     return [each for each in charts if each is not None] + _lanes(results, axes, numbers, present)
 
 
-def _coverage_chart(axis: RunAxis, coverage: FloatArray) -> Chart:
-    """Coverage, which stands over time in any case."""
-    title = "Coverage over time, %"
-    series = Series("coverage", coverage, GREEN)
-    drawn = line_chart(
-        axis.x,
-        [series],
+def _drawn(
+    title: str,
+    axis: RunAxis,
+    curves: Sequence[tuple[str, FloatArray, Color]],
+    y_range: tuple[float, float] | None,
+) -> str:
+    """Curves along one axis as SVG."""
+    return line_chart(
+        [Curve(name, axis.x, values, color) for name, values, color in curves],
         title=title,
         x_label=axis.label,
         marks=axis.marks,
         x_range=axis.ends,
-        y_range=(0.0, 100.0),
-    )
+        y_range=y_range,
+        style=ON_PAGE,
+    ).svg(is_inline=True)
+
+
+def _coverage_chart(axis: RunAxis, coverage: FloatArray) -> Chart:
+    """Coverage, which stands over time in any case."""
+    title = "Coverage over time, %"
+    drawn = _drawn(title, axis, [("coverage", coverage, GREEN)], (0.0, 100.0))
     return Chart(title, "Known free area over that of the last map.", (), drawn, drawn)
 
 
@@ -203,7 +205,7 @@ def _lanes(results: Run, axes: Sequence[RunAxis], numbers: np.ndarray, present: 
     rows = [histories[int(number)] for number in numbers[shown]]
     title = "When each room was there, and when it was right"
     names = [f"{row['track']}{unsure_sign(row['wall_support'])}" for row in rows]
-    colors = [{state: css(color) for state, color in state_colors(row["track"]).items()} for row in rows]
+    colors = [state_colors(row["track"]) for row in rows]
     states = _states(results.columns["snapshot"], rows, present[shown])
     draw: Callable[[RunAxis], str] = lambda axis: lane_chart(  # noqa: E731
         axis.x,
@@ -214,13 +216,13 @@ def _lanes(results: Run, axes: Sequence[RunAxis], numbers: np.ndarray, present: 
         x_label=axis.label,
         marks=axis.marks,
         x_range=axis.ends,
-    )
+    ).svg(is_inline=True)
     left_out = len(numbers) - len(shown)
     meaning = (
         "A lane for each room, by its number: pale while it forms, stronger once its shape was right, full "
         f"once its area has settled. {UNSURE_SIGN}: few walls back its last outline."
     ) + (f" {left_out} rooms that were there only shortly are left out." if left_out else "")
-    legend = tuple(colors[0].items())
+    legend = tuple((state, css(color)) for state, color in colors[0].items())
     return [Chart(title, meaning, legend, draw(axes[0]), draw(axes[1]), is_wide=True)]
 
 

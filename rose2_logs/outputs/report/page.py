@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from rose2_logs import __version__
-from rose2_logs.drawing.plan import FIGURE, PANEL, Bounds, draw_plan
+from rose2_logs.drawing.map_painter import Bounds
+from rose2_logs.drawing.plan import FIGURE, PANEL, draw_plan
 from rose2_logs.drawing.svg import as_svg
 from rose2_logs.model.room_plan import RoomPlan
 from rose2_logs.outputs.report import PANELS, facts, tables

@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rose2_logs.drawing.chart import ShareLane, share_lanes
+from rose2_logs.drawing.palette import track_color
 from rose2_logs.model.occupancy import FloatArray
 from rose2_logs.outputs.report.charts import LANES_MOST, run_axes
-from rose2_logs.outputs.report.words import Cell, Column, Table, css_color, number, room, share, when
+from rose2_logs.outputs.report.words import Cell, Column, Table, number, room, share, when
 from rose2_logs.runs.run import Run
 from rose2_logs.runs.tables import BACK_PROJECTED
 
@@ -51,7 +52,7 @@ def seen_rooms(results: Run) -> SeenRooms | None:
             str(tracks[each]),
             f"{row[0].text}: first seen at {row[2].text}, {MOSTLY:.0%} of it at {row[4].text} coverage",
             np.minimum(shares[each], 1.0),
-            css_color(int(tracks[each])),
+            track_color(int(tracks[each])),
             int(mostly[each]) if mostly[each] < len(axis.x) else None,
         )
         for each, row in rows.items()
@@ -63,7 +64,7 @@ def seen_rooms(results: Run) -> SeenRooms | None:
         title="How much of each room of the last map was seen",
         x_label=axis.label,
         x_range=axis.ends,
-    )
+    ).svg(is_inline=True)
     columns = (
         Column("room", "its number over the run", is_number=False),
         Column("area, m²", "in the last map"),

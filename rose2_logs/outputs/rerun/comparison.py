@@ -15,7 +15,7 @@ from rose2_logs.comparison.final_layout import FinalLayout
 from rose2_logs.comparison.layouts import LayoutComparison
 from rose2_logs.comparison.room_changes import ROOM_STATUSES
 from rose2_logs.comparison.wall_changes import WALL_STATUSES
-from rose2_logs.drawing.layout_picture import ROOM_COLORS, WALL_COLORS
+from rose2_logs.drawing.comparison_picture import ROOM_COLORS, WALL_COLORS
 from rose2_logs.drawing.palette import track_color
 from rose2_logs.model.labels import known_window
 from rose2_logs.model.occupancy import UNKNOWN, FloatArray
