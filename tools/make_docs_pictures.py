@@ -187,14 +187,14 @@ def _labels_along(
     directions = structure.directions_rad
     count = WallCounter(directions, cell_m, parameters.walls)
     clean = make_clean_map(structure, part.free_area_m2, count, parameters.spectrum)
-    walls = find_walls(
-        structure.supported, clean.cells, clean.attached, directions, cell_m, parameters.walls
-    )
+    walls = find_walls(structure.supported, clean.cells, clean.attached, directions, cell_m, parameters.walls)
     first = float(directions[0])
     lines = walls.lines.ends_m
     plan = make_floor_plan(lines, walls.walls, part.free, first, cell_m, parameters.floor_plan)
     split = split_rooms(plan.labels, walls.walls, lines, directions, cell_m, parameters.topology)
-    cells = voronoi_graph(split, walls.walls, cell_m, parameters.topology.split_min_clearance_m / 2, parameters.topology)
+    cells = voronoi_graph(
+        split, walls.walls, cell_m, parameters.topology.split_min_clearance_m / 2, parameters.topology
+    )
     graph = np.zeros(split.shape, np.int32)
     graph[cells[:, 0], cells[:, 1]] = 1
     return part.labels(plan.labels), part.labels(split), part.labels(graph) > 0

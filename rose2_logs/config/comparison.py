@@ -1,4 +1,4 @@
-"""Parameters of the comparison of two runs: how one layout is laid over another, and what counts as a change."""
+"""Parameters of the comparison of two runs: how one layout lies over another, and what is a change."""
 
 from __future__ import annotations
 
@@ -16,7 +16,10 @@ class ComparisonParameters(ParameterBlock):
     block: ClassVar[str] = "comparison"
 
     wall_reach_m: float = number(
-        0.2, "m", "A wall of the other map this near is the same: a wall's thickness, and SLAM's drift.", 0.001
+        0.2,
+        "m",
+        "A wall of the other map this near is the same: a wall's thickness, and SLAM's drift.",
+        0.001,
     )
     wall_reach_min_cells: float = number(2.0, "cells", "And this many cells of the coarser map at least.")
     contradiction: float = number(
@@ -64,19 +67,17 @@ class ComparisonParameters(ParameterBlock):
     parts_min_agreement: float = number(
         0.85,
         "share",
-        "So do two parts of a building that agree by this where both are explored: others agree by 0.8 or less.",
+        "So do parts of one that agree by this where both are explored: others do by 0.8 or less.",
     )
-    parts_min_common_share: float = number(
-        0.2, "share", "And have this share of the smaller one in common."
-    )
+    parts_min_common_share: float = number(0.2, "share", "And have this share of the smaller one in common.")
     ambiguous_share: float = number(
         0.85, "share", "Another placement with this share of the score leaves it open how the two lie."
     )
     scaled_min_score: float = number(
         0.6,
         "score",
-        "A placement at another scale needs this: two buildings of the benchmark reach 0.43, one that differs "
-        "by its scale alone 0.93.",
+        "A placement at another scale needs this: two buildings of the benchmark reach 0.43, one at two "
+        "scales 0.93.",
     )
     scale_min_change: float = number(0.03, "share", "Scales nearer to 1 are no other scale.")
     outside_share: float = number(
@@ -102,9 +103,15 @@ class ComparisonParameters(ParameterBlock):
         0.1, "m", "What is explored is looked up every so many meters: two cells of 5 cm.", 0.001
     )
     samples_max: int = number(
-        250_000, "points", "Most points looked up for one room; coarser in halls of more than 50 m.", 100, 10**9
+        250_000,
+        "points",
+        "Most points looked up for one room; coarser in halls of more than 50 m.",
+        100,
+        10**9,
     )
-    wall_step_m: float = number(0.1, "m", "Walls are looked at every so many meters: two cells of 5 cm.", 0.001)
+    wall_step_m: float = number(
+        0.1, "m", "Walls are looked at every so many meters: two cells of 5 cm.", 0.001
+    )
     change_min_length_m: float = number(
         0.5, "m", "Shorter stretches of wall are no change: the least jamb beside a door is as long."
     )

@@ -40,7 +40,11 @@ class ReadingParameters(ParameterBlock):
         2**40,
     )
     chunk_max_bytes: int = number(
-        2**28, "bytes", "Largest chunk or message once decompressed: a largest map; usual is 1 MB.", 1024, 2**40
+        2**28,
+        "bytes",
+        "Largest chunk or message once decompressed: a largest map; usual is 1 MB.",
+        1024,
+        2**40,
     )
     map_max_messages: int = number(
         2_000_000, "messages", "Most messages of a map's topics: one a second for 23 days.", 1, 10**12
@@ -64,7 +68,11 @@ class OccupancyParameters(ParameterBlock):
         0.05, "m", "Finer maps are analyzed in blocks up to this size: SLAM's usual cell.", 0.0
     )
     analyzed_max_cells: int = number(
-        20_000_000, "cells", "Explored parts with more are analyzed in blocks; 220 m squared at 5 cm.", 10_000, 2**40
+        20_000_000,
+        "cells",
+        "Explored parts with more are analyzed in blocks; 220 m squared at 5 cm.",
+        10_000,
+        2**40,
     )
 
 
@@ -233,7 +241,11 @@ class TopologyParameters(ParameterBlock):
     block: ClassVar[str] = "topology"
 
     clearance_blur_cells: float = number(
-        1.0, "cells", "Blur of the clearance, so that the raster's steps are no summits of their own.", 0.1, 100
+        1.0,
+        "cells",
+        "Blur of the clearance, so that the raster's steps are no summits of their own.",
+        0.1,
+        100,
     )
     summit_reach_m: float = number(
         0.15, "m", "A summit of the clearance is the highest this far around: a wall's thickness.", 0.0
@@ -247,12 +259,19 @@ class TopologyParameters(ParameterBlock):
     split_min_area_m2: float = number(3.0, "m2", "Smaller parts are niches: the least room.", 0.0)
     split_min_purity: float = number(0.98, "share", "A cut leaves this share of each part on its side.", 0, 1)
     cut_tail_share: float = number(
-        0.02, "share", "A cut lies midway between two parts but for this share of each, their fringes.", 0, 0.5
+        0.02,
+        "share",
+        "A cut lies midway between two parts but for this share of each, their fringes.",
+        0,
+        0.5,
     )
     max_rounds: int = number(5, "1", "Rounds of splitting; the paper's implementation has five.", 0, 100)
     doorway_min_width_m: float = number(0.3, "m", "Narrower contacts of two rooms are noise.", 0.0)
     doorway_gap_cells: float = number(
-        2.9, "cells", "Contacts of two rooms this near are one doorway: a cell may be missing between them.", 1.0
+        2.9,
+        "cells",
+        "Contacts of two rooms this near are one doorway: a cell may be missing between them.",
+        1.0,
     )
 
 
@@ -312,7 +331,11 @@ class TrackingParameters(ParameterBlock):
         1.5, "m2", "A lesser glimpse of a room of the last map is no room yet: half the least room.", 0.0
     )
     fit_points: int = number(
-        2000, "points", "Wall cells that are laid over the next map, evenly taken: enough for millimeters.", 3, 10**6
+        2000,
+        "points",
+        "Wall cells that are laid over the next map, evenly taken: enough for millimeters.",
+        3,
+        10**6,
     )
     fit_min_points: int = number(
         50, "points", "Fewer wall cells do not tell how a map lies: two meters of wall.", 3, 10**6
@@ -321,7 +344,10 @@ class TrackingParameters(ParameterBlock):
         12, "points", "Wall cells around one that tell how the wall runs: half a meter of it.", 2, 1000
     )
     fit_gate_1_m: float = number(
-        0.5, "m", "How far a wall's nearest wall may be in the fit's first step: a loop closure's leap.", 0.001
+        0.5,
+        "m",
+        "How far a wall's nearest wall may be in the fit's first step: a loop closure's leap.",
+        0.001,
     )
     fit_gate_2_m: float = number(0.3, "m", "The same in its second step.", 0.001)
     fit_gate_3_m: float = number(0.2, "m", "The same in its third step.", 0.001)
@@ -330,9 +356,14 @@ class TrackingParameters(ParameterBlock):
         2.0, "cells", "Every gate is at least this wide: a wall's two faces, and its wobble."
     )
     fit_damping: float = number(
-        1e-3, "share", "Share of the walls that must stand across a direction to tell the shift along it.", 1e-9
+        1e-3,
+        "share",
+        "Share of the walls that must stand across a direction to tell the shift along it.",
+        1e-9,
     )
-    fit_max_rounds: int = number(8, "rounds", "Rounds of each step of the fit; it has settled before.", 1, 1000)
+    fit_max_rounds: int = number(
+        8, "rounds", "Rounds of each step of the fit; it has settled before.", 1, 1000
+    )
     fit_settled_m: float = number(1e-4, "m", "The fit has settled when no point moves further.")
     fit_sure_share: float = number(
         0.75, "share", "With this share of the walls brought together no other position is searched."
@@ -402,7 +433,7 @@ class Parameters:
         ----------
         value : Parameters or mapping, optional
             Parameters are returned as they are; None gives the defaults. A mapping holds values by dotted
-            name, ``{"walls.extension_m": 6}``, or mappings of values by block, ``{"walls": {"extension_m": 6}}``.
+            name, ``{"walls.extension_m": 6}``, or mappings by block, ``{"walls": {"extension_m": 6}}``.
 
         Raises
         ------

@@ -74,9 +74,7 @@ def make_floor_plan(
     return FloorPlanResult(graph, evidence, seen, group, labels)
 
 
-def _frame(
-    known: BoolArray, direction_rad: float, resolution_m: float, margin_m: float
-) -> shapely.Polygon:
+def _frame(known: BoolArray, direction_rad: float, resolution_m: float, margin_m: float) -> shapely.Polygon:
     """Box around the known cells along a direction, with a margin: it turns with the map."""
     rows = np.flatnonzero(known.any(1))
     if len(rows) == 0:

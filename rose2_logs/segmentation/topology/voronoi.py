@@ -152,9 +152,7 @@ def _summits(
     return markers
 
 
-def _passages(
-    basin: NDArray[np.int32], clear: NDArray[np.float32]
-) -> dict[tuple[int, int], float]:
+def _passages(basin: NDArray[np.int32], clear: NDArray[np.float32]) -> dict[tuple[int, int], float]:
     """Clearance in meters of the widest passage between each two neighboring basins."""
     meet = contacts(basin)
     meet = meet.chosen(meet.low > 0)

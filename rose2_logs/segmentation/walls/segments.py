@@ -161,9 +161,7 @@ def _straight_runs(
         first = np.flatnonzero(new)
         last = np.append(first[1:], len(point)) - 1
         cover = np.full(len(point), resolution_m)
-        np.minimum(
-            np.abs(gap), parameters.segment_cover_cells * resolution_m, out=cover[1:], where=~new[1:]
-        )
+        np.minimum(np.abs(gap), parameters.segment_cover_cells * resolution_m, out=cover[1:], where=~new[1:])
         covered = np.bincount(run, weights=cover)
         start, end = position[first] - resolution_m / 2, position[last] + resolution_m / 2
         yield _Runs(
