@@ -14,16 +14,6 @@ from rose2_logs.comparison.placement import Placement, fitting_scale, place
 from rose2_logs.comparison.room_changes import RoomChange, RoomStatus, compare_rooms
 from rose2_logs.comparison.wall_changes import WallComparison, compare_walls
 
-SAME_BUILDING_SCORE = 0.4
-"""Placements with less do not show one building. Measured on the maps of the benchmark: the empty and the
-furnished maps of each building, and two runs in one building, have 0.54 or more, other pairs 0.34 or less."""
-PARTS_AGREEMENT, PARTS_COMMON_SHARE = 0.85, 0.2
-"""Also one building: two parts of it that have this share of the smaller one in common and agree there by
-this; other pairs agree by 0.8 or less."""
-AMBIGUOUS_SHARE = 0.85
-"""Another placement with this share of the score leaves it open how the two lie: a building that looks the
-same turned by half a circle."""
-
 
 @dataclass(frozen=True, eq=False)
 class LayoutComparison:
@@ -53,14 +43,18 @@ class LayoutComparison:
     @property
     def same_building(self) -> bool:
         """Whether the two seem to show the same building."""
-        found = self.placement
-        in_parts = found.agreement >= PARTS_AGREEMENT and found.common_share >= PARTS_COMMON_SHARE
-        return found.score >= SAME_BUILDING_SCORE or in_parts
+        placement, parameters = self.placement, self.a.map.parameters.comparison
+        in_parts = (
+            placement.agreement >= parameters.parts_min_agreement
+            and placement.common_share >= parameters.parts_min_common_share
+        )
+        return placement.score >= parameters.same_building_min_score or in_parts
 
     @property
     def ambiguous(self) -> bool:
         """Whether another placement fits about as well."""
-        return self.placement.runner_up_score >= AMBIGUOUS_SHARE * self.placement.score
+        share = self.a.map.parameters.comparison.ambiguous_share
+        return self.placement.runner_up_score >= share * self.placement.score
 
     @property
     def room_counts(self) -> dict[RoomStatus, int]:
@@ -103,7 +97,7 @@ def compare_layouts(a: FinalLayout, b: FinalLayout) -> LayoutComparison | None:
     if placement is None:
         return None
     rooms = compare_rooms(a, b, placement.motion)
-    found = LayoutComparison(a, b, placement, rooms, compare_walls(a, b, placement.motion))
-    if found.same_building:
-        return found
-    return dataclasses.replace(found, scale=fitting_scale(b.map, a.map))
+    comparison = LayoutComparison(a, b, placement, rooms, compare_walls(a, b, placement.motion))
+    if comparison.same_building:
+        return comparison
+    return dataclasses.replace(comparison, scale=fitting_scale(b.map, a.map))

@@ -15,42 +15,14 @@ from numpy.typing import NDArray
 from scipy import fft, ndimage
 from scipy.spatial import cKDTree
 
-from rose2_logs.config.parameters import OccupancyParameters, SpectrumParameters
+from rose2_logs.config.comparison import ComparisonParameters
+from rose2_logs.config.parameters import OccupancyParameters, Parameters
 from rose2_logs.model.explored import ExploredPart
 from rose2_logs.model.labels import known_window
 from rose2_logs.model.occupancy import UNKNOWN, BoolArray, FloatArray, OccupancySnapshot, classify
 from rose2_logs.segmentation.circular_peaks import circular_peaks
 from rose2_logs.segmentation.rose.spectrum import angular_energy, compute_spectrum
-from rose2_logs.tracking.registration import POINTS_MIN, RigidMotion, WallFit, evenly, wall_faces
-
-WALL_REACH_M = 0.2
-"""A wall is on a wall of the other map when one lies this near: a wall's thickness, and SLAM's drift."""
-REACH_MIN_CELLS = 2.0
-"""And this many cells of the coarser map at least."""
-CONTRADICTION = 0.5
-"""A wall on free space of the other map takes away this share of what one on a wall gives: two maps of one
-building, drawn years apart, still have more walls in common than not."""
-RASTER_M = 0.2
-"""Cells of the rasters whose shifts are searched; the fit bridges two of them."""
-RASTER_MOST = 1024
-"""Most such cells along the side of what a map shows; they are larger in larger maps."""
-WALL_BLUR_M = 0.5
-"""Nearness to a wall falls from 1 to 0 over this length: the fit's first gate."""
-TURNS_MOST = 6
-"""Turns, by half a circle, that are tried: two for walls at right angles, more for other buildings."""
-TURN_MIN_GAP_RAD = math.radians(3.0)
-"""Turns closer than this are one: the fit bridges them."""
-STARTS_PER_TURN = 3
-STARTS_FITTED = 10
-"""Best places of each turn, and of all, that are fitted."""
-START_MIN_GAP_M = 1.0
-"""Starts of one turn are this far apart."""
-POINTS_MOST = 4000
-"""Wall cells of each map, evenly taken, that agreement is counted over."""
-FACES_MIN_SHARE = 0.05
-"""Of blurred drawings, whose occupied cells do not touch free ones, all occupied cells are taken as walls."""
-SAME_PLACE_M, SAME_TURN_RAD = 1.0, math.radians(3.0)
-"""Placements closer than this are one and not each other's alternative."""
+from rose2_logs.tracking.registration import RigidMotion, WallFit, evenly, wall_faces
 
 
 @dataclass(frozen=True)
@@ -85,26 +57,37 @@ class PlacedMap:
     Parameters
     ----------
     snapshot : OccupancySnapshot
+        The map.
     occupancy : OccupancyParameters
         Which cells are walls.
+    parameters : Parameters, optional
+        Of the comparison, the same for both maps: its blocks spectrum, tracking and comparison are used.
     """
 
-    def __init__(self, snapshot: OccupancySnapshot, occupancy: OccupancyParameters) -> None:
+    def __init__(
+        self,
+        snapshot: OccupancySnapshot,
+        occupancy: OccupancyParameters,
+        parameters: Parameters | None = None,
+    ) -> None:
+        self.parameters = parameters or Parameters()
+        comparison = self.parameters.comparison
         self.snapshot = snapshot
         self.free, self.occupied = classify(snapshot.cells, occupancy)
         self._occupancy = occupancy
         occupied_m = snapshot.geometry.cell_centers(*np.nonzero(self.occupied))
         self.tree = cKDTree(occupied_m)
-        self.reach_m = max(WALL_REACH_M, REACH_MIN_CELLS * self.resolution_m)
+        self.reach_m = max(comparison.wall_reach_m, comparison.wall_reach_min_cells * self.resolution_m)
         faces_m = wall_faces(self.free, self.occupied, snapshot.geometry)
-        least = max(POINTS_MIN, FACES_MIN_SHARE * len(occupied_m))
+        least = max(self.parameters.tracking.fit_min_points, comparison.faces_min_share * len(occupied_m))
         self.walls = faces_m if len(faces_m) >= least else occupied_m
 
     def scaled(self, scale: float) -> PlacedMap:
         """Return the same map with cells so many times larger."""
         geometry = self.snapshot.geometry
         larger = dataclasses.replace(geometry, resolution_m=geometry.resolution_m * scale)
-        return PlacedMap(dataclasses.replace(self.snapshot, geometry=larger), self._occupancy)
+        snapshot = dataclasses.replace(self.snapshot, geometry=larger)
+        return PlacedMap(snapshot, self._occupancy, self.parameters)
 
     @property
     def resolution_m(self) -> float:
@@ -120,7 +103,7 @@ class PlacedMap:
     @property
     def can_be_placed(self) -> bool:
         """Whether there are walls enough to tell how the map lies."""
-        return len(self.walls) >= POINTS_MIN
+        return len(self.walls) >= self.parameters.tracking.fit_min_points
 
     def on_wall(self, points_m: FloatArray, reach_m: float) -> BoolArray:
         """Which points (..., 2) of this map's frame have an occupied cell within reach."""
@@ -141,16 +124,16 @@ class PlacedMap:
         rows, columns = cells[..., 0], cells[..., 1]
         height, width = mask.shape
         inside = (rows >= 0) & (columns >= 0) & (rows < height) & (columns < width)
-        found: BoolArray = mask[rows.clip(0, height - 1), columns.clip(0, width - 1)] & inside
-        return found
+        values: BoolArray = mask[rows.clip(0, height - 1), columns.clip(0, width - 1)] & inside
+        return values
 
     def energy(self) -> FloatArray:
         """Angular energy (B,) of the map's spectrum, over half a circle of its frame."""
-        spectrum = SpectrumParameters()
+        spectrum = self.parameters.spectrum
         part = ExploredPart.of(self.snapshot.cells, self.snapshot.geometry, self._occupancy)
-        found = angular_energy(compute_spectrum(part.occupied, part.resolution_m, spectrum), spectrum)
-        bins = self.snapshot.geometry.yaw_rad / np.pi * len(found)
-        shifted: FloatArray = ndimage.shift(found, bins, order=1, mode="grid-wrap")
+        energy = angular_energy(compute_spectrum(part.occupied, part.resolution_m, spectrum), spectrum)
+        bins = self.snapshot.geometry.yaw_rad / np.pi * len(energy)
+        shifted: FloatArray = ndimage.shift(energy, bins, order=1, mode="grid-wrap")
         return shifted
 
     def free_points(self, cell_m: float) -> FloatArray:
@@ -171,21 +154,28 @@ def place(moving: PlacedMap, fixed: PlacedMap) -> Placement | None:
     """
     if not (moving.can_be_placed and fixed.can_be_placed):
         return None
-    fit = WallFit(fixed.walls, fixed.resolution_m)
-    walls = WallFit(moving.walls, moving.resolution_m).sample()
+    parameters = fixed.parameters
+    fit = WallFit(fixed.walls, fixed.resolution_m, parameters.tracking)
+    walls = WallFit(moving.walls, moving.resolution_m, parameters.tracking).sample()
     settled = [fit.settled(walls, start) for start in _starts(moving, fixed)]
     counter = _Agreement(moving, fixed)
     scored = sorted(((counter.of(motion), motion) for motion in settled), key=lambda each: -each[0][2])
     (agreement, common, score), motion = scored[0]
     center = moving.walls.mean(axis=0)
-    others = [figures[2] for figures, other in scored[1:] if not _is_same(motion, other, center)]
+    others = [
+        figures[2]
+        for figures, other in scored[1:]
+        if not _is_same(motion, other, center, parameters.comparison)
+    ]
     return Placement(motion, agreement, common, score, max(others, default=0.0))
 
 
-def _is_same(one: RigidMotion, other: RigidMotion, center_m: FloatArray) -> bool:
+def _is_same(
+    one: RigidMotion, other: RigidMotion, center_m: FloatArray, parameters: ComparisonParameters
+) -> bool:
     turn = math.remainder(one.turn_rad - other.turn_rad, 2 * math.pi)
     apart = float(np.linalg.norm(one.points(center_m) - other.points(center_m)))
-    return abs(turn) < SAME_TURN_RAD and apart < SAME_PLACE_M
+    return abs(turn) < parameters.same_turn_rad and apart < parameters.same_place_m
 
 
 class _Agreement:
@@ -193,7 +183,9 @@ class _Agreement:
 
     def __init__(self, moving: PlacedMap, fixed: PlacedMap) -> None:
         self._maps = moving, fixed
-        self._points = evenly(moving.walls, POINTS_MOST), evenly(fixed.walls, POINTS_MOST)
+        parameters = fixed.parameters.comparison
+        self._points = tuple(evenly(each.walls, parameters.points_max) for each in self._maps)
+        self._contradiction = parameters.contradiction
         self._reach_m = max(moving.reach_m, fixed.reach_m)
 
     def of(self, motion: RigidMotion) -> tuple[float, float, float]:
@@ -213,29 +205,31 @@ class _Agreement:
         common = agreeing + contrary
         least = int(wall.argmin())
         agreement = float(agreeing.sum() / max(common.sum(), 1e-9))
-        score = float((agreeing - CONTRADICTION * contrary).min() / wall[least])
+        score = float((agreeing - self._contradiction * contrary).min() / wall[least])
         return agreement, float(common[least] / wall[least]), min(score, 1.0)
 
 
 def _starts(moving: PlacedMap, fixed: PlacedMap) -> list[RigidMotion]:
     """Places to fit from, the most promising first."""
-    cell_m = max(RASTER_M, *(each.side_m / RASTER_MOST for each in (moving, fixed)))
-    search = _ShiftSearch(moving, fixed, cell_m)
-    found = [start for turn in _turns(moving, fixed) for start in search.best(turn)]
-    found.sort(key=lambda each: -each[0])
-    return [motion for _, motion in found[:STARTS_FITTED]]
+    parameters = fixed.parameters.comparison
+    sides_m = (each.side_m / parameters.raster_max_cells for each in (moving, fixed))
+    search = _ShiftSearch(moving, fixed, max(parameters.raster_m, *sides_m))
+    starts = [start for turn in _turns(moving, fixed) for start in search.best(turn)]
+    starts.sort(key=lambda each: -each[0])
+    return [motion for _, motion in starts[: parameters.starts_fitted]]
 
 
 def _turns(moving: PlacedMap, fixed: PlacedMap) -> list[float]:
     """Turns that bring the directions of a map's walls onto those of another, best first, each both ways."""
+    parameters = fixed.parameters.comparison
     profiles = []
     for each in (fixed, moving):
         energy = each.energy()
         profiles.append((energy - energy.mean()) / max(float(energy.std()), 1e-12))
     bins = len(profiles[0])
     match = fft.irfft(fft.rfft(profiles[0]) * np.conj(fft.rfft(profiles[1])), n=bins)
-    peaks = circular_peaks(match, round(TURN_MIN_GAP_RAD / np.pi * bins))
-    peaks = peaks[np.argsort(-match[peaks], kind="stable")][:TURNS_MOST]
+    peaks = circular_peaks(match, round(parameters.turn_min_gap_rad / np.pi * bins))
+    peaks = peaks[np.argsort(-match[peaks], kind="stable")][: parameters.turns_max]
     if len(peaks) == 0:
         peaks = np.array([0])
     turns = peaks * np.pi / bins
@@ -250,6 +244,8 @@ class _ShiftSearch:
 
     def __init__(self, moving: PlacedMap, fixed: PlacedMap, cell_m: float) -> None:
         self._cell_m = cell_m
+        self._parameters = fixed.parameters.comparison
+        contradiction = self._parameters.contradiction
         self._walls, self._space = moving.walls, moving.free_points(cell_m)
         self._center = moving.walls.mean(axis=0)
         reach = np.linalg.norm(np.concatenate([self._walls, self._space]) - self._center, axis=1).max()
@@ -262,10 +258,10 @@ class _ShiftSearch:
         # Room for every shift at which the two still touch.
         self._padded = tuple(fft.next_fast_len(side + self._side, real=True) for side in self._shape)
         wall = self._raster(fixed.walls - self._low, self._shape)
-        near = _nearness(wall, cell_m)
+        near = self._nearness(wall)
         free = self._raster(space - self._low, self._shape) * (near == 0)
-        self._for_walls = fft.rfft2(near - CONTRADICTION * free, s=self._padded)
-        self._for_space = fft.rfft2(-CONTRADICTION * wall, s=self._padded)
+        self._for_walls = fft.rfft2(near - contradiction * free, s=self._padded)
+        self._for_space = fft.rfft2(-contradiction * wall, s=self._padded)
 
     def _raster(self, points_m: FloatArray, shape: tuple[int, int]) -> NDArray[np.float32]:
         columns, rows = np.floor(points_m / self._cell_m).astype(np.intp).T
@@ -279,13 +275,13 @@ class _ShiftSearch:
         turned = RigidMotion.moving(self._center, np.full(2, half), turn_rad)
         shape = (self._side, self._side)
         wall = self._raster(turned.points(self._walls), shape)
-        free = self._raster(turned.points(self._space), shape) * (_nearness(wall, self._cell_m) == 0)
+        free = self._raster(turned.points(self._space), shape) * (self._nearness(wall) == 0)
         product = self._for_walls * np.conj(fft.rfft2(wall, s=self._padded))
         product += self._for_space * np.conj(fft.rfft2(free, s=self._padded))
         scores = fft.irfft2(product, s=self._padded)
-        found = []
-        gap = max(1, round(START_MIN_GAP_M / self._cell_m))
-        for _ in range(STARTS_PER_TURN):
+        starts = []
+        gap = max(1, round(self._parameters.start_min_gap_m / self._cell_m))
+        for _ in range(self._parameters.starts_per_turn):
             row, column = np.unravel_index(int(scores.argmax()), scores.shape)
             score = float(scores[row, column])
             shift = np.array(
@@ -295,36 +291,25 @@ class _ShiftSearch:
                 ]
             )
             target = self._low + shift * self._cell_m + half
-            found.append((score, RigidMotion.moving(self._center, target, turn_rad)))
+            starts.append((score, RigidMotion.moving(self._center, target, turn_rad)))
             rows, columns = (
                 np.arange(at - gap, at + gap + 1) % size
                 for at, size in ((row, self._padded[0]), (column, self._padded[1]))
             )
             scores[np.ix_(rows, columns)] = -np.inf
-        return found
+        return starts
+
+    def _nearness(self, wall: NDArray[np.float32]) -> NDArray[np.float32]:
+        """1 at walls, 0 from `wall_blur_m` on."""
+        import cv2
+
+        distance = cv2.distanceTransform((wall == 0).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
+        per_cell = np.float32(self._cell_m / self._parameters.wall_blur_m)
+        near: NDArray[np.float32] = np.maximum(0, 1 - distance * per_cell)
+        return near
 
 
-def _nearness(wall: NDArray[np.float32], cell_m: float) -> NDArray[np.float32]:
-    """1 at walls, 0 from `WALL_BLUR_M` on."""
-    import cv2
-
-    distance = cv2.distanceTransform((wall == 0).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
-    near: NDArray[np.float32] = np.maximum(0, 1 - distance * np.float32(cell_m / WALL_BLUR_M))
-    return near
-
-
-SIDES_WITHIN = (0.01, 0.99)
-"""A building reaches from the first to the last percent of its walls: what was seen through a window does not
-count."""
-SCALE_MIN_CHANGE = 0.03
-"""Scales nearer to 1 are no other than the one that was tried."""
-
-SCALED_SCORE = 0.6
-"""Placements at another scale need this score. Of the benchmark's maps two of different buildings reach 0.43
-where the scale is free, two that differ by their scale alone 0.93."""
-
-
-def fitting_scale(moving: PlacedMap, fixed: PlacedMap, least_score: float = SCALED_SCORE) -> float | None:
+def fitting_scale(moving: PlacedMap, fixed: PlacedMap) -> float | None:
     """Find how many times larger a map has to be to lie over another.
 
     The lengths and the widths of the two, along the strongest direction of their walls and across it, give
@@ -333,8 +318,6 @@ def fitting_scale(moving: PlacedMap, fixed: PlacedMap, least_score: float = SCAL
     Parameters
     ----------
     moving, fixed : PlacedMap
-    least_score : float
-        What a placement has to reach.
 
     Returns
     -------
@@ -342,21 +325,23 @@ def fitting_scale(moving: PlacedMap, fixed: PlacedMap, least_score: float = SCAL
         The scale of the best placement, None where none is good enough.
     """
     ratios = _extents_m(fixed) / np.maximum(_extents_m(moving), moving.resolution_m)
-    best, found = least_score, None
+    parameters = fixed.parameters.comparison
+    best_score, best_scale = parameters.scaled_min_score, None
     for scale in sorted({*ratios.tolist(), math.sqrt(float(ratios.prod()))}):
-        if abs(scale - 1) < SCALE_MIN_CHANGE:
+        if abs(scale - 1) < parameters.scale_min_change:
             continue
         placement = place(moving.scaled(scale), fixed)
-        if placement is not None and placement.score >= best:
-            best, found = placement.score, scale
-    return found
+        if placement is not None and placement.score >= best_score:
+            best_score, best_scale = placement.score, scale
+    return best_scale
 
 
 def _extents_m(map_: PlacedMap) -> FloatArray:
     """Length and width (2,) of what a map's walls enclose, the longer first."""
+    outside = map_.parameters.comparison.outside_share
     energy = map_.energy()
     turn = float(energy.argmax()) * math.pi / len(energy)
     axes = np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]])
-    low, high = np.quantile(map_.walls @ axes.T, SIDES_WITHIN, axis=0)
+    low, high = np.quantile(map_.walls @ axes.T, (outside, 1 - outside), axis=0)
     extents: FloatArray = np.sort(high - low)[::-1]
     return extents

@@ -10,6 +10,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from rose2_logs.comparison.final_layout import FinalLayout
+from rose2_logs.config.comparison import ComparisonParameters
 from rose2_logs.model.occupancy import BoolArray, FloatArray
 from rose2_logs.tracking.matching import assign
 from rose2_logs.tracking.overlap import share_of
@@ -30,19 +31,6 @@ ROOM_STATUSES: dict[RoomStatus, str] = {
     "unseen": "a room whose place the other run has not explored",
 }
 """What became of rooms, and what each of these means; the order of the tables."""
-
-SAME_MIN_IOU = 0.8
-"""Rooms that overlap by this are the same: as everywhere in the tables of a run."""
-PAIR_MIN_IOU = 0.3
-"""Rooms that overlap by less are no pair unless one is part of the other."""
-PART_MIN_SHARE = 0.5
-"""A room is part of another when most of it lies in it: never of two at once."""
-EXPLORED_MIN_SHARE = 0.5
-"""A room is missing where the other run has explored most of its place."""
-SAMPLE_M = 0.1
-"""What is explored is looked up every so many meters: two cells of usual maps."""
-SAMPLES_MOST = 250_000
-"""Most points that are looked up for one room; they are further apart in larger halls than 50 m by 50 m."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,17 +84,18 @@ def compare_rooms(a: FinalLayout, b: FinalLayout, b_to_a: RigidMotion) -> tuple[
     tuple of RoomChange
         In the order of `ROOM_STATUSES`, then of the numbers; each room is in one of them.
     """
+    parameters = a.map.parameters.comparison
     shapes_a, shapes_b = a.shapes, b.shapes_moved(b_to_a)
     common = _common_areas(shapes_a, shapes_b)
     changes = []
-    for rows, columns in _groups(common, shapely.area(shapes_a), shapely.area(shapes_b)):
+    for rows, columns in _groups(common, shapely.area(shapes_a), shapely.area(shapes_b), parameters):
         shape_a = shapely.union_all([shapes_a[row] for row in rows])
         shape_b = shapely.union_all([shapes_b[column] for column in columns])
         iou = _share(shapely.area(shapely.intersection(shape_a, shape_b)), _union_area(shape_a, shape_b))
         explored_iou, explored_share = _explored(a, b, b_to_a, shape_a, shape_b)
         changes.append(
             RoomChange(
-                _status(len(rows), len(columns), iou, explored_iou, explored_share),
+                _status(len(rows), len(columns), iou, explored_iou, explored_share, parameters),
                 tuple(sorted(a.tracks[row] for row in rows)),
                 tuple(sorted(b.tracks[column] for column in columns)),
                 iou,
@@ -134,14 +123,14 @@ def _common_areas(ones: tuple[BaseGeometry, ...], others: tuple[BaseGeometry, ..
 
 
 def _groups(
-    common: FloatArray, sizes_a: FloatArray, sizes_b: FloatArray
+    common: FloatArray, sizes_a: FloatArray, sizes_b: FloatArray, parameters: ComparisonParameters
 ) -> list[tuple[list[int], list[int]]]:
     """Rows and columns that belong together: pairs, what is part of one of a pair, and single ones."""
     smaller = np.minimum(sizes_a[:, None], sizes_b[None])
     union = sizes_a[:, None] + sizes_b[None] - common
     iou = share_of(common, union)
-    is_part: BoolArray = (common > 0) & (common >= PART_MIN_SHARE * smaller)
-    pairs = assign(iou**2, (iou >= PAIR_MIN_IOU) | is_part)
+    is_part: BoolArray = (common > 0) & (common >= parameters.part_min_share * smaller)
+    pairs = assign(iou**2, (iou >= parameters.pair_min_iou) | is_part)
     links = set(pairs)
     paired_rows, paired_columns = {row for row, _ in pairs}, {column for _, column in pairs}
     links |= {
@@ -176,8 +165,9 @@ def _explored(
     whole = shapely.union(shape_a, shape_b)
     if whole.is_empty:
         return None, 0.0
+    parameters = a.map.parameters.comparison
     low, high = np.reshape(whole.bounds, (2, 2))
-    step_m = max(SAMPLE_M, float(np.sqrt(np.prod(high - low) / SAMPLES_MOST)))
+    step_m = max(parameters.sample_m, float(np.sqrt(np.prod(high - low) / parameters.samples_max)))
     x, y = (np.arange(start + step_m / 2, end, step_m) for start, end in zip(low, high, strict=True))
     points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     inside_a, inside_b = (shapely.contains_xy(shape, points) for shape in (shape_a, shape_b))
@@ -190,17 +180,23 @@ def _explored(
 
 
 def _status(
-    count_a: int, count_b: int, iou: float, explored_iou: float | None, explored_share: float
+    count_a: int,
+    count_b: int,
+    iou: float,
+    explored_iou: float | None,
+    explored_share: float,
+    parameters: ComparisonParameters,
 ) -> RoomStatus:
     if count_a == 0 or count_b == 0:
-        if explored_share < EXPLORED_MIN_SHARE:
+        if explored_share < parameters.explored_min_share:
             return "unseen"
         return "missing" if count_a else "new"
     if count_a > 1 or count_b > 1:
         return "regrouped" if count_a > 1 and count_b > 1 else "merged" if count_a > 1 else "split"
-    if iou >= SAME_MIN_IOU:
+    same = parameters.same_room_min_iou
+    if iou >= same:
         return "same"
-    return "partly seen" if explored_iou is not None and explored_iou >= SAME_MIN_IOU else "changed"
+    return "partly seen" if explored_iou is not None and explored_iou >= same else "changed"
 
 
 def _union_area(one: BaseGeometry, other: BaseGeometry) -> float:

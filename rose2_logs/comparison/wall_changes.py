@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rose2_logs.comparison.final_layout import FinalLayout
+from rose2_logs.config.comparison import ComparisonParameters
 from rose2_logs.model.analysis import Walls
 from rose2_logs.model.occupancy import BoolArray, FloatArray
 from rose2_logs.tracking.matching import assign
@@ -25,21 +26,6 @@ WALL_STATUSES: dict[WallStatus, str] = {
     "moved": "a missing wall and a new one along it, side by side",
 }
 """What became of walls, and what each of these means; the order of the tables."""
-
-STEP_M = 0.1
-"""Walls are looked at every so many meters: two cells of usual maps."""
-CHANGE_MIN_LENGTH_M = 0.5
-"""Shorter stretches are no change: the least jamb beside a door is as long."""
-GAP_MAX_M = 0.3
-"""Stretches of one wall closer than this are one: it may be hidden by furniture between them."""
-BEYOND_M = 1.0
-"""Walls are followed this far beyond their segments, which end before others, where cells are occupied."""
-MOVED_MAX_M = 1.5
-"""A new wall further from a missing one than this is another wall: less than the narrowest corridor."""
-MOVED_MAX_TURN_RAD = np.radians(10.0)
-"""And at most so much turned against it."""
-MOVED_MIN_OVERLAP = 0.5
-"""And beside at least this share of it: most of the shorter one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +99,7 @@ def compare_walls(a: FinalLayout, b: FinalLayout, b_to_a: RigidMotion) -> WallCo
     gone_a, compared_a, kept_a = _look_up(a.walls, b, a, b_to_a.inverse())
     gone_b, compared_b, kept_b = _look_up(b.walls, a, b, b_to_a)
     gone_b = b_to_a.points(gone_b.reshape(-1, 2, 2)).reshape(-1, 4)
-    pairs = _side_by_side(gone_a, gone_b)
+    pairs = _side_by_side(gone_a, gone_b, a.map.parameters.comparison)
     changes = [WallChange("moved", gone_a[one], gone_b[two], shift) for one, two, shift in pairs]
     moved_a, moved_b = {one for one, _, _ in pairs}, {two for _, two, _ in pairs}
     changes += [WallChange("missing", gone_a[row], None) for row in range(len(gone_a)) if row not in moved_a]
@@ -129,7 +115,8 @@ def _look_up(
     """Stretches (K, 4) of walls where the other map is free; the lengths compared and kept, meters."""
     if len(walls.segments_m) == 0:
         return np.zeros((0, 4)), 0.0, 0.0
-    points, segment, beyond = _along(walls.segments_m)
+    parameters = own.map.parameters.comparison
+    points, segment, beyond = _along(walls.segments_m, parameters)
     real = ~beyond | own.map.on_wall(points, own.map.resolution_m)
     points, segment = points[real], segment[real]
     placed = to_other.points(points)
@@ -147,17 +134,21 @@ def _look_up(
     compared = kept = 0
     for chosen in np.split(by_cluster, np.flatnonzero(np.diff(cluster[by_cluster])) + 1):
         longest = _longest(walls.segments_m[np.unique(segment[chosen])])
-        stretches, told, there = _stretches(points[chosen], on[chosen], free[chosen], longest, reach_m)
+        stretches, steps, there = _stretches(
+            points[chosen], on[chosen], free[chosen], longest, reach_m, parameters
+        )
         gone.append(stretches)
-        compared, kept = compared + told, kept + there
-    return np.concatenate(gone), compared * STEP_M, kept * STEP_M
+        compared, kept = compared + steps, kept + there
+    return np.concatenate(gone), compared * parameters.wall_step_m, kept * parameters.wall_step_m
 
 
-def _along(segments_m: FloatArray) -> tuple[FloatArray, NDArray[np.intp], BoolArray]:
+def _along(
+    segments_m: FloatArray, parameters: ComparisonParameters
+) -> tuple[FloatArray, NDArray[np.intp], BoolArray]:
     """Points (K, 2) along segments and some way beyond, the segment of each, and which lie beyond it."""
     start, end = segments_m[:, :2], segments_m[:, 2:]
-    counts = np.maximum(np.ceil(_lengths(segments_m) / STEP_M).astype(int), 1)
-    more = round(BEYOND_M / STEP_M)
+    counts = np.maximum(np.ceil(_lengths(segments_m) / parameters.wall_step_m).astype(int), 1)
+    more = round(parameters.beyond_m / parameters.wall_step_m)
     longer = counts + 2 * more
     segment = np.repeat(np.arange(len(counts)), longer)
     position = np.arange(len(segment)) - np.repeat(np.cumsum(longer) - longer, longer) - more
@@ -178,7 +169,12 @@ def _longest(segments_m: FloatArray) -> FloatArray:
 
 
 def _stretches(
-    points: FloatArray, on: BoolArray, free: BoolArray, line: FloatArray, reach_m: float
+    points: FloatArray,
+    on: BoolArray,
+    free: BoolArray,
+    line: FloatArray,
+    reach_m: float,
+    parameters: ComparisonParameters,
 ) -> tuple[FloatArray, int, int]:
     """Stretches (K, 4) along a wall that are gone, and the numbers of its steps compared and kept.
 
@@ -188,41 +184,45 @@ def _stretches(
     along = (line[2:] - line[:2]) / max(float(_lengths(line)), 1e-9)
     across = np.array([-along[1], along[0]])
     t, lateral = (points - line[:2]) @ along, (points - line[:2]) @ across
-    step = np.floor(t / STEP_M).astype(int)
+    step_m = parameters.wall_step_m
+    step = np.floor(t / step_m).astype(int)
     first = int(step.min())
     count = int(step.max()) - first + 1
     there, gone = np.zeros(count, bool), np.zeros(count, bool)
     there[step[on] - first] = True
     gone[step[free] - first] = True
     gone &= ~there
-    hidden = round(reach_m / STEP_M)
-    found = []
-    for begin, end in _runs(gone, there):
-        if (end - begin) * STEP_M < CHANGE_MIN_LENGTH_M:
+    hidden = round(reach_m / step_m)
+    stretches = []
+    for begin, end in _runs(gone, there, parameters):
+        if (end - begin) * step_m < parameters.change_min_length_m:
             continue
         inside = free & (step - first >= begin) & (step - first < end)
         base = line[:2] + across * float(lateral[inside].mean())
         ends = [
-            base + along * ((first + at) * STEP_M)
+            base + along * ((first + at) * step_m)
             for at in (max(begin - hidden, 0), min(end + hidden, count))
         ]
-        found.append(np.concatenate(ends))
-    return np.reshape(found, (-1, 4)), int(np.count_nonzero(there | gone)), int(np.count_nonzero(there))
+        stretches.append(np.concatenate(ends))
+    return np.reshape(stretches, (-1, 4)), int(np.count_nonzero(there | gone)), int(np.count_nonzero(there))
 
 
-def _runs(gone: BoolArray, there: BoolArray) -> list[tuple[int, int]]:
+def _runs(gone: BoolArray, there: BoolArray, parameters: ComparisonParameters) -> list[tuple[int, int]]:
     """Begin and end of runs; those with a short gap of what cannot be told between them are one."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], gone.astype(np.int8), [0]])))
     runs: list[tuple[int, int]] = []
     for begin, end in edges.reshape(-1, 2).tolist():
-        if runs and (begin - runs[-1][1]) * STEP_M <= GAP_MAX_M and not there[runs[-1][1] : begin].any():
+        gap_m = (begin - runs[-1][1]) * parameters.wall_step_m if runs else np.inf
+        if gap_m <= parameters.gap_max_m and not there[runs[-1][1] : begin].any():
             runs[-1] = (runs[-1][0], end)
         else:
             runs.append((begin, end))
     return runs
 
 
-def _side_by_side(ones: FloatArray, others: FloatArray) -> list[tuple[int, int, float]]:
+def _side_by_side(
+    ones: FloatArray, others: FloatArray, parameters: ComparisonParameters
+) -> list[tuple[int, int, float]]:
     """Pairs of stretches (A, 4) and (B, 4) that may be one wall that moved, and how far it did, meters."""
     lengths, other_lengths = _lengths(ones)[:, None], _lengths(others)
     along = (ones[:, 2:] - ones[:, :2]) / lengths
@@ -233,8 +233,8 @@ def _side_by_side(ones: FloatArray, others: FloatArray) -> list[tuple[int, int, 
     overlap = np.minimum(lengths, t.max(axis=2)) - np.maximum(0.0, t.min(axis=2))
     turn = np.arctan2(np.abs(np.diff(lateral)), np.abs(np.diff(t)))[..., 0]
     apart = np.abs(lateral.mean(axis=2))
-    fits = (turn <= MOVED_MAX_TURN_RAD) & (apart <= MOVED_MAX_M)
-    fits &= overlap >= MOVED_MIN_OVERLAP * np.minimum(lengths, other_lengths)
+    fits = (turn <= parameters.moved_max_turn_rad) & (apart <= parameters.moved_max_m)
+    fits &= overlap >= parameters.moved_min_overlap * np.minimum(lengths, other_lengths)
     weight = overlap / np.maximum(lengths, other_lengths) / (1 + apart)
     return [(row, column, float(apart[row, column])) for row, column in assign(weight, fits)]
 

@@ -1,4 +1,4 @@
-"""Parameters of the comparison of two runs: how one layout is laid over another, and what counts as a change."""
+"""Parameters of the comparison of two runs: how one layout lies over another, and what is a change."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class ComparisonParameters(ParameterBlock):
     parts_min_agreement: float = number(
         0.85,
         "share",
-        "So do two parts of a building that agree by this where both are explored: others agree by 0.8 or less.",
+        "So do parts of one that agree by this where both are explored: others do by 0.8 or less.",
     )
     parts_min_common_share: float = number(0.2, "share", "And have this share of the smaller one in common.")
     ambiguous_share: float = number(
@@ -76,8 +76,8 @@ class ComparisonParameters(ParameterBlock):
     scaled_min_score: float = number(
         0.6,
         "score",
-        "A placement at another scale needs this: two buildings of the benchmark reach 0.43, one that differs "
-        "by its scale alone 0.93.",
+        "A placement at another scale needs this: two buildings of the benchmark reach 0.43, one at two "
+        "scales 0.93.",
     )
     scale_min_change: float = number(0.03, "share", "Scales nearer to 1 are no other scale.")
     outside_share: float = number(

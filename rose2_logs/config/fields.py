@@ -1,8 +1,9 @@
-"""How parameters are declared: blocks of fields that check themselves, each with unit, bounds and a reason."""
+"""How parameters are declared: blocks of fields with unit, bounds and a reason, which check themselves."""
 
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import numbers
 from dataclasses import field
 from typing import Any, ClassVar
@@ -23,7 +24,7 @@ HIGHEST = {
     "cells^2": 1e6,
     "tracks": 1e6,
 }
-"""Upper bound of a parameter by its unit, where it names none: a building is in it, a slip of units is not."""
+"""Upper bound of a parameter that names none, by its unit: buildings fit, slips of the unit do not."""
 
 
 def number(default: float, unit: str, why: str, low: float = 0.0, high: float | None = None) -> Any:
@@ -75,7 +76,7 @@ class ParameterBlock:
             value = _checked(f"{self.block}.{declared.name}", declared, getattr(self, declared.name))
             object.__setattr__(self, declared.name, value)
         for names in self.ascending:
-            for lower, upper in zip(names, names[1:], strict=False):
+            for lower, upper in itertools.pairwise(names):
                 if getattr(self, lower) > getattr(self, upper):
                     raise ParameterError(
                         f"{self.block}.{lower} is {getattr(self, lower)}; it must not be above "

@@ -433,7 +433,7 @@ class Parameters:
         ----------
         value : Parameters or mapping, optional
             Parameters are returned as they are; None gives the defaults. A mapping holds values by dotted
-            name, ``{"walls.extension_m": 6}``, or mappings of values by block, ``{"walls": {"extension_m": 6}}``.
+            name, ``{"walls.extension_m": 6}``, or mappings by block, ``{"walls": {"extension_m": 6}}``.
 
         Raises
         ------

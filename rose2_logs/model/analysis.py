@@ -135,12 +135,12 @@ class SnapshotAnalysis:
         The segmented map with the predicted shapes.
     structure, walls, floor_plan
         What the stages found; None from a method that does not have them.
+    quality : RoomQuality
+        How sure the rooms are.
     seconds : dict
         Time per stage.
     voronoi_m : (V, 4) float or None
         Lines x0, y0, x1, y1 of the free space's Voronoi graph, world meters, where it was asked for.
-    quality : RoomQuality or None
-        How sure the rooms are; None where it was not measured.
     """
 
     index: int
@@ -153,9 +153,9 @@ class SnapshotAnalysis:
     structure: Structure | None
     walls: Walls | None
     floor_plan: FloorPlan | None
+    quality: RoomQuality
     seconds: dict[str, float]
     voronoi_m: FloatArray | None = None
-    quality: RoomQuality | None = None
 
     def __repr__(self) -> str:
         parts = [f"index={self.index}", repr(self.rooms)]

@@ -171,8 +171,8 @@ class OccupancySnapshot:
             )
         if given.dtype.kind not in "iu":
             raise InvalidMapError(
-                f"map {self.index} of {self.topic}: cells must be integers, -1 for unknown and 0 to 100 percent, "
-                f"not {given.dtype}"
+                f"map {self.index} of {self.topic}: cells must be integers, -1 for unknown and 0 to 100 "
+                f"percent, not {given.dtype}"
             )
         if given.size and not (given.min() >= UNKNOWN and given.max() <= HIGHEST_PERCENT):
             raise InvalidMapError(

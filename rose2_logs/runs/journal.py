@@ -21,21 +21,23 @@ import zstandard
 from rose2_logs.errors import InvalidMapError, OutputError
 from rose2_logs.model.analysis import SnapshotAnalysis
 from rose2_logs.model.occupancy import OccupancySnapshot
-from rose2_logs.model.room_quality import RoomQuality
-from rose2_logs.runs.codec import Codec
+from rose2_logs.runs.serialization import Serializer
 from rose2_logs.system.files import writing
 from rose2_logs.system.workers import Workers
 
 Found = SnapshotAnalysis | InvalidMapError
 """What comes of one map, or why nothing does."""
 
-MAGIC = b"rose2_logs journal 1\n"
+MAGIC = b"rose2_logs journal 2\n"
 """At the beginning of the file, with the number of its layout."""
 COMPRESSION_LEVEL = 1
 """Of zstd: what is gained above it is little and takes longer."""
 
 _FRAME = struct.Struct("<QI")  # length of what follows, its CRC-32
-_CODEC = Codec([SnapshotAnalysis, RoomQuality])
+Entry = tuple[int, int, SnapshotAnalysis | str]
+"""Index and log time of a map, and what was found in it, or the message of the error."""
+
+_SERIALIZER: Serializer[Entry] = Serializer(Entry)
 
 
 @dataclass(frozen=True)
@@ -138,8 +140,8 @@ class Journal:
             frame = _read_frame(self._file)
             self._place = self._file.tell()
         try:
-            index, log_time_ns, found = _CODEC.decode(zstandard.decompress(frame or b""))
-        except (ValueError, TypeError, zstandard.ZstdError) as error:
+            index, log_time_ns, found = _SERIALIZER.decode(zstandard.decompress(frame or b""))
+        except (ValueError, zstandard.ZstdError) as error:
             raise self._does_not_fit(str(error)) from error
         if (index, log_time_ns) != (snapshot.index, snapshot.log_time_ns):
             raise self._does_not_fit(f"map {index} instead of {snapshot.index}")
@@ -155,7 +157,7 @@ class Journal:
         """
         value = str(found) if isinstance(found, InvalidMapError) else found
         with writing(self._path):
-            self._append(_CODEC.encode((snapshot.index, snapshot.log_time_ns, value)))
+            self._append(_SERIALIZER.encode((snapshot.index, snapshot.log_time_ns, value)))
         self._place = self._end
         self.maps += 1
 

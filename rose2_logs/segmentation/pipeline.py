@@ -87,9 +87,9 @@ def analyze(
         stages.structure,
         stages.walls,
         stages.floor_plan,
+        quality,
         watch.seconds,
         stages.voronoi_m,
-        quality,
     )
 
 

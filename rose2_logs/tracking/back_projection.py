@@ -18,7 +18,7 @@ from rose2_logs.config.parameters import OccupancyParameters, Parameters, Tracki
 from rose2_logs.model.labels import known_window, label_sizes
 from rose2_logs.model.occupancy import BoolArray, FloatArray, GridGeometry, OccupancySnapshot, classify
 from rose2_logs.model.rooms import RoomMap
-from rose2_logs.tracking.registration import POINTS_MIN, RigidMotion, WallFit, wall_faces
+from rose2_logs.tracking.registration import RigidMotion, WallFit, wall_faces
 from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot, map_motion
 
 
@@ -52,7 +52,7 @@ class BackProjector:
     rooms : RoomMap
         Its rooms.
     tracking : TrackingParameters
-        The least piece of a room.
+        The least piece of a room, and how walls are fitted.
     occupancy : OccupancyParameters, optional
         Which cells are free, which are walls.
     """
@@ -64,7 +64,7 @@ class BackProjector:
         tracking: TrackingParameters,
         occupancy: OccupancyParameters | None = None,
     ) -> None:
-        self._min_area_m2 = tracking.back_projected_min_area_m2
+        self._tracking = tracking
         self._occupancy = occupancy or OccupancyParameters()
         self._window = known_window(last.cells >= 0)
         self._geometry, self._count = rooms.geometry, len(rooms)
@@ -72,7 +72,8 @@ class BackProjector:
         free, occupied = classify(last.cells, self._occupancy)
         self._nearest = np.where(free[self._window], labels, _filled(labels))
         points = wall_faces(free, occupied, last.geometry)
-        self._fit = WallFit(points, last.geometry.resolution_m) if len(points) >= POINTS_MIN else None
+        enough = len(points) >= tracking.fit_min_points
+        self._fit = WallFit(points, last.geometry.resolution_m, tracking) if enough else None
 
     def rooms(self, snapshot: OccupancySnapshot, motion: RigidMotion) -> BackProjectedRooms:
         """Find the rooms of the last map on another one.
@@ -100,7 +101,7 @@ class BackProjector:
         part = labels[window]
         part[row, column] = self._nearest[cells[:, 0], cells[:, 1]]
         cell_m2 = snapshot.geometry.cell_area_m2
-        _join_small_pieces(part, free, self._min_area_m2 / cell_m2)
+        _join_small_pieces(part, free, self._tracking.back_projected_min_area_m2 / cell_m2)
         return BackProjectedRooms(labels, label_sizes(part, self._count)[1:].astype(float) * cell_m2)
 
     def _laid_over(
@@ -109,9 +110,9 @@ class BackProjector:
         """Fit a map's walls to those of the last one, where that brings more of them together."""
         points = wall_faces(free, occupied, geometry)
         fit = self._fit
-        if fit is None or len(points) < POINTS_MIN:
+        if fit is None or len(points) < self._tracking.fit_min_points:
             return motion
-        walls = WallFit(points, geometry.resolution_m).sample()
+        walls = WallFit(points, geometry.resolution_m, self._tracking).sample()
         center = walls.points.mean(axis=0)
         start = RigidMotion.moving(center, motion.points(center), motion.turn_rad)
         fitted = fit.settled(walls, start)
@@ -126,10 +127,10 @@ def motions_to_last(motions: Sequence[RigidMotion | None]) -> list[RigidMotion]:
     motions : sequence
         How it moved to each from the one before; None where it stayed.
     """
-    found = [RigidMotion.none()]
+    to_last = [RigidMotion.none()]
     for motion in reversed(motions[1:]):
-        found.append(found[-1] if motion is None else motion.then(found[-1]))
-    return found[: len(motions)][::-1]
+        to_last.append(to_last[-1] if motion is None else motion.then(to_last[-1]))
+    return to_last[: len(motions)][::-1]
 
 
 def _join_small_pieces(labels: NDArray[np.int32], free: NDArray[np.bool_], min_cells: float) -> None:
@@ -220,6 +221,6 @@ class RunBackProjection:
         for snapshot in snapshots:
             if snapshot.index in to_last:
                 motion = to_last[snapshot.index]
-                found = projector.rooms(snapshot, motion)
+                shown = projector.rooms(snapshot, motion)
                 coverage = self._coverages[snapshot.index]
-                yield BackProjectedSnapshot(snapshot, coverage, found, rooms, last.track_ids, motion)
+                yield BackProjectedSnapshot(snapshot, coverage, shown, rooms, last.track_ids, motion)

@@ -9,17 +9,11 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from rose2_logs.config.parameters import TrackingParameters
 from rose2_logs.model.occupancy import FloatArray
 from rose2_logs.tracking.overlap import share_of
 from rose2_logs.tracking.registration import RigidMotion
 from rose2_logs.tracking.track_history import SnapshotRef, TrackHistories
-
-AREA_TOLERANCE = 0.1
-"""A room has its last area when it is within this share of it."""
-SHAPE_MIN_IOU = 0.8
-"""A room has its last shape from this overlap on: walls a few decimeters off in a room of five meters."""
-FINAL_MIN_SHARE = 0.9
-"""The layout is final when this share of it, by area, is in rooms of their last shape."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,9 +43,9 @@ class Convergence:
     Attributes
     ----------
     area_settled : dict
-        By track, the map from which on its area stayed within `AREA_TOLERANCE` of its last.
+        By track, the map from which on its area stayed within `settled_area_tolerance` of its last.
     shape_right : dict
-        By track, the first map whose shape overlapped its last by `SHAPE_MIN_IOU`.
+        By track, the first map whose shape overlapped its last by `last_shape_min_iou`.
     shape_right_seen : dict
         By track, the area seen of it at that time over its last.
     final_iou : dict
@@ -60,7 +54,7 @@ class Convergence:
     final_share : dict
         By snapshot, the share of the last layout's area that was in rooms of their last shape.
     layout_final : SnapshotRef or None
-        The map from which on this share stayed above `FINAL_MIN_SHARE`; None where the last map has no room.
+        The map from which on this share stayed above `final_min_share`; None where the last map has no room.
     """
 
     area_settled: dict[int, SnapshotRef] = field(default_factory=dict)
@@ -76,6 +70,7 @@ def measure_convergence(
     histories: TrackHistories,
     snapshot_refs: Mapping[int, SnapshotRef],
     drifts: Mapping[int, RigidMotion],
+    parameters: TrackingParameters | None = None,
 ) -> Convergence:
     """Compare the rooms of every map with what they were in the end.
 
@@ -89,8 +84,11 @@ def measure_convergence(
         Every map, by snapshot, in their order.
     drifts : mapping of int to RigidMotion
         How each moved since the first one.
+    parameters : TrackingParameters, optional
+        From when on an area has settled, a shape is that of the last map, and the layout is final.
     """
-    found = Convergence()
+    parameters = parameters or TrackingParameters()
+    measured = Convergence()
     weight = {track: histories.tracks[track].polygon.area for track in histories.in_last_map}
     total = sum(weight.values())
     final_iou, final_share = dict.fromkeys(snapshot_refs, 0.0), dict.fromkeys(snapshot_refs, 0.0)
@@ -103,25 +101,25 @@ def measure_convergence(
             strict=True,
         ):
             last = histories.tracks[track].area_m2
-            if abs(area - last) > AREA_TOLERANCE * last:
-                found.area_settled.pop(track, None)
+            if abs(area - last) > parameters.settled_area_tolerance * last:
+                measured.area_settled.pop(track, None)
             else:
-                found.area_settled.setdefault(track, snapshot_refs[snapshot])
-            if iou >= SHAPE_MIN_IOU and track not in found.shape_right:
-                found.shape_right[track] = snapshot_refs[snapshot]
-                found.shape_right_seen[track] = area / last if last > 0 else 0.0
+                measured.area_settled.setdefault(track, snapshot_refs[snapshot])
+            if iou >= parameters.last_shape_min_iou and track not in measured.shape_right:
+                measured.shape_right[track] = snapshot_refs[snapshot]
+                measured.shape_right_seen[track] = area / last if last > 0 else 0.0
             if track in weight:
                 final_iou[snapshot] += iou * weight[track]
-                final_share[snapshot] += (iou >= SHAPE_MIN_IOU) * weight[track]
+                final_share[snapshot] += (iou >= parameters.last_shape_min_iou) * weight[track]
     for snapshot, snapshot_ref in snapshot_refs.items():
         share = final_share[snapshot] / total if total > 0 else None
-        found.final_iou[snapshot] = final_iou[snapshot] / total if total > 0 else None
-        found.final_share[snapshot] = share
-        if share is None or share < FINAL_MIN_SHARE:
-            found.layout_final = None
-        elif found.layout_final is None:
-            found.layout_final = snapshot_ref
-    return found
+        measured.final_iou[snapshot] = final_iou[snapshot] / total if total > 0 else None
+        measured.final_share[snapshot] = share
+        if share is None or share < parameters.final_min_share:
+            measured.layout_final = None
+        elif measured.layout_final is None:
+            measured.layout_final = snapshot_ref
+    return measured
 
 
 def _iou_with_last(

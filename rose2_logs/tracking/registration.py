@@ -14,35 +14,6 @@ from rose2_logs.model.occupancy import BoolArray, FloatArray, GridGeometry, Occu
 if TYPE_CHECKING:
     from scipy.spatial import cKDTree
 
-POINTS_MAX = 2000
-"""Wall cells of the map before that are laid over the next map, evenly taken: enough for some millimeters."""
-POINTS_MIN = 50
-"""Fewer wall cells do not tell how a map lies: two meters of wall."""
-SEARCH_POINTS = 500
-"""Wall cells that the search among many positions tries."""
-GATES_M = (0.5, 0.3, 0.2, 0.1)
-"""How far a wall's nearest wall may be, from step to step of the fit: a loop closure's leap, then drift."""
-GATE_MIN_CELLS = 2.0
-"""And this many cells at least: a wall's two faces, and its wobble."""
-NEIGHBORS = 12
-"""Wall cells around a point that tell how the wall runs: half a meter of its face."""
-DAMPING = 1e-3
-"""Least share of the walls that must stand across a direction to fit the shift along it."""
-ROUNDS_MAX = 8
-"""Rounds of the fit for each gate; it has settled before."""
-SETTLED_M = 1e-4
-"""The fit has settled when no point moves further than this."""
-SEARCH_RASTER_M = 0.1
-"""Cells of the raster on which positions are searched."""
-SEARCH_STEP_M = 0.3
-"""Step of the search, which the fit's first gate bridges."""
-SEARCH_CANDIDATES = 5
-"""Positions, the best of the search, that are fitted."""
-SURE_SHARE = 0.75
-"""Where the fit brings this share of the walls together, no other position is searched."""
-BETTER_SHARE = 0.05
-"""Another position is taken when it brings this share more of the walls together than staying does."""
-
 
 @dataclass(frozen=True)
 class RigidMotion:
@@ -136,13 +107,13 @@ class MapAligner:
         """
         points = wall_points(snapshot, self._occupancy)
         before, self._before = self._before, None
-        if len(points) < POINTS_MIN:
+        if len(points) < self._tracking.fit_min_points:
             return None
-        fit = WallFit(points, snapshot.geometry.resolution_m)
+        fit = WallFit(points, snapshot.geometry.resolution_m, self._tracking)
         self._before = fit.sample()
         if before is None:
             return None
-        motion = fit.best(before, self._tracking)
+        motion = fit.best(before)
         moved = np.linalg.norm(motion.points(before.points) - before.points, axis=1).mean()
         return motion if moved >= self._tracking.shift_min_m else None
 
@@ -183,40 +154,53 @@ class WallSample:
 
 
 class WallFit:
-    """The walls of a map, which those of another are laid over."""
+    """The walls of a map, which those of another are laid over.
 
-    def __init__(self, points: FloatArray, resolution_m: float) -> None:
+    Parameters
+    ----------
+    points : (N, 2) float
+        Points of the walls, world meters.
+    resolution_m : float
+        Side of the map's cells.
+    parameters : TrackingParameters
+        How walls are fitted and how far is searched.
+    """
+
+    def __init__(self, points: FloatArray, resolution_m: float, parameters: TrackingParameters) -> None:
         from scipy.spatial import cKDTree
 
         self._points = points
+        self._parameters = parameters
         self._tree: cKDTree = cKDTree(points)
-        self._gates = tuple(max(gate, GATE_MIN_CELLS * resolution_m) for gate in GATES_M)
+        least = parameters.fit_gate_min_cells * resolution_m
+        gates_m = (getattr(parameters, f"fit_gate_{step}_m") for step in (1, 2, 3, 4))
+        self._gates = tuple(max(gate, least) for gate in gates_m)
 
     def sample(self) -> WallSample:
         """Some of the walls, to be laid over those of the next map."""
-        points = evenly(self._points, POINTS_MAX)
-        _, nearest = self._tree.query(points, k=NEIGHBORS)
+        points = evenly(self._points, self._parameters.fit_points)
+        _, nearest = self._tree.query(points, k=self._parameters.fit_neighbors)
         around = self._points[nearest] - self._points[nearest].mean(axis=1, keepdims=True)
         x, y = around[..., 0], around[..., 1]
         # The direction of the greatest spread is that of the wall.
         along = np.arctan2(2 * (x * y).sum(axis=1), (x * x - y * y).sum(axis=1)) / 2
         return WallSample(points, np.stack([-np.sin(along), np.cos(along)], axis=1))
 
-    def best(self, walls: WallSample, parameters: TrackingParameters) -> RigidMotion:
+    def best(self, walls: WallSample) -> RigidMotion:
         """Motion of walls that brings most of them to walls; staying unless another is better."""
-        points = walls.points
+        points, parameters = walls.points, self._parameters
         center = points.mean(axis=0)
         staying = RigidMotion.moving(center, center, 0.0)
-        least = max(self.share(points, staying) + BETTER_SHARE, parameters.shift_min_share)
+        least = max(self.share(points, staying) + parameters.fit_better_share, parameters.shift_min_share)
         if least > 1:
             return staying
         fitted = self.settled(walls, staying)
         share = self.share(points, fitted)
-        if share < SURE_SHARE:
-            for start in self._search(points, center, parameters):
+        if share < parameters.fit_sure_share:
+            for start in self._search(points, center):
                 other = self.settled(walls, start)
-                if (found := self.share(points, other)) > share:
-                    fitted, share = other, found
+                if (its_share := self.share(points, other)) > share:
+                    fitted, share = other, its_share
         return fitted if share >= least else staying
 
     def share(self, points: FloatArray, motion: RigidMotion) -> float:
@@ -229,45 +213,45 @@ class WallFit:
 
         Only the distance across the wall counts: along a wall, cells match at every step of the raster.
         """
+        parameters = self._parameters
         center = np.asarray(motion.center_xy_m)
         radius = float(np.linalg.norm(walls.points - center, axis=1).max())
         for gate in self._gates:
-            for _ in range(ROUNDS_MAX):
+            for _ in range(parameters.fit_max_rounds):
                 placed = motion.points(walls.points)
                 distance, nearest = self._tree.query(placed, distance_upper_bound=gate)
                 near = np.isfinite(distance)
-                if np.count_nonzero(near) < POINTS_MIN:
+                if np.count_nonzero(near) < parameters.fit_min_points:
                     return motion
                 weight = (1 - (distance[near] / gate) ** 2) ** 2
                 to = motion.points(center)
                 across = motion.points(walls.across[near] + center) - to
-                shift, turn = _step(
-                    placed[near] - to, self._points[nearest[near]] - placed[near], across, weight, radius
-                )
+                gaps = self._points[nearest[near]] - placed[near]
+                shift, turn = _step(placed[near] - to, gaps, across, weight, radius, parameters.fit_damping)
                 motion = RigidMotion.moving(center, to + shift, motion.turn_rad + turn)
-                if np.hypot(*shift) + abs(turn) * radius < SETTLED_M:
+                if np.hypot(*shift) + abs(turn) * radius < parameters.fit_settled_m:
                     break
         return motion
 
-    def _search(
-        self, points: FloatArray, center: FloatArray, parameters: TrackingParameters
-    ) -> list[RigidMotion]:
+    def _search(self, points: FloatArray, center: FloatArray) -> list[RigidMotion]:
         """Best starts among all shifts and turns within reach: correlation with the distance to walls."""
+        parameters = self._parameters
+        step_m = parameters.search_step_m
         nearness, low = self._nearness(parameters.shift_search_m)
-        chosen = evenly(points, SEARCH_POINTS)
-        radius = max(float(np.linalg.norm(chosen - center, axis=1).max()), SEARCH_STEP_M)
-        shifts = _steps(parameters.shift_search_m, SEARCH_STEP_M)
-        turns = _steps(parameters.shift_search_rad, SEARCH_STEP_M / radius)
+        chosen = evenly(points, parameters.search_points)
+        radius = max(float(np.linalg.norm(chosen - center, axis=1).max()), step_m)
+        shifts = _steps(parameters.shift_search_m, step_m)
+        turns = _steps(parameters.shift_search_rad, step_m / radius)
         offset = np.stack(np.meshgrid(shifts, shifts, indexing="ij"), -1).reshape(-1, 2)
         height, width = nearness.shape
         scores = np.zeros((len(turns), len(offset)))
         for number, turn in enumerate(turns):
             placed = RigidMotion.moving(center, center, turn).points(chosen) - low
-            cells = np.floor((placed[:, None] + offset) / SEARCH_RASTER_M).astype(np.intp)
+            cells = np.floor((placed[:, None] + offset) / parameters.search_raster_m).astype(np.intp)
             x, y = cells[..., 0], cells[..., 1]
             inside = (x >= 0) & (y >= 0) & (x < width) & (y < height)
             scores[number] = (nearness[y.clip(0, height - 1), x.clip(0, width - 1)] * inside).sum(axis=0)
-        best = np.argsort(-scores, axis=None, kind="stable")[:SEARCH_CANDIDATES]
+        best = np.argsort(-scores, axis=None, kind="stable")[: parameters.search_candidates]
         return [
             RigidMotion.moving(center, center + offset[at % len(offset)], turns[at // len(offset)])
             for at in best.tolist()
@@ -277,13 +261,14 @@ class WallFit:
         """Raster (H, W): 1 at walls, 0 from the first gate on; and the world position (2,) of its corner."""
         import cv2
 
+        cell_m = self._parameters.search_raster_m
         low = self._points.min(axis=0) - margin_m
-        cells = np.floor((self._points - low) / SEARCH_RASTER_M).astype(np.intp)
-        margin = int(np.ceil(margin_m / SEARCH_RASTER_M)) + 1
+        cells = np.floor((self._points - low) / cell_m).astype(np.intp)
+        margin = int(np.ceil(margin_m / cell_m)) + 1
         width, height = (cells.max(axis=0) + margin).tolist()
         no_wall = np.ones((height, width), np.uint8)
         no_wall[cells[:, 1], cells[:, 0]] = 0
-        distance = cv2.distanceTransform(no_wall, cv2.DIST_L2, cv2.DIST_MASK_5) * SEARCH_RASTER_M
+        distance = cv2.distanceTransform(no_wall, cv2.DIST_L2, cv2.DIST_MASK_5) * cell_m
         return np.maximum(0.0, 1.0 - distance / self._gates[0]).astype(np.float64), low
 
 
@@ -294,7 +279,12 @@ def _steps(reach: float, step: float) -> FloatArray:
 
 
 def _step(
-    points: FloatArray, gaps: FloatArray, across: FloatArray, weight: FloatArray, radius_m: float
+    points: FloatArray,
+    gaps: FloatArray,
+    across: FloatArray,
+    weight: FloatArray,
+    radius_m: float,
+    damping_share: float,
 ) -> tuple[FloatArray, float]:
     """Shift (2,) and turn about the origin that close gaps (N, 2) across walls with the least squares.
 
@@ -303,6 +293,6 @@ def _step(
     turned = np.stack([-points[:, 1], points[:, 0]], axis=1) / radius_m
     rows = np.column_stack([across, (across * turned).sum(axis=1)])
     weighted = rows * weight[:, None]
-    damping = DAMPING * weight.sum() * np.eye(3)
+    damping = damping_share * weight.sum() * np.eye(3)
     solved = np.linalg.solve(weighted.T @ rows + damping, weighted.T @ (across * gaps).sum(axis=1))
     return solved[:2], float(solved[2]) / radius_m

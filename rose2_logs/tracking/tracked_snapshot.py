@@ -6,9 +6,13 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal, get_args
 
+import numpy as np
+from numpy.typing import NDArray
+
 from rose2_logs.model.analysis import SnapshotAnalysis
 from rose2_logs.model.occupancy import FloatArray, OccupancySnapshot
 from rose2_logs.model.room_quality import RoomQuality
+from rose2_logs.model.rooms import RoomMap
 from rose2_logs.tracking.layout_change import LayoutChange
 from rose2_logs.tracking.registration import RigidMotion
 
@@ -87,3 +91,19 @@ class TrackedSnapshot:
     quality: RoomQuality | None = None
     change: LayoutChange | None = None
     path: FloatArray | None = None
+
+    def __repr__(self) -> str:
+        return (
+            f"TrackedSnapshot(index={self.snapshot.index}, coverage={self.coverage:.2f}, "
+            f"tracks={list(self.track_ids)}, {self.snapshot.geometry.size_text})"
+        )
+
+    @property
+    def rooms(self) -> RoomMap:
+        """The rooms of the map; room i + 1 has the track ``track_ids[i]``."""
+        return self.analysis.rooms
+
+    @property
+    def labels(self) -> NDArray[np.int32]:
+        """Rooms (H, W) of the cells: 0 = no room, 1..R."""
+        return self.analysis.rooms.labels

@@ -17,9 +17,6 @@ from rose2_logs.tracking.overlap import share_of
 from rose2_logs.tracking.registration import MapAligner
 from rose2_logs.tracking.tracked_snapshot import EVENT_ORDER, MAP_TRACK, EventKind, RoomEvent
 
-WEIGHT_POWER = 2
-"""Pairs are weighed by this power of their overlap: one good pair is worth more than two poor ones."""
-
 
 @dataclass(frozen=True, eq=False)
 class _Overlaps:
@@ -146,7 +143,7 @@ class RoomTracker:
         ids = np.zeros(overlaps.newest.shape[1], np.int64)
         best = overlaps.best
         same = (best > 0) & ((best >= self._parameters.match_min_iou) | overlaps.is_part)
-        for row, column in assign(best**WEIGHT_POWER, same):
+        for row, column in assign(best**self._parameters.match_power, same):
             ids[column] = overlaps.tracks[row]
         return ids
 

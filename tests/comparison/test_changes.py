@@ -12,11 +12,13 @@ from moved_maps import motion_about, moved
 
 from rose2_logs.comparison.layouts import compare_layouts
 from rose2_logs.comparison.room_changes import compare_rooms
-from rose2_logs.comparison.wall_changes import STEP_M, _stretches, compare_walls
+from rose2_logs.comparison.wall_changes import _stretches, compare_walls
+from rose2_logs.config.comparison import ComparisonParameters
 from rose2_logs.io import open_log
 from rose2_logs.tracking.registration import RigidMotion
 
 SAMPLE = Path(__file__).parents[2] / "sample_logs" / "office.mcap"
+PARAMETERS = ComparisonParameters()
 STILL = RigidMotion.none()
 PARTITION_M = (4.85, 2.15, 5.2, 5.85)
 """The wall between the two rooms of the drawn office, without its ends in other walls."""
@@ -147,11 +149,12 @@ def test_a_run_without_rooms_is_compared(office):
 @pytest.mark.parametrize("kept", [0, 1])
 def test_a_wall_of_which_one_face_is_there_is_not_gone(kept: int):
     """Where the other map drew it thinner, its second face lies on free space."""
-    steps = np.arange(30) * STEP_M + STEP_M / 2
+    step_m = PARAMETERS.wall_step_m
+    steps = np.arange(30) * step_m + step_m / 2
     points = np.concatenate([np.column_stack([steps, np.full(30, y)]) for y in (0.0, 0.15)])
     on = np.repeat([kept == 0, kept == 1], 30)
     line = np.array([0.0, 0.0, 3.0, 0.0])
-    gone, compared, there = _stretches(points, on, ~on, line, reach_m=0.2)
+    gone, compared, there = _stretches(points, on, ~on, line, 0.2, PARAMETERS)
     assert (len(gone), compared, there) == (0, 30, 30)
-    gone, compared, there = _stretches(points, np.zeros(60, bool), np.ones(60, bool), line, reach_m=0.2)
+    gone, compared, there = _stretches(points, np.zeros(60, bool), np.ones(60, bool), line, 0.2, PARAMETERS)
     assert (len(gone), compared, there) == (1, 30, 0)

@@ -14,6 +14,7 @@ from moved_maps import motion_about, moved
 
 from rose2_logs.comparison.layouts import compare_layouts
 from rose2_logs.comparison.placement import PlacedMap, _is_same, place
+from rose2_logs.config.comparison import ComparisonParameters
 from rose2_logs.config.parameters import OccupancyParameters
 from rose2_logs.io import open_log
 from rose2_logs.model.occupancy import OccupancySnapshot
@@ -148,7 +149,7 @@ def test_placements_are_one_where_the_map_lies_and_is_turned_about_the_same(shif
     center = np.array([30.0, -20.0])
     one = RigidMotion.moving(center, center + 5.0, 1.0)
     other = RigidMotion.moving(center, center + 5.0 + np.array([0.0, shift_m]), 1.0 + turn_rad)
-    assert _is_same(one, other, center) == is_same
+    assert _is_same(one, other, center, ComparisonParameters()) == is_same
 
 
 @pytest.mark.parametrize("stated", [0.7, 1.4])

@@ -1,11 +1,16 @@
-"""Operations on label images: cells in straight runs."""
+"""Operations on label images: cells in straight runs, where labels meet."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from rose2_logs.model.labels import straight_runs
+from drawn_rooms import rows
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as arrays
+
+from rose2_logs.model.labels import contacts, straight_runs
 
 
 @pytest.mark.parametrize("step", [(0, 1), (1, 0), (1, 1), (1, -1)])
@@ -27,3 +32,46 @@ def test_runs_hold_every_cell_once_and_cannot_be_longer(step):
 def test_no_cells_make_no_runs():
     first, last = straight_runs(np.zeros(0, int), np.zeros(0, int), (1, 1))
     assert first.shape == last.shape == (0, 2)
+
+
+def test_contacts_are_counted_by_sides_of_cells():
+    meet = contacts(rows("112", "132"))
+    pairs, pair = meet.pairs()
+    assert pairs == [(1, 2), (1, 3), (2, 3)]
+    assert np.bincount(pair).tolist() == [1, 2, 1]
+
+
+def test_contacts_say_between_which_cells():
+    """Within rows first, each in reading order, as indices of the flattened image."""
+    meet = contacts(rows("11", "22", "23"))
+    assert list(zip(meet.first.tolist(), meet.second.tolist(), strict=True)) == [
+        (4, 5),
+        (0, 2),
+        (1, 3),
+        (3, 5),
+    ]
+    chosen = meet.chosen(meet.low == 1)
+    assert chosen.high.tolist() == [2, 2]
+
+
+def test_an_image_of_one_label_has_no_contacts():
+    pairs, pair = contacts(np.ones((3, 4), np.int32)).pairs()
+    assert pairs == []
+    assert len(pair) == 0
+
+
+@given(
+    arrays.arrays(
+        np.int32, arrays.array_shapes(min_dims=2, max_dims=2, max_side=6), elements=st.integers(0, 3)
+    )
+)
+def test_contacts_are_those_of_a_loop_over_all_cells(labels: np.ndarray):
+    height, width = labels.shape
+    expected = []
+    for row in range(height):
+        for column in range(width):
+            for other in ((row, column + 1), (row + 1, column)):
+                if other[0] < height and other[1] < width and labels[row, column] != labels[other]:
+                    expected.append(tuple(sorted((int(labels[row, column]), int(labels[other])))))
+    meet = contacts(labels)
+    assert sorted(zip(meet.low.tolist(), meet.high.tolist(), strict=True)) == sorted(expected)

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from rose2_logs.model.analysis import SnapshotAnalysis
 from rose2_logs.model.occupancy import GridGeometry, OccupancySnapshot
+from rose2_logs.model.room_quality import RoomQuality
 from rose2_logs.model.rooms import Doorway, RoomMap
 
 SECOND_NS = 10**9
@@ -36,8 +37,20 @@ def drawn(
     areas = np.bincount(labels.ravel(), minlength=count + 1)[1:] * geometry.cell_area_m2
     rooms = RoomMap(geometry, labels, polygons, areas, doorways)
     free_m2 = float((cells == 0).sum()) * geometry.cell_area_m2
+    quality = RoomQuality(np.full(count, np.nan), np.zeros(count))
     return snapshot, SnapshotAnalysis(
-        index, time_ns, time_ns, geometry, free_m2, resolution_m, rooms, None, None, None, {"draw": 0.0}
+        index,
+        time_ns,
+        time_ns,
+        geometry,
+        free_m2,
+        resolution_m,
+        rooms,
+        None,
+        None,
+        None,
+        quality,
+        {"draw": 0.0},
     )
 
 

@@ -128,9 +128,9 @@ def _join_by_dbscan(groups: _Groups, parameters: FloorPlanParameters) -> None:
     cluster = model.fit_predict(distance)
     takes_part = groups.free_m2 > 0
     for number in np.unique(cluster):
-        target, *members = np.flatnonzero((cluster == number) & takes_part).tolist() or [None]
-        for member in members:
-            groups.join(member, target)
+        members = np.flatnonzero((cluster == number) & takes_part).tolist()
+        for member in members[1:]:
+            groups.join(member, members[0])
 
 
 def _join_by_whole_borders(groups: _Groups, parameters: FloorPlanParameters) -> None:

@@ -1,4 +1,4 @@
-"""Stage C: faces, what is seen along edges, grouping, borders, doorways."""
+"""Stage C: faces, what is seen along edges, grouping."""
 
 import dataclasses
 
@@ -8,11 +8,9 @@ import shapely
 
 from rose2_logs.config.parameters import FloorPlanParameters
 from rose2_logs.model.outlines import outline
-from rose2_logs.segmentation.floor_plan.doorways import find_doorways
 from rose2_logs.segmentation.floor_plan.edge_weights import EdgeEvidence, edge_evidence
 from rose2_logs.segmentation.floor_plan.faces import build_faces, rasterize
 from rose2_logs.segmentation.floor_plan.grouping import group_faces
-from rose2_logs.segmentation.floor_plan.rooms import adopt_left_out, settle_borders
 from rose2_logs.segmentation.floor_plan.stage import make_floor_plan
 
 PARAMETERS = FloorPlanParameters()
@@ -157,45 +155,6 @@ def test_a_wall_is_blind_where_it_shows_no_free_space_on_a_side():
     evidence = edge_evidence(line, line, walls, free, 0.05, PARAMETERS)
     assert evidence.wall_m[0] == pytest.approx(6.0, abs=0.1)
     assert evidence.blind_m[0] == pytest.approx(2.0, abs=0.1)
-
-
-def test_a_strip_along_the_other_side_of_a_wall_changes_room():
-    labels = np.ones((60, 60), np.int32)
-    labels[32:] = 2
-    labels[30, 10:50] = 0  # the wall, with room 1 spilling over to rows 31
-    settled = settle_borders(labels, 0.05, 0.25)
-    assert (settled[31, 15:45] == 2).all()
-    assert (settled[:29] == 1).all()
-    assert ((settled > 0) == (labels > 0)).all()
-
-
-def test_wide_space_outside_joins_the_room_that_it_opens_to_and_rays_do_not():
-    free, labels = np.ones((100, 160), bool), np.zeros((100, 160), np.int32)
-    labels[:, :60], labels[:40, 60:80] = 1, 2
-    free[:, 100:] = False
-    free[50:53, 100:150] = True  # a ray
-    free[80:, 130:] = True  # seen on its own, beside no room
-    adopted = adopt_left_out(labels, free, 0.05, PARAMETERS)
-    assert (adopted[:, :60] == 1).all()
-    assert (adopted[60:, 60:95] == 1).all()
-    assert (adopted[51, 105:145] == 0).all()
-    assert (adopted[80:, 130:] == 0).all()
-    assert (adopted[labels > 0] == labels[labels > 0]).all()
-
-
-def test_a_doorway_is_found_where_it_was_drawn():
-    labels = np.zeros((40, 80), np.int32)
-    labels[:, :39] = 1
-    labels[:, 40:] = 2
-    labels[10:28, 39] = 1
-    ((rooms, ends),) = find_doorways(labels, 0.05, 0.3)
-    assert rooms == (1, 2)
-    assert np.allclose(ends[:, 0], 2.0, atol=0.05)
-    assert np.linalg.norm(ends[1] - ends[0]) == pytest.approx(0.9, abs=0.1)
-
-
-def test_rooms_that_do_not_touch_have_no_doorway():
-    assert find_doorways(np.array([[1, 0, 2]], np.int32), 0.05, 0.0) == []
 
 
 def test_an_outline_has_the_area_and_the_hole_of_its_cells():

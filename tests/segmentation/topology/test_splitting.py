@@ -56,7 +56,7 @@ def test_the_drawn_voronoi_graph_is_a_straight_line_in_a_corridor_and_goes_throu
     walls = np.ones((60, 200), bool)
     walls[5:25] = walls[35:55] = False
     walls[25:35, 100:110] = False
-    lines = voronoi_lines(~walls, walls, 0.05, 0.15)
+    lines = voronoi_lines(~walls, walls, 0.05, PARAMETERS)
     lengths = np.hypot(*(lines[:, 2:] - lines[:, :2]).T)
     in_corridors = lines[lengths > 1.5]
     assert len(in_corridors) >= 2
@@ -66,7 +66,7 @@ def test_the_drawn_voronoi_graph_is_a_straight_line_in_a_corridor_and_goes_throu
     crossing = lines[(lines[:, [1, 3]].min(axis=1) < 1.6) & (lines[:, [1, 3]].max(axis=1) > 1.4)]
     assert len(crossing)
     assert np.abs(crossing[:, [0, 2]] - 5.25).max() < 0.3
-    assert len(voronoi_lines(np.zeros((5, 5), bool), np.ones((5, 5), bool), 0.05, 0.15)) == 0
+    assert len(voronoi_lines(np.zeros((5, 5), bool), np.ones((5, 5), bool), 0.05, PARAMETERS)) == 0
 
 
 def parts(walls):
