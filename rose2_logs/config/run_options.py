@@ -82,13 +82,6 @@ class Option:
     text: str = ""
     decides: bool = False
 
-    @property
-    def meaning(self) -> str:
-        """What it does, as said of a keyword in Python."""
-        return (
-            f"If False: {self.help[0].lower()}{self.help[1:]}" if self.flag.startswith("--no-") else self.help
-        )
-
 
 def option(default: Any, help: str, **about: Any) -> Any:
     """Declare an option of a dataclass; a default that is a class is called for the value."""

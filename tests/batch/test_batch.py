@@ -146,7 +146,7 @@ def test_a_killed_worker_takes_only_its_try_with_it(tmp_path):
     assert all("was killed (SIGKILL)" in reason for _, reason in heard.retries)
     rows = summary(out)
     assert rows["slow"]["snapshots"] == str(len(SLOW))
-    assert "fewer --workers" in rows["doomed"]["reason"]
+    assert "fewer workers" in rows["doomed"]["reason"]
     assert not [path for path in tree(out) if path.startswith(".batch") or "doomed" in path]
 
 
