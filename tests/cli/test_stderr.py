@@ -159,7 +159,7 @@ def test_a_map_that_the_method_stumbles_over_is_left_out(monkeypatch, tmp_path):
     monkeypatch.setattr(tracked_stream, "analyze", stumbling)
     options = run.RunOptions(recording=False, annotated_log=False)
     result = run.analyze_log(maps, tmp_path / "out", options)
-    assert (result.totals.snapshots, result.totals.invalid) == (2, 1)
+    assert (result.summary.totals.snapshots, result.summary.totals.invalid) == (2, 1)
     (told,) = result.warnings.kinds["snapshot_left_out"].first
     assert "snapshot 1 is left out: IndexError: out of bounds" in told["message"]
     assert "a fault of rose2-logs" in told["message"]
