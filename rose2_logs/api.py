@@ -51,7 +51,7 @@ def _with_run_options(function: Callable[..., Run]) -> Callable[..., Run]:
     kept = [each for each in own.parameters.values() if each.kind is not inspect.Parameter.VAR_KEYWORD]
     function.__signature__ = own.replace(parameters=[*kept, *added])  # type: ignore[attr-defined]
     about = options_of(RunOptions)
-    lines = [f"{each.name} : {each.type}\n        {about[each.name].meaning}" for each in options]
+    lines = [f"{each.name} : {each.type}\n        {about[each.name].help}" for each in options]
     function.__doc__ = (function.__doc__ or "").replace("**options", "\n    ".join(lines))
     return function
 

@@ -1,10 +1,10 @@
-"""How a batch is worked off."""
+"""How a batch is carried out: its options, beside those of the run of each log."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from rose2_logs.config.run_options import OUTPUTS, RunOptions, check_options, option
+from rose2_logs.config.run_options import OUTPUTS, RunOptions, check_options, explained, option
 from rose2_logs.errors import ParameterError
 
 MACHINES = "Where and how often"
@@ -12,15 +12,12 @@ MACHINES = "Where and how often"
 BATCH = ("batch",)
 
 
+@explained
 @dataclass(frozen=True)
 class BatchOptions:
-    """How a batch is worked off.
+    """What to take from each log, how to analyze it, what to write (`run`), and how the batch is carried out.
 
-    Attributes
-    ----------
-    run : RunOptions
-        What to take from each log, how to analyze it, what to write. Its `workers`, `overwrite`, `resume`,
-        `live`, `journal` and `origin` have no meaning here.
+    The options of `run` that `analyze` alone has have no meaning here.
 
     Raises
     ------

@@ -163,7 +163,7 @@ def _typer_option(name: str, about: Option, default: Any) -> Any:
         shown,
         flag_of(name, about),
         metavar="" if isinstance(default, bool) else about.metavar or None,
-        help=about.help,
+        help=f"Do not {about.help[0].lower()}{about.help[1:]}" if default is True else about.help,
         show_default=shown is not None,
         rich_help_panel=about.panel,
     )
@@ -181,7 +181,7 @@ def _built(kind: Any, command: str, given: dict[str, Any]) -> Any:
         if command in about.commands and name not in values:
             value = given.pop(name)
             value = about.parse(value) if about.parse is not None else value
-            values[name] = not value if about.flag.startswith("--no-") else value
+            values[name] = not value if getattr(kind, name, None) is True else value
     return kind(**values)
 
 

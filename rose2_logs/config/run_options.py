@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from numbers import Integral, Real
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from rose2_logs.config.baselines import METHODS
 from rose2_logs.config.parameters import Parameters
@@ -34,6 +34,7 @@ RECORDING_LAYERS = (
 """Layers of a recording that can be left out; map, rooms and doorways are always there."""
 LONGEST_LOG_S = 2.0**63 / 1e9
 """Log times are 64 bit integers that count nanoseconds."""
+Type = TypeVar("Type", bound=type)
 BOTH = ("analyze", "batch")
 MAPS, OUTPUTS, METHOD = "Which maps", "What to write", "Method and parameters"
 """Groups of options in the help."""
@@ -52,8 +53,8 @@ class Option:
     commands : tuple of str
         Commands that have it; an option for programs alone has none.
     flag : str
-        On the command line; by default the name with dashes. That of an option which is on by default begins
-        with ``--no-`` and turns it off.
+        On the command line; by default the name with dashes. The flag of an option that is on by default
+        turns it off, and begins with ``--no-``.
     metavar : str
         What stands for the value in the help.
     low, high : float
@@ -80,13 +81,6 @@ class Option:
     text: str = ""
     decides: bool = False
 
-    @property
-    def meaning(self) -> str:
-        """What it does, as said of a keyword in Python."""
-        return (
-            f"If False: {self.help[0].lower()}{self.help[1:]}" if self.flag.startswith("--no-") else self.help
-        )
-
 
 def option(default: Any, help: str, **about: Any) -> Any:
     """Declare an option of a dataclass; a default that is a class is called for the value."""
@@ -99,6 +93,17 @@ def option(default: Any, help: str, **about: Any) -> Any:
 def options_of(kind: Any) -> dict[str, Option]:
     """List what is known of the options of a dataclass, by their names."""
     return {each.name: each.metadata["option"] for each in dataclasses.fields(kind) if each.metadata}
+
+
+def explained(kind: Type) -> Type:
+    """Add the options of a dataclass to its docstring."""
+    lines = [kind.__doc__ or "", "    Attributes", "    ----------"]
+    for each in dataclasses.fields(kind):
+        if each.metadata:
+            default = "" if each.default is dataclasses.MISSING else f", default {each.default!r}"
+            lines += [f"    {each.name} : {each.type}{default}", f"        {each.metadata['option'].help}"]
+    kind.__doc__ = "\n".join(lines) + "\n    "
+    return kind
 
 
 def check_options(given: Any) -> None:
@@ -155,24 +160,20 @@ def layers_named(text: str) -> tuple[str, ...]:
     if text in ("all", "none"):
         return RECORDING_LAYERS if text == "all" else ()
     asked = [name.strip() for name in text.split(",")]
-    _check_layers(asked)
+    if unknown := [name for name in asked if name not in RECORDING_LAYERS]:
+        raise ParameterError(
+            f"layers={unknown[0]!r}: there is no such layer; there are: all, none, "
+            f"{', '.join(RECORDING_LAYERS)}"
+        )
     return tuple(name for name in RECORDING_LAYERS if name in asked)
 
 
-def _check_layers(names: Sequence[str]) -> None:
-    for name in names:
-        if name not in RECORDING_LAYERS:
-            raise ParameterError(
-                f"layers={name!r}: there is no such layer; there are: all, none, "
-                f"{', '.join(RECORDING_LAYERS)}"
-            )
-
-
+@explained
 @dataclass(frozen=True)
 class RunOptions:
     """What to take from a log, how to analyze it, what to write.
 
-    Each option has a default, and is explained where it is declared.
+    Everything has a default.
 
     Raises
     ------
@@ -244,7 +245,7 @@ class RunOptions:
     )
     method: str = option(
         "rose2",
-        f"Segmentation method: {', '.join(METHODS)}.",
+        f"Segmentation method: {METHODS[0]}, or one that it is compared with, {', '.join(METHODS[1:])}.",
         panel=METHOD,
         commands=BOTH,
         metavar="NAME",
@@ -262,7 +263,9 @@ class RunOptions:
         metavar="N",
         low=1,
     )
-    recording: bool = option(True, "Write no Rerun recording.", panel=OUTPUTS, commands=BOTH, flag="--no-rrd")
+    recording: bool = option(
+        True, "Write the Rerun recording.", panel=OUTPUTS, commands=BOTH, flag="--no-rrd"
+    )
     layers: tuple[str, ...] = option(
         RECORDING_LAYERS,
         "What the recording shows beside map, rooms and doorways: all, none, or names with commas between "
@@ -274,7 +277,7 @@ class RunOptions:
         text="all",
     )
     annotated_log: bool = option(
-        True, "Write no annotated MCAP.", panel=OUTPUTS, commands=BOTH, flag="--no-mcap"
+        True, "Write the annotated MCAP.", panel=OUTPUTS, commands=BOTH, flag="--no-mcap"
     )
     bag: bool = option(
         False,
@@ -319,7 +322,10 @@ class RunOptions:
 
     def __post_init__(self) -> None:
         check_options(self)
-        _check_layers(self.layers)
+        # A text, as the command line has it, is a right value for programs too.
+        layers: Any = self.layers
+        layers = layers_named(layers if isinstance(layers, str) else ",".join(layers) or "none")
+        object.__setattr__(self, "layers", layers)
         if self.bag and not self.annotated_log:
             raise ParameterError(
                 "bag=True makes a ROS 2 bag of the annotated MCAP, which annotated_log=False leaves out"

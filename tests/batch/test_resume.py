@@ -130,7 +130,7 @@ def test_other_settings_need_leave_too_and_nothing_is_begun_without(batches, cap
         batches.run("one", settings=other)
     assert tree(batches.out) == before
     assert batches.run("one", settings=other, overwrite=True) == {"one_run": "done"}
-    assert "1 logs that are not among those given now keep results of other settings" in caplog.text
+    assert "1 logs that are not among those given now keep results of other options" in caplog.text
     assert batches.run(settings=other, overwrite=True) == {"one_run": "up to date", "two_run": "done"}
 
 

@@ -23,6 +23,7 @@ from rose2_logs.config.parameters import (
 )
 from rose2_logs.errors import ParameterError
 
+
 def test_every_number_has_finite_bounds_that_hold_its_default():
     for row in describe_parameters():
         if "low" in row:

@@ -72,6 +72,14 @@ def test_layers_are_named_in_a_text():
     assert layers_named("all") == RECORDING_LAYERS
     assert layers_named("none") == ()
     assert layers_named("lines, predicted") == ("predicted", "lines")
+    assert RunOptions(layers="none").layers == RunOptions(layers=()).layers == ()
+    assert RunOptions(layers=["lines", "path"]).layers == ("path", "lines")
+
+
+def test_options_stand_in_the_docstring():
+    """In `help(RunOptions)`, as on the command line."""
+    for kind in (RunOptions, BatchOptions):
+        assert all(about.help in str(kind.__doc__) for about in options_of(kind).values())
 
 
 def test_the_methods_are_those_that_there_are():

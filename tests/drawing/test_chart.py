@@ -45,7 +45,8 @@ def test_a_curve_goes_from_corner_to_corner():
     page = line_chart([curve], title="t", x_label="x", x_range=(0.0, 100.0), style=ON_PAGE)
     (corners,) = points(page)
     assert corners == pytest.approx(
-        np.array([[LEFT, BOTTOM], [(LEFT + RIGHT) / 2, BOTTOM - 0.25 * (BOTTOM - TOP)], [RIGHT, TOP]]), abs=0.1
+        np.array([[LEFT, BOTTOM], [(LEFT + RIGHT) / 2, BOTTOM - 0.25 * (BOTTOM - TOP)], [RIGHT, TOP]]),
+        abs=0.1,
     )
     assert sum(isinstance(each, Dot) for each in page.shapes) == 3
 

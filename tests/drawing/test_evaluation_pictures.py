@@ -90,8 +90,12 @@ def test_a_found_room_without_partner_has_a_color_of_its_own_and_stripes(drawn):
     assert (high <= np.array(inside[2:]) + scale).all()
     assert stripes.shape.length > 100
     assert not any(isinstance(each, Lines) and each.color == WHITE for each in true_panel.shapes)
-    cell = found_panel.pixels().astype(int)[int(17 * scale) : int(27 * scale), int(37 * scale) : int(45 * scale)]
-    near = [(np.abs(cell - np.array(color)).max(axis=-1) <= 1).any() for color in (WHITE, *map(tinted, (3, 1, 2)))]
+    cell = found_panel.pixels().astype(int)[
+        int(17 * scale) : int(27 * scale), int(37 * scale) : int(45 * scale)
+    ]
+    near = [
+        (np.abs(cell - np.array(color)).max(axis=-1) <= 1).any() for color in (WHITE, *map(tinted, (3, 1, 2)))
+    ]
     assert near == [True, True, False, False]
     assert at(errors, 24, 45) == MARK_COLORS[Mark.SPLIT]
 
@@ -111,9 +115,7 @@ def test_borders_run_between_rooms_and_not_along_walls(drawn):
     _, true_panel, found_panel, _ = draw_panels(cells, compare(truth, found))
     lengths = []
     for panel in (true_panel, found_panel):
-        (borders,) = (
-            each for each in panel.shapes if isinstance(each, Lines) and each.color == BORDER_COLOR
-        )
+        (borders,) = (each for each in panel.shapes if isinstance(each, Lines) and each.color == BORDER_COLOR)
         lengths.append(borders.shape.length / (panel.width / 54))
     assert lengths == pytest.approx([0, 14 + 12 + 4], abs=0.1)
 

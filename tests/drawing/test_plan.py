@@ -173,9 +173,7 @@ def test_colors_of_rooms_may_be_given():
 def test_rooms_without_cells_are_filled_whole():
     """Where no cell is told to be a room's its shape is filled, but for what was not seen."""
     plan = two_rooms_plan()
-    plan = dataclasses.replace(
-        plan, map=dataclasses.replace(plan.map, labels=np.zeros_like(plan.map.labels))
-    )
+    plan = dataclasses.replace(plan, map=dataclasses.replace(plan.map, labels=np.zeros_like(plan.map.labels)))
     drawing = draw_plan(plan, dataclasses.replace(PANEL, detail=0.0))
     scale = PANEL.width / (plan.bounds_m[2] - plan.bounds_m[0] + 2 * MARGIN_M)
     areas_m2 = {

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
 from drawn_rooms import rows
 from hypothesis import given
 from hypothesis import strategies as st
