@@ -43,7 +43,7 @@ def test_what_is_whole_is_analyzed_and_copied(table, fault, kind, maps, copied, 
     log = make(table, (fault, kind), tmp_path)
     before = [(file, file.read_bytes()) for file in ([log] if log.is_file() else sorted(log.iterdir()))]
     result = analyze_log(log, tmp_path / "out", RunOptions(recording=False))
-    assert result.totals.snapshots == maps
+    assert result.summary.totals.snapshots == maps
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert summary["warnings"] == result.warnings.as_json()
     assert pq.read_metadata(tmp_path / "out" / "snapshots.parquet").num_rows == maps
@@ -69,7 +69,7 @@ def test_the_same_faults_give_the_same_summary_whatever_the_number_of_workers(tm
     for workers in (1, 2):
         folder = tmp_path / str(workers)
         options = RunOptions(recording=False, annotated_log=False, workers=workers)
-        assert 0 < analyze_log(log, folder, options).totals.snapshots < COUNT
+        assert 0 < analyze_log(log, folder, options).summary.totals.snapshots < COUNT
         summary = json.loads((folder / "summary.json").read_text())
         summaries.append({key: value for key, value in summary.items() if key != "seconds"})
     assert summaries[0] == summaries[1]

@@ -10,12 +10,16 @@ import shapely
 from drawn_maps import office, snapshot
 from drawn_rooms import rows
 
-from rose2_logs.config.parameters import OccupancyParameters
+from rose2_logs.config.parameters import OccupancyParameters, QualityParameters
+from rose2_logs.model.explored import ExploredPart
 from rose2_logs.model.occupancy import OccupancySnapshot
 from rose2_logs.model.room_quality import RoomQuality, room_quality
 from rose2_logs.model.rooms import RoomMap
 
-PARAMETERS = OccupancyParameters()
+
+def quality_of(map_: OccupancySnapshot, rooms: RoomMap) -> RoomQuality:
+    explored = ExploredPart.of(map_.cells, map_.geometry, OccupancyParameters())
+    return room_quality(map_, explored, rooms, QualityParameters())
 
 
 def rooms_with(map_: OccupancySnapshot, labels: np.ndarray, *polygons: shapely.Polygon) -> RoomMap:
@@ -24,7 +28,7 @@ def rooms_with(map_: OccupancySnapshot, labels: np.ndarray, *polygons: shapely.P
 
 def frontiers(labels: np.ndarray, cells: np.ndarray, resolution_m: float = 1.0) -> list[float]:
     map_ = snapshot(cells, resolution_m)
-    return room_quality(map_, RoomMap.from_labels(labels, map_.geometry), PARAMETERS).frontier_m.tolist()
+    return quality_of(map_, RoomMap.from_labels(labels, map_.geometry)).frontier_m.tolist()
 
 
 def test_a_frontier_is_counted_in_cell_sides():
@@ -60,7 +64,7 @@ def test_outlines_along_walls_are_backed_and_others_are_not(turn_deg: int):
         return shapely.affinity.translate(turned, *center)
 
     right, off, nothing = box(0, 2, 5, 6), box(2, 3.5, 4.2, 5.2), shapely.Polygon()
-    found = room_quality(map_, rooms_with(map_, labels, right, off, nothing), PARAMETERS)
+    found = quality_of(map_, rooms_with(map_, labels, right, off, nothing))
     outline = 2 * (5 + 4)
     assert found.wall_support[0] == pytest.approx((outline - 0.5) / outline, abs=0.03)
     assert found.wall_support[1] < 0.1
@@ -72,13 +76,13 @@ def test_an_outline_beyond_the_map_is_not_backed():
     cells = np.full((20, 20), 100)
     map_ = snapshot(cells)
     labels = np.ones((20, 20), np.int32)
-    found = room_quality(map_, rooms_with(map_, labels, shapely.box(-0.5, 0.3, 0.5, 0.7)), PARAMETERS)
+    found = quality_of(map_, rooms_with(map_, labels, shapely.box(-0.5, 0.3, 0.5, 0.7)))
     assert found.wall_support[0] == pytest.approx(0.5, abs=0.05)
 
 
 def test_a_map_without_rooms_has_no_evidence():
     """Empty arrays, no error."""
     map_ = snapshot(np.full((5, 5), -1))
-    found = room_quality(map_, RoomMap.from_labels(np.zeros((5, 5), np.int32), map_.geometry), PARAMETERS)
+    found = quality_of(map_, RoomMap.from_labels(np.zeros((5, 5), np.int32), map_.geometry))
     assert isinstance(found, RoomQuality)
     assert len(found.wall_support) == len(found.frontier_m) == 0

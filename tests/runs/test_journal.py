@@ -13,7 +13,6 @@ from drawn_maps import office, snapshot
 from rose2_logs.config.parameters import Parameters
 from rose2_logs.errors import InvalidMapError, OutputError
 from rose2_logs.model.occupancy import OccupancySnapshot
-from rose2_logs.model.room_quality import room_quality
 from rose2_logs.runs.journal import MAGIC, Found, Journal, JournaledWorkers, kept_maps
 from rose2_logs.segmentation.pipeline import analyze
 from rose2_logs.system.workers import Workers
@@ -31,8 +30,7 @@ def at(index: int) -> OccupancySnapshot:
 def work(taken: OccupancySnapshot) -> Found:
     if taken.index == 1:
         return InvalidMapError("map 1 is bad")
-    analysis = analyze(taken, Parameters())
-    return analysis, room_quality(taken, analysis.rooms, Parameters().occupancy)
+    return analyze(taken, Parameters())
 
 
 @pytest.fixture(scope="module")
@@ -55,8 +53,8 @@ def test_what_was_found_comes_back_in_order(whole, tmp_path: Path):
     with Journal(tmp_path / "journal", FACTS, kept) as journal:
         first, bad, *_ = [journal.known(at(index)) for index in range(4)]
         assert journal.known(at(4)) is None
-    assert first[0].index == 0
-    assert np.array_equal(first[0].rooms.labels, work(at(0))[0].rooms.labels)
+    assert first.index == 0
+    assert np.array_equal(first.rooms.labels, work(at(0)).rooms.labels)
     assert isinstance(bad, InvalidMapError)
     assert str(bad) == "map 1 is bad"
 
@@ -102,7 +100,7 @@ def test_a_journal_goes_on_after_its_last_whole_map(whole, tmp_path: Path):
     assert kept.maps == 3
     with Journal(path, FACTS, kept) as journal:
         found = [journal.known(at(index)) for index in range(3)]
-    assert found[2][0].index == 2
+    assert found[2].index == 2
 
 
 @pytest.mark.parametrize("begin", [b"", MAGIC[:5], b"something else", MAGIC, MAGIC + bytes(40)])
@@ -130,7 +128,7 @@ def test_only_maps_that_are_not_known_are_analyzed(whole, tmp_path: Path, worker
     path.write_bytes(data[: ends[2]])
     with Journal(path, FACTS, kept_maps(path)) as journal, Workers(fail_on_known, workers) as processes:
         same = JournaledWorkers(processes, journal).map(map(at, range(6)), lambda _, now: now.index == 3)
-        found = [result if isinstance(result, InvalidMapError) else result[0].index for _, result in same]
+        found = [result if isinstance(result, InvalidMapError) else result.index for _, result in same]
     assert str(found[1]) == "map 1 is bad"
     assert [found[0], *found[2:]] == [0, 2, 2, 4, 5]
     assert kept_maps(path).maps == 5

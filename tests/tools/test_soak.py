@@ -17,8 +17,8 @@ def test_a_long_log_changes_and_is_watched(tmp_path: Path):
     write_long_log(tmp_path / "long.mcap", 12)
     options = RunOptions(recording=False, annotated_log=False)
     result, samples = watch(tmp_path / "long.mcap", tmp_path / "out", 12, options)
-    assert (result.totals.snapshots, result.totals.unchanged) == (12, 8)
-    assert result.totals.rooms_last == 4
+    assert (result.summary.totals.snapshots, result.summary.totals.unchanged) == (12, 8)
+    assert result.summary.totals.rooms_last == 4
     assert [sample.maps for sample in samples] == list(range(1, 13))
     assert all(sample.memory_bytes > 10e6 and sample.open_files > 2 for sample in samples)
     assert len(table(samples).splitlines()) == 7

@@ -86,7 +86,7 @@ def test_any_number_of_workers_gives_the_same_bytes(run: Path, tmp_path: Path):
     """Two worker processes write what one process wrote."""
     options = RunOptions(recording=False, annotated_log=False, workers=2)
     result = analyze_log(run / "maps", tmp_path, options)
-    assert result.totals.snapshots == 3
+    assert result.summary.totals.snapshots == 3
     assert table_bytes(tmp_path) == table_bytes(run / "out")
 
 
@@ -101,12 +101,12 @@ def test_a_map_that_did_not_change_is_not_analyzed_again(tmp_path: Path, monkeyp
         path.write_text(path.read_text() + "mode: raw\n")
     options = dataclasses.replace(TABLES_ONLY, workers=workers)
     result = analyze_log(folder, tmp_path / "out", options)
-    assert (result.totals.snapshots, result.totals.unchanged) == (5, 2)
+    assert (result.summary.totals.snapshots, result.summary.totals.unchanged) == (5, 2)
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert summary["results"]["unchanged_maps"] == 2
     monkeypatch.setattr("rose2_logs.runs.stream.is_same_to_analysis", lambda before, now, parameters: False)
     each = analyze_log(folder, tmp_path / "each", options)
-    assert (each.totals.snapshots, each.totals.unchanged) == (5, 0)
+    assert (each.summary.totals.snapshots, each.summary.totals.unchanged) == (5, 0)
     assert table_bytes(tmp_path / "out") == table_bytes(tmp_path / "each")
 
 
