@@ -119,7 +119,7 @@ def test_the_same_plan_gives_the_same_dxf_in_every_process(tmp_path: Path):
         file = tmp_path / f"{seed}.dxf"
         surroundings = os.environ | {
             "PYTHONHASHSEED": str(seed),
-            "PYTHONPATH": str(Path(__file__).parents[2]),
+            "PYTHONPATH": os.pathsep.join(sys.path),
         }
         subprocess.run([sys.executable, "-c", script, str(file)], env=surroundings, check=True)
         written.add(file.read_bytes())
