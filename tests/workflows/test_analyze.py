@@ -166,7 +166,7 @@ def test_seconds_into_a_log_are_counted_from_its_first_message(tmp_path: Path):
     """Also in a log without an index, which is counted within the limits of the run when it is opened."""
     log = save_run(tmp_path / "maps")
     options = dataclasses.replace(TABLES_ONLY, start_s=1.0, end_s=1.5)
-    assert analyze_log(log, tmp_path / "out", options).totals.snapshots == 1
+    assert analyze_log(log, tmp_path / "out", options).summary.totals.snapshots == 1
     many = Parameters().replaced({"reading": {"map_max_messages": 2}})
     office = cut_off(SAMPLE_LOGS / "office.mcap", tmp_path)
     with pytest.raises(LogError, match="more than 2 map messages"):
