@@ -117,7 +117,11 @@ def analyze(
         return Run(out)
     temporary = TemporaryDirectory(prefix="rose2_logs_", ignore_cleanup_errors=True)
     folder = Path(temporary.name) / log_stem(log)
-    analyze_log(log, folder, chosen, on_snapshot, sinks)
+    try:
+        analyze_log(log, folder, chosen, on_snapshot, sinks)
+    except BaseException:
+        temporary.cleanup()
+        raise
     return Run(folder, temporary)
 
 

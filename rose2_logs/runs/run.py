@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Iterator, Sequence
 from functools import cached_property
 from pathlib import Path
@@ -57,7 +58,9 @@ class Run(StoredRun, Sequence["RunSnapshot"]):
 
     def __init__(self, folder: str | Path, temporary: TemporaryDirectory[str] | None = None) -> None:
         super().__init__(Path(folder))
-        self._temporary = temporary
+        if temporary is not None:
+            # Left to itself, it warns of being removed only when nothing refers to it any more.
+            weakref.finalize(self, temporary.cleanup)
 
     @property
     def snapshots(self) -> Table:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import shapely
 from numpy.typing import NDArray
+from shapely.geometry.base import BaseGeometry
 
 from rose2_logs.config.parameters import OccupancyParameters, Parameters
 from rose2_logs.errors import ParameterError, ResultsError
@@ -111,9 +112,9 @@ class StoredRun:
         try:
             return Parameters().replaced(self.summary["parameters"])
         except ParameterError as error:
-            raise ResultsError(
-                f"{self.folder / SUMMARY}: is of another version ({error}); {MAKE_AGAIN}"
-            ) from error
+            path = self.folder / SUMMARY
+            text = f"{path}: is of another version ({error}); {MAKE_AGAIN}"
+            raise ResultsError(text, file=path) from error
 
     @property
     def annotated_log(self) -> Path | None:
@@ -140,30 +141,39 @@ class StoredRun:
         import pyarrow as pa
         import pyarrow.parquet as pq
 
-        from rose2_logs.runs.table_schemas import SCHEMAS
-
         if name not in (*TABLES, BACK_PROJECTED):
             raise ParameterError(f"no table {name!r}; there are {', '.join((*TABLES, BACK_PROJECTED))}")
         path = self.folder / f"{name}.parquet"
         rows = None if snapshot is None else [("snapshot", "=", snapshot)]
         try:
-            found = pq.read_table(path, columns=columns, filters=rows, partitioning=None)
+            _require_columns(path, pq.read_schema(path), name, columns)
+            return pq.read_table(path, columns=columns, filters=rows, partitioning=None)
         except (OSError, pa.ArrowException) as error:
-            raise ResultsError(f"{path}: cannot be read: {error}; {MAKE_AGAIN}", file=path) from error
-        for field in SCHEMAS[name]:
-            if columns is None or field.name in columns:
-                at = found.schema.get_field_index(field.name)
-                if at < 0 or found.schema.field(at).type != field.type:
-                    lack = "is missing" if at < 0 else f"is not of type {field.type}"
-                    raise ResultsError(f"{path}: its column {field.name} {lack}; {MAKE_AGAIN}", file=path)
-        return found
+            why = " ".join(str(error).split())
+            raise ResultsError(f"{path}: cannot be read: {why}; {MAKE_AGAIN}", file=path) from error
+
+    def shapes(self, name: str, wkb: list[bytes]) -> list[BaseGeometry]:
+        """Read shapes of a table.
+
+        Raises
+        ------
+        ResultsError
+            If one is damaged.
+        """
+        try:
+            return shapely.from_wkb(wkb).tolist()  # type: ignore[no-any-return]
+        except shapely.errors.ShapelyError as error:
+            path = self.folder / f"{name}.parquet"
+            text = f"{path}: its column polygon_wkb holds what is no shape: {error}; {MAKE_AGAIN}"
+            raise ResultsError(text, file=path) from error
 
     @cached_property
     def columns(self) -> dict[str, NDArray[Any]]:
         """Columns of the table of snapshots as arrays; null is NaN."""
         table = self.table("snapshots")
         if not table.num_rows:
-            raise ResultsError(f"{self.folder / 'snapshots.parquet'}: holds no map; {MAKE_AGAIN}")
+            path = self.folder / "snapshots.parquet"
+            raise ResultsError(f"{path}: holds no map; {MAKE_AGAIN}", file=path)
         return {name: table[name].to_numpy(zero_copy_only=False) for name in table.column_names}
 
     def choose(self, snapshot: int | None = None, coverage: float | None = None) -> int:
@@ -275,7 +285,9 @@ class StoredRun:
             If a file cannot be read.
         """
         row = self.row(snapshot)
-        rooms = [_room(each) for each in self.table("rooms", snapshot=snapshot).to_pylist()]
+        rows = self.table("rooms", snapshot=snapshot).to_pylist()
+        shapes = self.shapes("rooms", [each["polygon_wkb"] for each in rows])
+        rooms = [_room(each, shape) for each, shape in zip(rows, shapes, strict=True)]
         doorways = [_doorway(each) for each in self.table("doorways", snapshot=snapshot).to_pylist()]
         walls = self.found_walls(snapshot) if with_walls else None
         return RoomPlan(
@@ -301,9 +313,10 @@ def _read_summary(folder: Path) -> dict[str, Any]:
     if not isinstance(summary, dict) or not {"log", "topic", "results", "files"} <= summary.keys():
         raise ResultsError(f"{path}: is not the summary of a run; give a folder of results", file=path)
     if summary.get("results_format") != RESULTS_FORMAT:
-        version = summary.get("versions", {}).get("rose2-logs", "another version")
+        versions = summary.get("versions")
+        version = versions.get("rose2-logs") if isinstance(versions, dict) else None
         raise ResultsError(
-            f"{folder}: was written by rose2-logs {version}, whose results this version cannot read; "
+            f"{folder}: was written by {f'rose2-logs {version}' if version else 'another version'}, whose results this version cannot read; "
             f"{MAKE_AGAIN} ({summary['log']}) to another folder, or overwrite this one",
             file=path,
         )
@@ -318,11 +331,24 @@ def _ends(table: pa.Table) -> NDArray[np.float64]:
     return np.column_stack([table[name].to_numpy() for name in ("x0_m", "y0_m", "x1_m", "y1_m")])
 
 
-def _room(row: Row) -> PlanRoom:
+def _require_columns(path: Path, schema: pa.Schema, name: str, columns: list[str] | None) -> None:
+    """Refuse a table that lacks columns, or whose columns are not of their types."""
+    from rose2_logs.runs.table_schemas import SCHEMAS
+
+    for field in SCHEMAS[name]:
+        # Rows of a map are found by its number.
+        if columns is None or field.name in (*columns, "snapshot"):
+            at = schema.get_field_index(field.name)
+            if at < 0 or schema.field(at).type != field.type:
+                lack = "is missing" if at < 0 else f"is not of type {field.type}"
+                raise ResultsError(f"{path}: its column {field.name} {lack}; {MAKE_AGAIN}", file=path)
+
+
+def _room(row: Row, shape: BaseGeometry) -> PlanRoom:
     point = (row["label_x_m"], row["label_y_m"])
     return PlanRoom(
         row["track"],
-        shapely.from_wkb(row["polygon_wkb"]),
+        shape,
         row["area_m2"],
         None if point[0] is None else point,
         tuple(row["neighbors"]),

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import shapely
 
 from rose2_logs.comparison.final_layout import FinalLayout
 from rose2_logs.comparison.layouts import LayoutComparison, compare_layouts
@@ -119,7 +118,7 @@ def read_final_layout(run: Run, name: str | None = None) -> FinalLayout:
         name=name or run.name,
         map=PlacedMap(OccupancySnapshot(last, 0, 0, "", below.cells, below.geometry), below.occupancy),
         tracks=tuple(row["track"] for row in rooms),
-        shapes=tuple(shapely.from_wkb([row["polygon_wkb"] for row in rooms])),
+        shapes=tuple(run.shapes("rooms", [row["polygon_wkb"] for row in rooms])),
         areas_m2=np.array([row["area_m2"] for row in rooms], float),
         walls=run.found_walls(last),
     )

@@ -20,11 +20,11 @@ import yaml
 from faulty_logs import SEEN, START_NS, grid, room, write_mcap
 from finished_runs import SAMPLE_LOGS
 from mcap.reader import make_reader
-from rose2_logs.runs.folder import RunResults
 
 from rose2_logs.errors import OutputError
 from rose2_logs.outputs.exports.formats import FORMATS
 from rose2_logs.outputs.report.page import write_report
+from rose2_logs.runs.run import Run
 from rose2_logs.workflows.analyze import NAMELESS, RunOptions, analyze_log, log_stem
 from rose2_logs.workflows.figure import export_plan, write_figure
 
@@ -165,7 +165,7 @@ def test_a_name_that_is_not_utf8_is_refused_in_one_line(tmp_path: Path):
         analyze_log(plain, log.with_suffix(""), RunOptions())
     assert list(tmp_path.iterdir()) == [plain]
     with pytest.raises(OutputError, match=r"is not valid UTF-8.*rename it"):
-        RunResults(log.with_suffix(""))
+        Run(log.with_suffix(""))
 
 
 def test_a_name_too_long_for_its_results_is_told_and_leaves_nothing(tmp_path: Path):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -12,19 +13,19 @@ import pytest
 import shapely
 from drawn_rooms import drawn, rows
 
-from rose2_logs.config.parameters import TrackingParameters
+from rose2_logs.config.parameters import OccupancyParameters, Parameters, TrackingParameters
 from rose2_logs.errors import OutputError
 from rose2_logs.model.rooms import Doorway
 from rose2_logs.runs import parquet_table
-from rose2_logs.runs.tables import Tables
+from rose2_logs.runs.history import RunHistory
+from rose2_logs.runs.store import RunStore
+from rose2_logs.runs.tables import TABLES
 from rose2_logs.tracking.registration import RigidMotion
 from rose2_logs.tracking.tracked_snapshot import MAP_TRACK, RoomEvent, TrackedSnapshot
 from rose2_logs.tracking.tracker import RoomTracker
 
-NAMES = ("snapshots", "rooms", "tracks", "events", "doorways")
 
-
-def frames() -> list[TrackedSnapshot]:
+def steps() -> list[TrackedSnapshot]:
     """Three maps: two rooms with a door, one lost, and back with swapped labels."""
     door = Doorway((1, 2), np.array([[2.0, 0.0], [2.0, 0.9]]))
     tracker = RoomTracker(TrackingParameters())
@@ -36,11 +37,18 @@ def frames() -> list[TrackedSnapshot]:
     return result
 
 
+def store_run(folder: Path, written: Iterable[TrackedSnapshot]) -> None:
+    history = RunHistory(Parameters())
+    with RunStore(folder, OccupancyParameters()) as store:
+        for step in written:
+            history.add(step)
+            store.write(step, history)
+        store.finish(history)
+
+
 def write(folder: Path) -> dict[str, list[dict]]:
-    with Tables(folder) as sink:
-        for step in frames():
-            sink.write(step)
-    return {name: pq.read_table(folder / f"{name}.parquet").to_pylist() for name in NAMES}
+    store_run(folder, steps())
+    return {name: pq.read_table(folder / f"{name}.parquet").to_pylist() for name in TABLES}
 
 
 def test_snapshots_have_one_row_a_map(tmp_path: Path):
@@ -101,7 +109,7 @@ def test_tracks_have_one_row_a_room_over_the_run(tmp_path: Path):
     assert (two["first_snapshot"], two["last_snapshot"], two["last_time_s"]) == (0, 2, 2.0)
     assert (two["area_settled_snapshot"], two["shape_right_coverage"]) == (0, 1.0)
     assert shapely.from_wkb(two["polygon_wkb"]).equals(shapely.box(2, 0, 4, 2))
-    # These frames carry no evidence: not measured is not zero.
+    # These steps carry no evidence: not measured is not zero.
     assert one["wall_support"] is None
 
 
@@ -115,10 +123,9 @@ def test_snapshots_are_compared_with_the_last_one(tmp_path: Path):
 
 def test_a_shift_of_the_map_is_an_event_of_no_track(tmp_path: Path):
     """How far it moved and turned; other events have no motion."""
-    step = frames()[0]
+    step = steps()[0]
     shift = RoomEvent("shifted", 0, MAP_TRACK, motion=RigidMotion((9.0, 9.0), (0.5, -0.25), 0.01))
-    with Tables(tmp_path) as sink:
-        sink.write(dataclasses.replace(step, events=(shift, *step.events)))
+    store_run(tmp_path, [dataclasses.replace(step, events=(shift, *step.events))])
     first, *others = pq.read_table(tmp_path / "events.parquet").to_pylist()
     assert (first["kind"], first["track"]) == ("shifted", 0)
     assert (first["shift_x_m"], first["shift_y_m"], first["turn_rad"]) == (0.5, -0.25, 0.01)
@@ -128,7 +135,7 @@ def test_a_shift_of_the_map_is_an_event_of_no_track(tmp_path: Path):
 def test_every_column_says_what_it_is(tmp_path: Path):
     """Each field has a description, and GeoParquet's metadata names the polygons."""
     write(tmp_path)
-    for name in NAMES:
+    for name in TABLES:
         for field in pq.read_schema(tmp_path / f"{name}.parquet"):
             assert field.metadata[b"description"], field.name
     for name in ("rooms", "tracks"):
@@ -143,7 +150,7 @@ def test_row_groups_are_written_along_the_way_and_twice_the_same(tmp_path: Path,
     write(tmp_path / "a")
     write(tmp_path / "b")
     assert pq.ParquetFile(tmp_path / "a" / "events.parquet").num_row_groups == 3
-    for name in NAMES:
+    for name in TABLES:
         first, second = ((tmp_path / run / f"{name}.parquet").read_bytes() for run in "ab")
         assert first == second
 
@@ -152,13 +159,12 @@ def test_a_run_that_breaks_off_leaves_nothing(tmp_path: Path):
     """Neither half tables nor parts of files remain, and earlier results stay."""
     (tmp_path / "rooms.parquet").write_text("earlier")
 
-    def break_off():
-        with Tables(tmp_path) as sink:
-            sink.write(frames()[0])
-            raise RuntimeError("broken off")
+    def broken_off():
+        yield steps()[0]
+        raise RuntimeError("broken off")
 
     with pytest.raises(RuntimeError, match="broken off"):
-        break_off()
+        store_run(tmp_path, broken_off())
     assert [path.name for path in tmp_path.iterdir()] == ["rooms.parquet"]
     assert (tmp_path / "rooms.parquet").read_text() == "earlier"
 
@@ -166,5 +172,5 @@ def test_a_run_that_breaks_off_leaves_nothing(tmp_path: Path):
 def test_a_place_that_cannot_be_written_is_named(tmp_path: Path):
     """A file where the folder should be is one clear line."""
     (tmp_path / "file").write_text("")
-    with pytest.raises(OutputError, match=r"file/snapshots\.parquet"), Tables(tmp_path / "file"):
-        pass
+    with pytest.raises(OutputError, match=r"file/snapshots.*\.parquet"):
+        store_run(tmp_path / "file", [])

@@ -18,7 +18,6 @@ import shapely
 import yaml
 from drawn_plans import LEFT, RIGHT, two_rooms_plan
 from PIL import Image
-from rose2_logs.runs.folder import RunResults
 from shapely.geometry import shape
 
 from rose2_logs.config.parameters import OccupancyParameters
@@ -28,6 +27,7 @@ from rose2_logs.model.occupancy import GridGeometry
 from rose2_logs.model.room_plan import PlanMap
 from rose2_logs.outputs.exports.dxf import LAYERS
 from rose2_logs.outputs.exports.formats import FORMATS, planned_files, write_plan
+from rose2_logs.runs.run import Run
 
 
 @pytest.fixture(params=[0.0, 0.4], ids=["straight", "turned"])
@@ -37,9 +37,7 @@ def plan(request):
 
 @pytest.fixture
 def real_plan(office_results: Path):
-    results = RunResults(office_results)
-    with results.open_maps() as maps:
-        return results.plan(results.choose(), maps, with_walls=True)
+    return Run(office_results)[-1].plan()
 
 
 def test_geojson_is_read_by_shapely(plan, tmp_path: Path):
@@ -121,7 +119,7 @@ def test_the_same_plan_gives_the_same_dxf_in_every_process(tmp_path: Path):
         file = tmp_path / f"{seed}.dxf"
         surroundings = os.environ | {
             "PYTHONHASHSEED": str(seed),
-            "PYTHONPATH": str(Path(__file__).parents[2]),
+            "PYTHONPATH": os.pathsep.join(sys.path),
         }
         subprocess.run([sys.executable, "-c", script, str(file)], env=surroundings, check=True)
         written.add(file.read_bytes())

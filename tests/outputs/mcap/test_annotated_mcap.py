@@ -24,8 +24,7 @@ from rose2_logs.io import open_log
 from rose2_logs.outputs.mcap.annotated import ADDED, ATTACHMENT, METADATA, AnnotatedMcap
 from rose2_logs.outputs.mcap.writer import McapWriter
 from rose2_logs.runs.sink import RunInfo
-from rose2_logs.runs.stream import start_workers, tracked_snapshots
-from rose2_logs.runs.summary import RunTotals
+from rose2_logs.runs.stream import TrackedStream, start_workers
 from rose2_logs.workflows.analyze import RunOptions, analyze_log
 
 PROJECT = Path(__file__).parents[3]
@@ -293,13 +292,15 @@ from pathlib import Path
 from rose2_logs.errors import OutputError
 from rose2_logs.config.parameters import Parameters
 from rose2_logs.outputs.mcap.annotated import AnnotatedMcap
-from rose2_logs.runs.sink import RunInfo
+from rose2_logs.runs.sink import RunInfo, abandoned_on_error
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 resource.setrlimit(resource.RLIMIT_FSIZE, (2_000, 2_000))
 info = RunInfo(Path({str(log)!r}), "/map", "rose2", Parameters(), {{}}, {{}})
+sink = AnnotatedMcap(Path({str(tmp_path / "run.mcap")!r}))
 try:
-    with AnnotatedMcap(Path({str(tmp_path / "run.mcap")!r}), info):
-        pass
+    with abandoned_on_error([sink]):
+        sink.begin(info)
+        sink.finish(None)
 except OutputError as error:
     print(error)
 """
@@ -323,18 +324,19 @@ def test_nothing_is_kept_of_chunks_that_were_taken_apart(tmp_path):
     log = chunked_log(tmp_path / "run.mcap", maps_in=range(20))
     options = RunOptions()
     with open_log(log.path) as reader, start_workers(options) as workers:
-        totals = RunTotals()
-        step = next(tracked_snapshots(reader, reader.last(), workers, options.parameters, totals))
+        step = next(iter(TrackedStream.of_log(reader, workers, options.parameters)))
         times = [snapshot.log_time_ns for snapshot in reader.snapshots()]
     info = RunInfo(log.path, "/map", "rose2", options.parameters, {}, {})
     held = []
     tracemalloc.start()
     try:
-        with AnnotatedMcap(tmp_path / "out.mcap", info) as sink:
-            for time in times:
-                snapshot = dataclasses.replace(step.snapshot, log_time_ns=time)
-                sink.write(dataclasses.replace(step, snapshot=snapshot))
-                held.append(tracemalloc.get_traced_memory()[0])
+        sink = AnnotatedMcap(tmp_path / "out.mcap")
+        sink.begin(info)
+        for time in times:
+            snapshot = dataclasses.replace(step.snapshot, log_time_ns=time)
+            sink.write(dataclasses.replace(step, snapshot=snapshot))
+            held.append(tracemalloc.get_traced_memory()[0])
+        sink.abandon()
     finally:
         tracemalloc.stop()
     assert held[-1] - held[1] < step.snapshot.cells.nbytes

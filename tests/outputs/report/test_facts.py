@@ -11,25 +11,25 @@ import pytest
 from drawn_plans import two_rooms_plan
 
 from rose2_logs.outputs.report.facts import NOT_FINAL, notes, tiles
-from rose2_logs.runs.folder import RunResults
+from rose2_logs.runs.run import Run
 
 
 @pytest.fixture
 def changed(office_results: Path, tmp_path: Path):
     """Results whose summary says something else."""
 
-    def change(**parts) -> RunResults:
+    def change(**parts) -> Run:
         folder = shutil.copytree(office_results, tmp_path / "changed", dirs_exist_ok=True)
         summary = json.loads((folder / "summary.json").read_text())
         for part, values in parts.items():
             summary[part] |= values
         (folder / "summary.json").write_text(json.dumps(summary))
-        return RunResults(folder)
+        return Run(folder)
 
     return change
 
 
-def told(results: RunResults, plan=None) -> str:
+def told(results: Run, plan=None) -> str:
     return "\n".join(note.text for note in notes(results, plan or two_rooms_plan()))
 
 
@@ -37,7 +37,7 @@ def test_what_is_lost_is_said(changed):
     text = told(changed(results={"invalid_maps": 2}, messages={"damaged": 3, "skipped": 4, "messages": 9}))
     assert "2 maps could not be analyzed" in text
     assert "3 messages of the log were damaged" in text
-    assert "4 of 9 map messages were not taken" in text
+    assert "4 of 9 map messages were skipped" in text
 
 
 @pytest.mark.parametrize(
@@ -65,7 +65,7 @@ def test_rooms_that_are_unsure_or_unseen_are_named(changed):
     text = told(changed(), dataclasses.replace(plan, rooms=(bare, plan.rooms[1])))
     assert "unsure (?): Room 3 (0%)." in text
     assert "open frontier, not explored to the end: Room 120 (3.0 m)." in text
-    assert "not seen: predicted, or furniture: Room 120 (50%)." in text
+    assert "never seen (predicted, or behind furniture): Room 120 (50%)." in text
 
 
 def test_shifts_of_the_map_are_said(tmp_path: Path, changed):

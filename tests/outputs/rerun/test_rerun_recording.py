@@ -97,11 +97,13 @@ def test_layers_that_were_not_asked_for_are_not_written(tmp_path):
 def test_a_run_that_fails_leaves_no_recording(tmp_path):
     from rose2_logs.config.parameters import Parameters
     from rose2_logs.outputs.rerun.recording import RerunRecording
-    from rose2_logs.runs.sink import RunInfo
+    from rose2_logs.runs.sink import RunInfo, abandoned_on_error
 
     path = tmp_path / "run.rrd"
     info = RunInfo(save_run(tmp_path / "maps"), "/map", "rose2", Parameters(), {}, {})
-    with pytest.raises(RuntimeError, match="stopped"), RerunRecording(path, info):
+    recording = RerunRecording(path)
+    with pytest.raises(RuntimeError, match="stopped"), abandoned_on_error([recording]):
+        recording.begin(info)
         raise RuntimeError("stopped")
     assert [file.name for file in tmp_path.iterdir()] == ["maps"]
 
@@ -191,5 +193,5 @@ def test_names_of_rooms_are_short_enough_for_their_place_in_the_view():
     """Number and area in one line; of a room that is small in the view the number; a sign if unsure."""
     assert room_label(7, 22.4, 40.0) == "7: 22 m²"
     assert room_label(7, 22.4, 40.0, unsure=True) == "7?: 22 m²"
-    assert room_label(7, 22.4, 40.0, told="51%") == "7: 51%"
+    assert room_label(7, 22.4, 40.0, text="51%") == "7: 51%"
     assert room_label(7, 22.4, 100.0, unsure=True) == "7?"

@@ -9,10 +9,15 @@ import shapely
 
 from rose2_logs.config.parameters import Parameters
 from rose2_logs.outputs.rerun.summary import summary_text
+from rose2_logs.runs.history import RunSummary, RunTotals
 from rose2_logs.runs.sink import RunInfo
 from rose2_logs.tracking.convergence import Convergence
 from rose2_logs.tracking.registration import RigidMotion
 from rose2_logs.tracking.track_history import SnapshotRef, TrackHistories, TrackHistory
+
+
+def told(info: RunInfo, histories: TrackHistories, convergence: Convergence, maps: int) -> str:
+    return summary_text(info, RunSummary(RunTotals(snapshots=maps), histories, convergence))
 
 
 def test_the_summary_tells_rooms_and_since_when_they_were_right():
@@ -29,17 +34,16 @@ def test_the_summary_tells_rooms_and_since_when_they_were_right():
         layout_final=SnapshotRef(7, 75.0, 0.8),
     )
     info = RunInfo(Path("a|b.mcap"), "/map", "rose2", Parameters(), {"tool": "1"}, {})
-    text = summary_text(info, histories, convergence, 10)
+    text = told(info, histories, convergence, 10)
     assert text.startswith("# a/b.mcap\n")
     assert "**1 room** at the end, 2 over the run; 10 maps, 1 min 30 s." in text
     assert "**from 80 % coverage on** (1 min 15 s)" in text
     assert "| 1 | 20.0 | 25 % | 50 % | 100 % | 90 % |" in text
     assert "| version of tool | 1 |" in text
-    assert "as in the end" not in summary_text(info, histories, None, 10)
     late = dataclasses.replace(convergence, layout_final=last)
     for never in (late, dataclasses.replace(convergence, layout_final=None)):
-        assert "still changed up to the last map" in summary_text(info, histories, never, 10)
-    assert "**from 100 % coverage on**" in summary_text(info, histories, late, 1)
+        assert "still changed up to the last map" in told(info, histories, never, 10)
+    assert "**from 100 % coverage on**" in told(info, histories, late, 1)
 
 
 def test_the_summary_names_unsure_rooms_and_the_largest_shift():
@@ -52,7 +56,7 @@ def test_the_summary_names_unsure_rooms_and_the_largest_shift():
     }
     histories.in_last_map, histories.last = tuple(histories.tracks), last
     info = RunInfo(Path("a.mcap"), "/map", "rose2", Parameters(), {}, {})
-    text = summary_text(info, histories, None, 1)
+    text = told(info, histories, Convergence(), 1)
     assert "room 3? (31 %), 2? (50 %), 6? (60 %), 7? (60 %), 8? (60 %), 9? (60 %) and 1 more." in text
     assert "1 map, 1 min" in text
     assert "shifted" not in text
@@ -60,7 +64,7 @@ def test_the_summary_names_unsure_rooms_and_the_largest_shift():
         2,
         (SnapshotRef(4, 40.0, 0.4), RigidMotion((0.0, 0.0), (0.3, -0.4), 0.02)),
     )
-    text = summary_text(info, histories, None, 10)
+    text = told(info, histories, Convergence(), 10)
     assert "shifted** 2 times, most by 0.50 m and +1.1° at 40 % coverage" in text
     histories.in_last_map = (1,)
-    assert "Unsure" not in summary_text(info, histories, None, 10)
+    assert "Unsure" not in told(info, histories, Convergence(), 10)
