@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 """Make the maps and rooms that the tests of the segmentation hold it to, in tests/segmentation/golden.
 
-    python tools/make_golden_maps.py                # segment the maps that are there again, and say what changed
-    python tools/make_golden_maps.py --maps         # draw and simulate the maps anew as well
+    python tools/make_golden_maps.py           # segment the maps that are there again, say what changed
+    python tools/make_golden_maps.py --maps    # draw and simulate the maps anew as well
 
-Each file holds the ``cells`` (H, W) int8 of a map, its ``resolution_m``, and the ``labels`` (H, W) of its rooms.
+Each file holds the ``cells`` (H, W) int8 of a map, its ``resolution_m`` and the ``labels`` (H, W) of rooms.
 Run it after a change that is meant to change rooms, look at what changed, and commit the files with it.
 """
 
@@ -81,7 +81,9 @@ def rooms_of(cells: NDArray[np.int8], resolution_m: float) -> NDArray[np.int32]:
 
 def main() -> None:
     """Write the files."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--maps", action="store_true", help="make the maps anew too, not only their rooms")
     arguments = parser.parse_args()
     GOLDEN.mkdir(exist_ok=True)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import subprocess
 import sys
-import time
 from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from commands import wait_for
 from looking import free_port, needs_vulkan
 from saved_maps import save_run
 
@@ -118,10 +118,7 @@ def test_a_run_is_shown_in_the_viewer_that_is_open_and_stored_too(tmp_path, monk
         options = RunOptions(max_snapshots=3, annotated_log=False, live=True)
         log = PROJECT / "sample_logs" / "office.mcap"
         done = analyze_log(log, tmp_path / "out", options)
-        end = time.monotonic() + 60
-        while not viewer.get_state().views and time.monotonic() < end:
-            time.sleep(0.5)
-        assert viewer.get_state().views
+        wait_for(lambda: viewer.get_state().views)
     assert (done.folder / "office.rrd").stat().st_size > 0
 
 
