@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import rerun as rr
+from commands import WAIT_S
 
 from rose2_logs.outputs.rerun.lanes import FORMING, LOST, SETTLED, SHAPED, TrackLanes
 from rose2_logs.outputs.rerun.layers import Instant
@@ -20,7 +21,7 @@ def lanes(tmp_path, tracks_of_maps, convergence) -> dict[str, list[tuple[int, st
     for index, tracks in enumerate(tracks_of_maps):
         histories.add(Instant(index, index, 10 + index, 100 * index), tracks)
     histories.log(convergence)
-    recording.flush(timeout_sec=10)
+    recording.flush(timeout_sec=WAIT_S)
     recording.disconnect()
     found = {}
     for chunk in RrdReader(str(tmp_path / "run.rrd")).stream():

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import rerun as rr
+from commands import WAIT_S
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rerun.chunk import RrdReader
@@ -41,7 +42,7 @@ def written(steps: list[Step], stamps: list[int], chunk_bytes: int = 600) -> dic
             pixels = np.full((3, 4), picture, np.uint8)
             layers.show("/picture", Picture(pixels, 0.05, (0.0, 0.0, 0.0), 0.3))
         layers.flush()
-        recording.flush(timeout_sec=10)
+        recording.flush(timeout_sec=WAIT_S)
         recording.disconnect()
         rows: dict[str, list[Row]] = defaultdict(list)
         for chunk in RrdReader(str(path)).stream():
@@ -131,7 +132,7 @@ def test_lines_of_their_own_colors_and_none_at_all():
             layers.show("/line", Strips(points, np.array(lengths, np.int32), colors))
             layers.show("/none", Strips(points[:0], np.zeros(0, np.int32), colors[:0]))
         layers.flush()
-        recording.flush(timeout_sec=10)
+        recording.flush(timeout_sec=WAIT_S)
         recording.disconnect()
         batches = {str(c.entity_path): c.to_record_batch() for c in RrdReader(str(path)).stream()}
     found = batches["/line"].column("LineStrips3D:strips").to_pylist()
@@ -156,7 +157,7 @@ def test_a_cleared_path_is_empty_from_then_on_where_the_coverage_stays():
             else:
                 layers.clear("/room/1")
         layers.flush()
-        recording.flush(timeout_sec=10)
+        recording.flush(timeout_sec=WAIT_S)
         recording.disconnect()
         last, cleared = {}, {}
         for chunk in RrdReader(str(path)).stream():
@@ -184,7 +185,7 @@ def test_no_more_rows_wait_than_were_allowed():
         layers.begin(9, 9, 9, 9)
         layers.show("/label", Label((0.0, 0.0, 0.0), "9"))
         layers.flush()
-        recording.flush(timeout_sec=10)
+        recording.flush(timeout_sec=WAIT_S)
         recording.disconnect()
         chunks = [
             (str(chunk.entity_path), chunk.to_record_batch()) for chunk in RrdReader(str(path)).stream()

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import subprocess
 import sys
-import time
 from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from commands import wait_for
 from looking import free_port, needs_vulkan
 from saved_maps import save_run
 
@@ -120,10 +120,7 @@ def test_a_run_is_shown_in_the_viewer_that_is_open_and_stored_too(tmp_path, monk
         options = RunOptions(max_snapshots=3, annotated_log=False, live=True)
         log = PROJECT / "sample_logs" / "office.mcap"
         done = analyze_log(log, tmp_path / "out", options)
-        end = time.monotonic() + 60
-        while not viewer.get_state().views and time.monotonic() < end:
-            time.sleep(0.5)
-        assert viewer.get_state().views
+        wait_for(lambda: viewer.get_state().views)
     assert (done.folder / "office.rrd").stat().st_size > 0
 
 
@@ -175,10 +172,7 @@ def test_a_viewer_that_does_not_come_up_in_time_is_ended(monkeypatch):
     monkeypatch.setattr(rerun_viewer, "VIEWER_START_S", 3.0)
     with pytest.raises(OutputError, match="no Rerun viewer is open"):
         rerun_viewer.open_viewer(free_port())
-    end = time.monotonic() + 10
-    while rerun_viewer.listens(elsewhere) and time.monotonic() < end:
-        time.sleep(0.1)
-    assert not rerun_viewer.listens(elsewhere)
+    wait_for(lambda: not rerun_viewer.listens(elsewhere))
 
 
 def test_a_shift_of_the_map_is_told_in_metres_and_degrees():

@@ -5,6 +5,8 @@ import dataclasses
 import numpy as np
 import pytest
 import shapely
+from rose2_logs.segmentation.floor_plan.doorways import find_doorways
+from rose2_logs.segmentation.floor_plan.rooms import adopt_left_out, settle_borders
 
 from rose2_logs.config.parameters import FloorPlanParameters
 from rose2_logs.model.outlines import outline
@@ -134,7 +136,9 @@ def test_a_niche_joins_its_room_and_a_face_that_was_not_seen_takes_no_part():
     assert group.tolist() == [0, 0, -1]
 
 
-@pytest.mark.parametrize(("seen", "rooms"), [((1.0, 0.9), 1), ((1.0, 0.4), 2), ((0.4, 1.0), 2)])
+@pytest.mark.parametrize(
+    ("seen", "rooms"), [((1.0, 0.9), 1), ((1.0, 0.7), 2), ((1.0, 0.4), 2), ((0.4, 1.0), 2)]
+)
 def test_a_wall_with_nothing_behind_divides_faces_that_are_hardly_known(seen, rooms):
     """A cupboard of 2 m beside a passage of 2 m; behind it, the rest of a room or another one."""
     evidence = make_quality([2.0], [2.0], [1.0], blind=1.0)

@@ -36,6 +36,16 @@ def test_a_representative_line_that_divides_the_parts_is_where_the_cut_goes():
     assert columns.tolist() == [85]
 
 
+def test_of_several_lines_the_one_that_keeps_the_parts_apart_best_is_the_cut():
+    labels, walls = dumbbell()
+    best, crossing, along = (4.3, 0.0, 4.3, 5.0), (1.0, 0.0, 7.0, 5.0), (0.0, 2.5, 8.5, 2.5)
+    for lines in ([best, crossing, along], [along, crossing, best]):
+        split = split_rooms(labels, walls, np.array(lines), AXES, 0.05, PARAMETERS)
+        assert np.flatnonzero(split[20, :-1] != split[20, 1:]).tolist() == [83, 85]
+        assert np.flatnonzero(split[50, :-1] != split[50, 1:]).tolist() == [85]
+        assert len(np.unique(split[:, :84])) == 1
+
+
 def test_a_room_in_one_piece_stays_whole():
     labels = np.ones((80, 80), np.int32)
     split = split_rooms(labels, np.zeros((80, 80), bool), NO_LINES, AXES, 0.05, PARAMETERS)
@@ -81,6 +91,15 @@ def test_a_narrow_gap_divides_the_parts_of_a_room_and_a_wide_one_does_not():
     assert ((part > 0) == ~walls).all()
     walls[20:80, 84:86] = False
     assert (parts(walls) == ~walls).all()
+
+
+def test_two_halls_stay_two_though_the_corridor_between_them_opens_to_both():
+    """What the corridor joined is as wide as its hall, so that it is no wide way on to the other one."""
+    walls = np.ones((140, 360), bool)
+    walls[5:135, 5:135] = walls[5:135, 225:355] = walls[60:80, 135:225] = False
+    part = parts(walls)
+    assert part[70, 70] != part[70, 290]
+    assert len(np.unique(part[part > 0])) == 2
 
 
 def test_a_niche_is_no_part():

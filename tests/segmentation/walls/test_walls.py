@@ -68,6 +68,21 @@ def test_a_line_reaches_beyond_its_wall_and_every_segment_knows_its_line():
     assert (lengths > 5).all()
 
 
+@pytest.mark.parametrize(("share_of_gap", "walls"), [(0.9, 1), (1.1, 2), (1.9, 2)])
+def test_segments_farther_apart_than_furniture_before_a_wall_are_two_walls(share_of_gap, walls):
+    start = 4 + share_of_gap * PARAMETERS.cluster_gap_m
+    _, clusters = lines_of([(0, 1, 4, 1), (start, 1, start + 4, 1)])
+    assert len(clusters.offset) == walls
+
+
+@pytest.mark.parametrize("length_m", [0.5, 1.0, 5.0])
+def test_a_short_wall_reaches_less_far(length_m):
+    """In proportion to itself, and no wall farther than a room."""
+    lines, _ = lines_of([(0, 1, length_m, 1)])
+    reach = min(PARAMETERS.extension_m, PARAMETERS.extension_per_length * length_m)
+    np.testing.assert_allclose(np.sort(lines.ends_m[0, ::2]), [-reach, length_m + reach])
+
+
 def test_segments_have_the_ends_that_they_were_made_of():
     ends = [(0.0, 1.0, 4.0, 1.0), (2.0, -1.0, 2.0, 5.0)]
     assert np.allclose(axis_aligned(ends).ends_m, ends)
