@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from rose2_logs import __version__
 from rose2_logs.batch.record import (
     RECORD,
     SETTLED_S,
@@ -113,4 +114,4 @@ def test_the_version_counts(monkeypatch):
     """Results of another version are other results."""
     record = Record("", Signature((), True), "", deciding_settings(RunOptions()))
     monkeypatch.setattr("rose2_logs.batch.record.__version__", "99.0")
-    assert record.difference(deciding_settings(RunOptions())) == "rose2-logs 0.1.0, now 99.0"
+    assert record.difference(deciding_settings(RunOptions())) == f"rose2-logs {__version__}, now 99.0"
