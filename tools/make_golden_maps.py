@@ -43,7 +43,7 @@ SIMULATED = (
 def drawn() -> Iterator[tuple[str, NDArray[np.int8], float]]:
     """Name, cells and resolution of offices drawn by hand: turned, cluttered, coarse, half seen."""
     sys.path.append(str(PROJECT / "tests" / "support"))
-    from drawn_maps import office
+    from drawn_maps import office  # type: ignore[import-not-found]
 
     yield "office_turned", office(turn_rad=0.4, clutter=25)[0], 0.05
     yield "office_coarse", office(resolution_m=0.1, clutter=10)[0], 0.1

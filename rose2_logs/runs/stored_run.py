@@ -315,8 +315,9 @@ def _read_summary(folder: Path) -> dict[str, Any]:
     if summary.get("results_format") != RESULTS_FORMAT:
         versions = summary.get("versions")
         version = versions.get("rose2-logs") if isinstance(versions, dict) else None
+        written_by = f"rose2-logs {version}" if version else "another version"
         raise ResultsError(
-            f"{folder}: was written by {f'rose2-logs {version}' if version else 'another version'}, whose results this version cannot read; "
+            f"{folder}: was written by {written_by}, whose results this version cannot read; "
             f"{MAKE_AGAIN} ({summary['log']}) to another folder, or overwrite this one",
             file=path,
         )

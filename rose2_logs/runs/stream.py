@@ -183,4 +183,4 @@ def _analyze_or_refuse(
     except Exception as error:  # a map that the method stumbles over does not cost the others of the run
         at = traceback.extract_tb(error.__traceback__)[-1]
         where = f"{Path(at.filename).name}:{at.lineno}"
-        return InvalidMapError(f"{type(error).__name__}: {error} ({where}, a fault of rose2-logs)")
+        return InvalidMapError(f"{type(error).__name__}: {error} ({where}; an internal error of rose2-logs)")

@@ -163,7 +163,7 @@ def test_a_map_that_the_method_stumbles_over_is_left_out(monkeypatch, tmp_path):
     assert (totals.snapshots, totals.invalid) == (2, 1)
     (told,) = result.warnings.kinds["snapshot_left_out"].first
     assert "snapshot 1 is left out: IndexError: out of bounds" in told["message"]
-    assert "a fault of rose2-logs" in told["message"]
+    assert "an internal error of rose2-logs" in told["message"]
 
 
 def test_notices_are_gathered_by_kind_in_this_thread_only_while_asked_for():

@@ -20,7 +20,7 @@ from rose2_logs.errors import LogError, OutputError
 VIEWER_PORT = 9876
 """Where Rerun's viewer listens by default."""
 VIEWER_START_S, VIEWER_SETTLE_S = 120.0, 1.0
-"""Longest wait for a viewer, which starts within seconds unless the machine is busy; time in which it can fail."""
+"""Longest wait for a viewer, which starts within seconds unless the machine is busy; time for it to fail."""
 PAGE_PORT = 9090
 """Where Rerun serves its web viewer by default."""
 SERVER_MEMORY = "50%"

@@ -26,7 +26,7 @@ DOOR_COLOR, PATH_COLOR, ROBOT_COLOR = (230, 90, 20), (20, 90, 200), (200, 20, 60
 LINE_COLOR, VORONOI_COLOR, DIRECTION_COLOR = (60, 110, 230), (150, 20, 150), (255, 190, 40)
 UNCLUSTERED_COLOR = (130, 130, 130)
 STRONG_EDGE, WEAK_EDGE = (20, 20, 90), (80, 165, 235)
-"""Edges that walls cover all along, and not at all; which can be distinguished without seeing red and green."""
+"""Edges that walls cover all along, and not at all; distinct also for those who do not see red and green."""
 OUTLINE_SHADE, SEGMENT_SHADE = 0.6, 0.75
 """Share of the color of a fill that its outline has, and of a track's that a wall's segments have."""
 PATH_GAP_M = 2.0

@@ -102,7 +102,7 @@ def test_a_run_that_fails_leaves_no_recording(tmp_path):
     path = tmp_path / "run.rrd"
     info = RunInfo(save_run(tmp_path / "maps"), "/map", "rose2", Parameters(), {}, {})
     recording = RerunRecording(path)
-    with pytest.raises(RuntimeError, match="stopped"), abandoned_on_error([recording]):
+    with pytest.raises(RuntimeError, match="stopped"), abandoned_on_error([recording]):  # noqa: PT012
         recording.begin(info)
         raise RuntimeError("stopped")
     assert [file.name for file in tmp_path.iterdir()] == ["maps"]
