@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import shapely
 
-from rose2_logs.drawing.map_painter import DOORWAY_COLOR, INK, OUTLINE_SHADE, WHITE, tinted_cells
+from rose2_logs.drawing.map_painter import DOORWAY_COLOR, INK, OUTLINE_SHADE, UNKNOWN_GRAY, WHITE, tinted_cells
 from rose2_logs.drawing.palette import shaded, track_color
 from rose2_logs.drawing.plan import MARGIN_M, PREDICTED_OPACITY, SEEN_OPACITY, SHAPE_OPACITY
 from rose2_logs.errors import MissingPackageError
@@ -84,6 +84,7 @@ def _show_map(plan: RoomPlan, ax: Axes) -> set[int]:
         return set()
     from matplotlib.transforms import Affine2D
 
+    ax.set_facecolor(_unit((UNKNOWN_GRAY,) * 3))
     below = plan.map.cropped()
     geometry, (height, width) = below.geometry, below.cells.shape
     colors = {room.number: track_color(room.number) for room in plan.rooms}
@@ -116,7 +117,7 @@ def _show_room(ax: Axes, room: PlanRoom, predicted: BaseGeometry, *, is_tinted: 
     if not predicted.is_empty:
         unseen = _patch(predicted)
         unseen.set(facecolor=(*_unit(color), PREDICTED_OPACITY), edgecolor=dark, linewidth=0)
-        unseen.set(hatch=HATCH, zorder=LAYER_AREAS)
+        unseen.set(hatch=HATCH, hatch_linewidth=HATCH_LINE, zorder=LAYER_AREAS)
         ax.add_patch(unseen)
     outline = _patch(room.shape)
     outline.set(fill=False, edgecolor=dark, linewidth=OUTLINE_LINE, zorder=LAYER_OUTLINES)
