@@ -90,7 +90,7 @@ def _picture(image: Image.Image, picture: Picture, scale: float) -> None:
 
 
 def _area(image: Image.Image, area: Area, scale: float) -> None:
-    if area.shape.is_empty:
+    if area.shape.is_empty or area.opacity == 0:
         return
     x0, y0, x1, y1 = (value * scale for value in area.shape.bounds)
     left, top = math.floor(x0), math.floor(y0)

@@ -202,8 +202,7 @@ def _write_name(painter: MapPainter, room: PlanRoom, shape: BaseGeometry, style:
         return
     circle = shapely.maximum_inscribed_circle(shape, tolerance=0.5)
     (x, y), radius = shapely.get_coordinates(circle)[0].tolist(), float(shapely.length(circle))
-    area = f"{room.area_m2:.0f} m²" if room.area_m2 >= 10 else f"{room.area_m2:.1f} m²"
-    font = style.font
+    area, font = area_text(room.area_m2), style.font
     sign = unsure_sign(room.wall_support)
     number, name = f"{room.number}{sign}", f"{room.name}{sign}"
     small = 0.8 * font
@@ -212,6 +211,11 @@ def _write_name(painter: MapPainter, room: PlanRoom, shape: BaseGeometry, style:
         return
     painter.name(name if _fits(name, font, radius, lines=2) else number, x, y - 0.5 * font, font)
     painter.name(area, x, y + 0.6 * font, small, is_bold=False)
+
+
+def area_text(area_m2: float) -> str:
+    """Tell an area as names of rooms do: with a decimal where it is small."""
+    return f"{area_m2:.0f} m²" if area_m2 >= 10 else f"{area_m2:.1f} m²"
 
 
 def _fits(text: str, font: float, radius: float, lines: int) -> bool:

@@ -9,7 +9,7 @@ import shapely
 
 from rose2_logs.drawing.map_painter import DOORWAY_COLOR, INK, OUTLINE_SHADE, UNKNOWN_GRAY, WHITE, tinted_cells
 from rose2_logs.drawing.palette import shaded, track_color
-from rose2_logs.drawing.plan import MARGIN_M, PREDICTED_OPACITY, SEEN_OPACITY, SHAPE_OPACITY
+from rose2_logs.drawing.plan import MARGIN_M, PREDICTED_OPACITY, SEEN_OPACITY, SHAPE_OPACITY, area_text
 from rose2_logs.errors import MissingPackageError
 from rose2_logs.model.room_plan import PlanRoom, RoomPlan, predicted_parts
 from rose2_logs.model.room_quality import unsure_sign
@@ -126,7 +126,7 @@ def _show_room(ax: Axes, room: PlanRoom, predicted: BaseGeometry, *, is_tinted: 
     ax.text(
         x,
         y,
-        f"{room.number}{unsure_sign(room.wall_support)}\n{room.area_m2:.3g} m²",
+        f"{room.number}{unsure_sign(room.wall_support)}\n{area_text(room.area_m2)}",
         color=_unit(INK),
         fontsize=NAME_POINTS,
         horizontalalignment="center",

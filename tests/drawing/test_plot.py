@@ -57,7 +57,7 @@ def test_names_doorways_and_unseen_parts_are_drawn(axes):
     plan = two_rooms_plan()
     unsure = tuple(dataclasses.replace(room, wall_support=0.5) for room in plan.rooms)
     plot_plan(dataclasses.replace(plan, rooms=unsure), axes)
-    assert [text.get_text() for text in axes.texts] == [f"{LEFT}?\n12 m²", f"{RIGHT}?\n6 m²"]
+    assert [text.get_text() for text in axes.texts] == [f"{LEFT}?\n12 m²", f"{RIGHT}?\n6.0 m²"]
     (door,) = axes.get_lines()
     assert np.asarray(door.get_xydata()) == pytest.approx(plan.doorways[0].ends_m.reshape(2, 2))
     (hatched,) = (patch for patch in axes.patches if patch.get_hatch() == HATCH)
