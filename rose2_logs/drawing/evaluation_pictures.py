@@ -38,8 +38,6 @@ TEXT_PX, TITLE_PX, NUMBER_PX = 17.0, 21.0, 15.0
 SCREEN_ASPECT = 1.5
 """Width over height that the four panels are arranged for: about a page or a screen."""
 ROOM_OPACITY = 0.8
-OCCUPIED_PERCENT = 50
-"""Cells above are walls, along which no borders of rooms are drawn."""
 STRIPE_GAP, STRIPE_WIDTH = 8.0, 2.5
 """Found rooms without a partner are striped: their color alone might pass for a true room's."""
 BORDER_COLOR: Color = (70, 70, 70)
@@ -170,7 +168,7 @@ class _Panel:
             # As far apart on the page as they are to be, whatever a cell's size there.
             stripes = hatch_cells(np.isin(labels, striped), STRIPE_GAP / self._painter.scale)
             self._painter.lines(stripes, WHITE, STRIPE_WIDTH)
-        self._painter.lines(_borders(labels, self._cells > OCCUPIED_PERCENT), BORDER_COLOR, 1.0)
+        self._painter.lines(_borders(labels), BORDER_COLOR, 1.0)
         for number, window in enumerate(find_objects(labels), start=1):
             if window is not None:
                 corner = (window[1].start, window[0].start)
@@ -178,18 +176,17 @@ class _Panel:
                 self._painter.name(str(number), place.x, place.y, NUMBER_PX, is_bold=False)
 
 
-def _borders(labels: NDArray[np.integer], occupied: BoolArray) -> FloatArray:
-    """Lines (N, 2, 2) between cells of different labels, x and y of their ends in cells; none along walls."""
+def _borders(labels: NDArray[np.integer]) -> FloatArray:
+    """Lines (N, 2, 2) between cells of different rooms, x and y of their ends in cells."""
     found = []
-    for axis in (0, 1):
-        around = [(1, 1) if each == axis else (0, 0) for each in (0, 1)]
-        changes = np.diff(np.pad(labels, around), axis=axis) != 0
-        walls = np.pad(occupied, around)
-        changes &= ~(walls[1:] | walls[:-1]) if axis == 0 else ~(walls[:, 1:] | walls[:, :-1])
-        row, column = np.nonzero(changes)
+    for axis, one, other in ((0, np.s_[1:], np.s_[:-1]), (1, np.s_[:, 1:], np.s_[:, :-1])):
+        row, column = np.nonzero((labels[one] != labels[other]) & (labels[one] > 0) & (labels[other] > 0))
         first, last = straight_runs(row, column, (axis, 1 - axis))
+        # The border lies behind a cell along one axis, and goes along the cell on the other.
         last[:, 1 - axis] += 1
-        found.append(np.stack([first, last], axis=1)[..., ::-1])
+        ends = np.stack([first, last], axis=1)
+        ends[..., axis] += 1
+        found.append(ends[..., ::-1])
     return np.concatenate(found).astype(np.float64)
 
 

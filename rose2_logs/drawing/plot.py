@@ -7,7 +7,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 import shapely
 
-from rose2_logs.drawing.map_painter import DOORWAY_COLOR, INK, OUTLINE_SHADE, UNKNOWN_GRAY, WHITE, tinted_cells
+from rose2_logs.drawing.map_painter import (
+    DOORWAY_COLOR,
+    INK,
+    OUTLINE_SHADE,
+    UNKNOWN_GRAY,
+    WHITE,
+    tinted_cells,
+)
 from rose2_logs.drawing.palette import shaded, track_color
 from rose2_logs.drawing.plan import MARGIN_M, PREDICTED_OPACITY, SEEN_OPACITY, SHAPE_OPACITY, area_text
 from rose2_logs.errors import MissingPackageError

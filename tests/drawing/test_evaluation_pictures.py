@@ -109,15 +109,18 @@ def test_small_maps_are_scaled_up_and_large_ones_keep_to_a_screen(drawn):
     assert max(plain.width, plain.height) == pytest.approx(PANEL_PX[1], abs=3)
 
 
-def test_borders_run_between_rooms_and_not_along_walls(drawn):
-    """Rooms 1 and 2 are walled in; found rooms 3 and 4 meet, 14 cells long, and room 4 ends in the open."""
+def test_borders_run_between_rooms_only(drawn):
+    """Rooms 1 and 2 have a wall between them; found rooms 3 and 4 meet in row 18, 14 cells long."""
     cells, truth, found = drawn
     _, true_panel, found_panel, _ = draw_panels(cells, compare(truth, found))
     lengths = []
     for panel in (true_panel, found_panel):
         (borders,) = (each for each in panel.shapes if isinstance(each, Lines) and each.color == BORDER_COLOR)
         lengths.append(borders.shape.length / (panel.width / 54))
-    assert lengths == pytest.approx([0, 14 + 12 + 4], abs=0.1)
+    assert lengths == pytest.approx([0, 14], abs=0.1)
+    scale = found_panel.width / 54
+    expected = [(32 - 4) * scale, (18 - 2) * scale, (46 - 4) * scale, (18 - 2) * scale]
+    assert borders.shape.bounds == pytest.approx(expected, abs=0.1)
 
 
 def test_rooms_are_numbered_within_themselves(drawn):
