@@ -325,7 +325,12 @@ def load(folder: str | Path) -> Run:
 
 
 def compare(
-    a: Run | str | Path, b: Run | str | Path, out: str | Path | None = None, *, overwrite: bool = False
+    a: Run | str | Path,
+    b: Run | str | Path,
+    out: str | Path | None = None,
+    *,
+    parameters: GivenParameters = None,
+    overwrite: bool = False,
 ) -> LayoutComparison:
     """Lay the last layout of run B over that of run A, wherever they started, and tell what differs.
 
@@ -335,6 +340,8 @@ def compare(
         The runs, or the folders of their results.
     out : str or path, optional
         Folder for tables, a picture and a recording of the comparison.
+    parameters : Parameters or mapping, optional
+        Of the comparison, as in `analyze`.
     overwrite : bool
         Whether an earlier comparison may be replaced.
 
@@ -358,9 +365,12 @@ def compare(
     {'same': 19}
     """
     run_a, run_b = (each if isinstance(each, Run) else Run(each) for each in (a, b))
+    used = Parameters.from_any(parameters)
     if out is None:
-        return compare_stored(run_a, run_b)
-    return compare_runs(run_a.folder, run_b.folder, Path(out), overwrite=overwrite).comparison
+        return compare_stored(run_a, run_b, parameters=used)
+    return compare_runs(
+        run_a.folder, run_b.folder, Path(out), overwrite=overwrite, parameters=used
+    ).comparison
 
 
 def evaluate(

@@ -154,6 +154,7 @@ class RunHistory:
     def __init__(self, parameters: Parameters, *, back_project: bool = False) -> None:
         self.totals = RunTotals()
         self.histories = TrackHistories()
+        self._tracking = parameters.tracking
         self._snapshot_refs: dict[int, SnapshotRef] = {}
         self._drifts: dict[int, RigidMotion] = {}
         self._back_projection = RunBackProjection(parameters) if back_project else None
@@ -198,7 +199,9 @@ class RunHistory:
         rooms : iterable of RoomRows
             Every room of every map, in the order of the maps.
         """
-        convergence = measure_convergence(rooms, self.histories, self._snapshot_refs, self._drifts)
+        convergence = measure_convergence(
+            rooms, self.histories, self._snapshot_refs, self._drifts, self._tracking
+        )
         return RunSummary(self.totals, self.histories, convergence)
 
 

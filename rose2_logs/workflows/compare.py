@@ -10,6 +10,7 @@ import numpy as np
 from rose2_logs.comparison.final_layout import FinalLayout
 from rose2_logs.comparison.layouts import LayoutComparison, compare_layouts
 from rose2_logs.comparison.placement import PlacedMap
+from rose2_logs.config.parameters import Parameters
 from rose2_logs.errors import ResultsError
 from rose2_logs.model.occupancy import OccupancySnapshot
 from rose2_logs.runs.run import Run
@@ -34,7 +35,13 @@ class ComparisonResult:
 
 
 def compare_runs(
-    folder_a: Path, folder_b: Path, folder: Path, *, recording: bool = True, overwrite: bool = False
+    folder_a: Path,
+    folder_b: Path,
+    folder: Path,
+    *,
+    recording: bool = True,
+    overwrite: bool = False,
+    parameters: Parameters | None = None,
 ) -> ComparisonResult:
     """Compare the last layouts of two runs and write what differs.
 
@@ -48,6 +55,8 @@ def compare_runs(
         Whether to write the Rerun recording.
     overwrite : bool
         Whether an earlier comparison may be replaced.
+    parameters : Parameters, optional
+        Of the comparison.
 
     Raises
     ------
@@ -62,7 +71,7 @@ def compare_runs(
     files = tuple(folder / name for name in FILES)
     refuse_existing(files, overwrite=overwrite)
     name_a, name_b = _names(folder_a, folder_b)
-    comparison = compare_stored(Run(folder_a), Run(folder_b), name_a, name_b)
+    comparison = compare_stored(Run(folder_a), Run(folder_b), name_a, name_b, parameters)
     write_comparison_tables(files[0], files[1], comparison)
     write_comparison_summary(files[2], comparison, folder_a, folder_b)
     draw_comparison(comparison).save(files[3], width_px=None)
@@ -77,16 +86,30 @@ def compare_runs(
 
 
 def compare_stored(
-    run_a: Run, run_b: Run, name_a: str | None = None, name_b: str | None = None
+    run_a: Run,
+    run_b: Run,
+    name_a: str | None = None,
+    name_b: str | None = None,
+    parameters: Parameters | None = None,
 ) -> LayoutComparison:
     """Compare the last layouts of two stored runs; B is laid over A.
+
+    Parameters
+    ----------
+    run_a, run_b : Run
+        The runs.
+    name_a, name_b : str, optional
+        What they are called instead of by their own names.
+    parameters : Parameters, optional
+        Of the comparison.
 
     Raises
     ------
     ResultsError
         If results cannot be read, or a last map has too few walls to tell how it lies.
     """
-    a, b = read_final_layout(run_a, name_a), read_final_layout(run_b, name_b)
+    a = read_final_layout(run_a, name_a, parameters)
+    b = read_final_layout(run_b, name_b, parameters)
     comparison = compare_layouts(a, b)
     if comparison is None:
         few = run_a if not a.map.can_be_placed else run_b
@@ -103,7 +126,7 @@ def _names(folder_a: Path, folder_b: Path) -> tuple[str, str]:
     return folder_a.resolve().name, folder_b.resolve().name
 
 
-def read_final_layout(run: Run, name: str | None = None) -> FinalLayout:
+def read_final_layout(run: Run, name: str | None = None, parameters: Parameters | None = None) -> FinalLayout:
     """Take the last layout of a stored run, called by the run's name unless another is given.
 
     Raises
@@ -113,10 +136,11 @@ def read_final_layout(run: Run, name: str | None = None) -> FinalLayout:
     """
     last = run.choose()
     below, _ = run.map(last)
+    snapshot = OccupancySnapshot(last, 0, 0, "", below.cells, below.geometry)
     rooms = run.table("rooms", ["track", "area_m2", "polygon_wkb"], last).to_pylist()
     return FinalLayout(
         name=name or run.name,
-        map=PlacedMap(OccupancySnapshot(last, 0, 0, "", below.cells, below.geometry), below.occupancy),
+        map=PlacedMap(snapshot, below.occupancy, parameters),
         tracks=tuple(row["track"] for row in rooms),
         shapes=tuple(run.shapes("rooms", [row["polygon_wkb"] for row in rooms])),
         areas_m2=np.array([row["area_m2"] for row in rooms], float),

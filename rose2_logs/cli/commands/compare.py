@@ -11,6 +11,7 @@ from rich.markup import escape
 
 from rose2_logs.cli.messages import warning
 from rose2_logs.cli.printing import print_line, print_table
+from rose2_logs.config.parameters import Parameters
 
 if TYPE_CHECKING:
     from rose2_logs.comparison.layouts import LayoutComparison
@@ -31,6 +32,7 @@ def compare(
     ],
     b: Annotated[Path, typer.Argument(metavar="B", help="Results of analyze: the layout as it is now.")],
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the results of the comparison.")],
+    parameters: Parameters,
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace the results of an earlier comparison.")
     ] = False,
@@ -39,7 +41,8 @@ def compare(
     """Compare the last layouts of two runs: rooms and walls that are new, missing or moved."""
     from rose2_logs.workflows.compare import compare_runs
 
-    print_comparison(compare_runs(a, b, out, recording=not no_rrd, overwrite=overwrite))
+    result = compare_runs(a, b, out, recording=not no_rrd, overwrite=overwrite, parameters=parameters)
+    print_comparison(result)
 
 
 def print_comparison(result: ComparisonResult) -> None:
