@@ -62,8 +62,12 @@ def test_the_report_differs_in_times_and_names_of_files_alone(folders, tmp_path:
     seconds = json.loads((full / "summary.json").read_text())["seconds"]
     summary = json.loads((bare / "summary.json").read_text())
     (bare / "summary.json").write_text(json.dumps(summary | {"seconds": seconds}))
-    one, other = (write_report(folder, tmp_path / "page.html", overwrite=True).read_text() for folder in (full, bare))
-    of_files = re.compile("<li>office.*</li>|<li>[a-z_]+[.](json|parquet).*</li>|<p [^>]*>[^<]*<code>rose2-logs view office.rrd</code></p>")
+    one, other = (
+        write_report(folder, tmp_path / "page.html", overwrite=True).read_text() for folder in (full, bare)
+    )
+    of_files = re.compile(
+        "<li>office.*</li>|<li>[a-z_]+[.](json|parquet).*</li>|<p [^>]*>[^<]*<code>rose2-logs view office.rrd</code></p>"
+    )
     assert of_files.sub("", one).split() == of_files.sub("", other).split()
     assert len(one) > 10_000
 
