@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import numpy as np
 import pytest
 import zstandard
@@ -46,10 +48,8 @@ def test_cut_changed_or_other_bytes_are_refused_or_of_the_right_size(data: st.Da
     changed = bytearray(packed)
     changed[at] ^= bits
     for damaged in (packed[:cut], bytes(changed), data.draw(st.binary(max_size=60))):
-        try:
+        with suppress(ValueError):
             assert unpack_image(damaged, (10, 12), "<i4").shape == (10, 12)
-        except ValueError as error:
-            assert "\n" not in str(error)
 
 
 @pytest.mark.parametrize("cells", [119, 121, 0])

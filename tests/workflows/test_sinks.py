@@ -132,8 +132,8 @@ def test_a_sink_that_fails_costs_nothing_of_earlier_results(log: Path, tmp_path:
     options = {"recording": False, "annotated_log": False, "journal": False}
     rl.analyze(log, out, **options)
     before = {file.name: file.read_bytes() for file in out.iterdir()}
+    sink = Told(tmp_path / "told", "finish", ValueError("broken"))
     with pytest.raises(ValueError, match="broken"):
-        sink = Told(tmp_path / "told", "finish", ValueError("broken"))
         rl.analyze(log, out, sinks=[sink], overwrite=True, **options)
     assert {file.name: file.read_bytes() for file in out.iterdir()} == before
 

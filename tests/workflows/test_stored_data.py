@@ -1,4 +1,4 @@
-"""Report, figures, exports and comparisons are made of stored data: with or without the log and its outputs."""
+"""Report, figures, exports and comparisons are made of stored data, without the log and its outputs."""
 
 from __future__ import annotations
 
@@ -65,9 +65,8 @@ def test_the_report_differs_in_times_and_names_of_files_alone(folders, tmp_path:
     one, other = (
         write_report(folder, tmp_path / "page.html", overwrite=True).read_text() for folder in (full, bare)
     )
-    of_files = re.compile(
-        "<li>office.*</li>|<li>[a-z_]+[.](json|parquet).*</li>|<p [^>]*>[^<]*<code>rose2-logs view office.rrd</code></p>"
-    )
+    listed = "<li>office.*</li>|<li>[a-z_]+[.](json|parquet).*</li>"
+    of_files = re.compile(f"{listed}|<p [^>]*>[^<]*<code>rose2-logs view office.rrd</code></p>")
     assert of_files.sub("", one).split() == of_files.sub("", other).split()
     assert len(one) > 10_000
 
@@ -124,5 +123,5 @@ def test_a_comparison_is_written_and_not_replaced_unasked(folders, tmp_path: Pat
 
 
 def test_what_cannot_be_compared_is_one_line(folders, tmp_path: Path):
-    with pytest.raises(ResultsError, match="there is no such folder|holds no summary"):
+    with pytest.raises(ResultsError, match="holds no summary"):
         rl.compare(folders[0], tmp_path)
