@@ -106,7 +106,7 @@ def analyze(
     >>> import rose2_logs as rl
     >>> run = rl.analyze("sample_logs/office.mcap", max_snapshots=3)
     >>> run.snapshots.arrow["rooms"].to_pylist()
-    [2, 12, 19]
+    [3, 11, 19]
     """
     log = Path(log)
     if out is None:
@@ -163,10 +163,10 @@ def track(
     --------
     >>> import rose2_logs as rl
     >>> for step in rl.track(rl.open_log("sample_logs/office.mcap", max_snapshots=3)):
-    ...     print(f"{step.coverage:.2f}", len(step.rooms), step.track_ids[:3])
-    0.26 2 (1, 2)
-    0.79 12 (1, 2, 3)
-    1.00 19 (1, 2, 3)
+    ...     print(f"{step.coverage:.2f}", len(step.rooms), sorted(step.track_ids)[:4])
+    0.26 3 [1, 2, 3]
+    0.72 11 [1, 2, 3, 4]
+    1.00 19 [1, 2, 3, 4]
     """
     options = _options(parameters, {"method": method, "workers": workers})
     if isinstance(log, str | Path):
@@ -232,7 +232,7 @@ def segment(
     >>> grid[[10, 11, 108, 109], 10:190] = 100
     >>> grid[50:70, 99:101] = 0
     >>> rl.segment(grid, resolution_m=0.05).rooms
-    <RoomMap: 2 rooms, 120 x 200 cells of 0.05 m>
+    RoomMap(2 rooms, 1 doorways, 200 x 120 cells of 0.05 m)
     """
     if isinstance(map_, OccupancySnapshot):
         snapshot = map_
@@ -284,7 +284,7 @@ def open_log(
     >>> import rose2_logs as rl
     >>> with rl.open_log("sample_logs/wing.bag") as reader:
     ...     print(reader.topic, reader.first())
-    /map <OccupancySnapshot 0 of /map: ...>
+    /map OccupancySnapshot(index=0, topic='/map', 384 x 320 cells of 0.05 m)
     """
     limits = Parameters.from_any(parameters).reading
     return open_log_reader(log, topic=topic, selection=Selection(**selection), limits=limits)
@@ -304,6 +304,17 @@ def read_map(map_file: str | Path, resolution_m: float | None = None) -> Occupan
     ------
     LogError, InvalidMapError, ParameterError
         If it cannot be read, is a log, or its resolution is not known.
+
+    Examples
+    --------
+    >>> import tempfile, numpy as np, rose2_logs as rl
+    >>> from PIL import Image
+    >>> image = np.full((120, 200), 205, np.uint8)
+    >>> image[10:110, 10:190] = 254
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     Image.fromarray(image).save(f"{folder}/plan.png")
+    ...     rl.read_map(f"{folder}/plan.png", resolution_m=0.05)
+    OccupancySnapshot(index=0, topic='/map', 200 x 120 cells of 0.05 m)
     """
     return read_static_map(Path(map_file), resolution_m)
 
@@ -320,6 +331,15 @@ def load(folder: str | Path) -> Run:
     ------
     ResultsError
         If the folder holds no results, or those of another version.
+
+    Examples
+    --------
+    >>> import tempfile, rose2_logs as rl
+    >>> options = {"max_snapshots": 3, "recording": False, "annotated_log": False}
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     run = rl.analyze("sample_logs/office.mcap", f"{folder}/office", **options)
+    ...     rl.load(f"{folder}/office")
+    <Run office: 3 maps, 19 rooms at the end>
     """
     return Run(folder)
 

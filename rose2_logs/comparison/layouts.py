@@ -31,6 +31,14 @@ class LayoutComparison:
         None where a method found no walls.
     scale : float, optional
         Where they do not seem to show one building: how many times larger B would have to be to lie over A.
+
+    Examples
+    --------
+    >>> import rose2_logs as rl
+    >>> run = rl.analyze("sample_logs/office.mcap", max_snapshots=3)
+    >>> found = rl.compare(run, run)
+    >>> found.same_building, found.room_counts
+    (True, {'same': 19})
     """
 
     a: FinalLayout

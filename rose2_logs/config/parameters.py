@@ -398,6 +398,12 @@ class Parameters:
     ------
     ParameterError
         If a block is not of its type; blocks check their values themselves.
+
+    Examples
+    --------
+    >>> import rose2_logs as rl
+    >>> rl.Parameters.from_any({"walls.extension_m": 6}).walls.extension_m
+    6.0
     """
 
     reading: ReadingParameters = field(default_factory=ReadingParameters)

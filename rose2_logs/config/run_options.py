@@ -179,6 +179,12 @@ class RunOptions:
     ------
     ParameterError
         If a value cannot be used; the message names the option.
+
+    Examples
+    --------
+    >>> import rose2_logs as rl
+    >>> rl.RunOptions(method="voronoi", every_s=5.0).selection.every_s
+    5.0
     """
 
     topic: str | None = option(

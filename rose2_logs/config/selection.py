@@ -37,6 +37,12 @@ class Selection:
     ------
     ParameterError
         If a number makes no sense.
+
+    Examples
+    --------
+    >>> import numpy as np, rose2_logs as rl
+    >>> rl.Selection(max_snapshots=3).thin(np.arange(10))
+    array([0, 4, 9])
     """
 
     start_ns: int | None = None

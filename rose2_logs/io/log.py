@@ -46,6 +46,13 @@ class LogReader:
         The open log.
     counts : ReadCounts
         Message counts of the latest call of `snapshots`.
+
+    Examples
+    --------
+    >>> import rose2_logs as rl
+    >>> with rl.open_log("sample_logs/office.mcap", every_s=60.0) as reader:
+    ...     print(reader.topic, len(list(reader.snapshots())), reader.counts.messages)
+    /map 10 40
     """
 
     def __init__(self, source: MessageSource, topic: str | None, selection: Selection) -> None:

@@ -43,6 +43,15 @@ class GridGeometry:
         Name of the world frame.
     shape : (int, int)
         Rows and columns (H, W); row 0 lies at the origin.
+
+    Examples
+    --------
+    >>> import numpy as np, rose2_logs as rl
+    >>> geometry = rl.GridGeometry(0.05, (-10.0, -5.0), 0.0, "map", (200, 400))
+    >>> geometry.corners_m()[2]
+    array([10.,  5.])
+    >>> geometry.world_to_cell(np.array([0.01, 0.01]))
+    array([100, 200])
     """
 
     resolution_m: float
@@ -149,6 +158,14 @@ class OccupancySnapshot:
     ------
     InvalidMapError
         If `cells` has not the geometry's shape, or is not made of integers from -1 to 100.
+
+    Examples
+    --------
+    >>> import numpy as np, rose2_logs as rl
+    >>> cells = np.full((200, 400), -1, np.int8)
+    >>> geometry = rl.GridGeometry(0.05, (0.0, 0.0), 0.0, "map", cells.shape)
+    >>> rl.OccupancySnapshot(0, 0, 0, "/map", cells, geometry)
+    OccupancySnapshot(index=0, topic='/map', 400 x 200 cells of 0.05 m)
     """
 
     index: int

@@ -129,6 +129,14 @@ class RoomPlan:
         Ends of the wall segments, None where they are not known.
     map : PlanMap or None
         None where only shapes are known.
+
+    Examples
+    --------
+    >>> import rose2_logs as rl
+    >>> run = rl.analyze("sample_logs/office.mcap", max_snapshots=3)
+    >>> plan = run[-1].plan()
+    >>> plan.title, len(plan.rooms), len(plan.doorways)
+    ('office, snapshot 2, coverage 100%', 19, 18)
     """
 
     title: str

@@ -27,6 +27,12 @@ class Doorway:
         The two room numbers, the smaller one first.
     ends_m : (2, 2) float
         The two ends of the passage, world meters.
+
+    Examples
+    --------
+    >>> import numpy as np, rose2_logs as rl
+    >>> rl.Doorway((1, 2), np.array([[3.0, 1.0], [3.0, 2.0]])).width_m
+    1.0
     """
 
     rooms: tuple[int, int]
@@ -55,6 +61,14 @@ class RoomMap:
         Area of the labeled cells of each room.
     doorways : tuple of Doorway
         Passages between rooms.
+
+    Examples
+    --------
+    >>> import rose2_logs as rl
+    >>> with rl.open_log("sample_logs/office.mcap") as reader:
+    ...     found = rl.segment(reader.last())
+    >>> found.rooms
+    RoomMap(19 rooms, 18 doorways, 704 x 512 cells of 0.05 m)
     """
 
     geometry: GridGeometry

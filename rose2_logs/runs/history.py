@@ -116,6 +116,18 @@ class RunSummary:
         What is known of every room.
     convergence : Convergence
         Since when each room, and the layout, was as in the last map.
+
+    Examples
+    --------
+    >>> import rose2_logs as rl
+    >>> class Conclusion(rl.Sink):
+    ...     def write(self, step):
+    ...         pass
+    ...
+    ...     def finish(self, summary):
+    ...         print(summary.totals.rooms_last, "rooms, final from map", summary.layout_final.snapshot)
+    >>> run = rl.analyze("sample_logs/office.mcap", sinks=[Conclusion()], max_snapshots=3)
+    19 rooms, final from map 2
     """
 
     totals: RunTotals

@@ -36,6 +36,18 @@ class RunInfo:
         What is known of the input: format, size in bytes, SHA-256 fingerprint; JSON values only.
     origin : str, optional
         Where the log comes from if `log_path` is but a copy.
+
+    Examples
+    --------
+    >>> import rose2_logs as rl
+    >>> class Heading(rl.Sink):
+    ...     def begin(self, info):
+    ...         print(info.topic, info.method, info.provenance["format"])
+    ...
+    ...     def write(self, step):
+    ...         pass
+    >>> run = rl.analyze("sample_logs/office.mcap", sinks=[Heading()], max_snapshots=2)
+    /map rose2 MCAP
     """
 
     log_path: Path

@@ -195,7 +195,8 @@ def pack_image(image: NDArray[Any], convert: Callable[[NDArray[Any]], NDArray[An
     """Compress an image (H, W), converted some rows at a time, row by row as one Zstandard frame."""
     packer = zstandard.ZstdCompressor(COMPRESSION_LEVEL).compressobj()
     parts = np.array_split(image, max(1, image.size // CELLS_AT_ONCE))
-    packed = [packer.compress(np.ascontiguousarray(convert(part)).data.cast("B")) for part in parts]
+    flat = (np.ascontiguousarray(convert(part)).reshape(-1) for part in parts)
+    packed = [packer.compress(part.view("u1").data) for part in flat]
     return b"".join([*packed, packer.flush()])
 
 

@@ -44,6 +44,13 @@ class RoomEvent:
         Intersection over union of the room with its track's last shape; 0 where there is none.
     motion : RigidMotion, optional
         Of a shift: how the map moved since the snapshot before.
+
+    Examples
+    --------
+    >>> import rose2_logs as rl
+    >>> step = next(rl.track("sample_logs/office.mcap"))
+    >>> step.events[0]
+    RoomEvent(kind='born', snapshot=0, track=1, others=(), overlap=0.0, motion=None)
     """
 
     kind: EventKind
@@ -81,6 +88,12 @@ class TrackedSnapshot:
         How the layout changed since the map before.
     path : (K, 3) float, optional
         Poses of the robot since the map before: x, y in world meters, yaw in radians.
+
+    Examples
+    --------
+    >>> import rose2_logs as rl
+    >>> next(rl.track("sample_logs/office.mcap"))
+    TrackedSnapshot(index=0, coverage=0.26, tracks=[1, 2, 3], 512 x 320 cells of 0.05 m)
     """
 
     snapshot: OccupancySnapshot

@@ -40,6 +40,12 @@ class Evaluation:
         Figures of each group's maps over coverage, if the groups were evaluated as runs.
     tracks : mapping of str to RunTrackScores
         Figures of each group's tracks, in the same case.
+
+    Examples
+    --------
+    >>> import rose2_logs as rl
+    >>> found = rl.evaluate("cases.json")  # doctest: +SKIP
+    >>> found.groups["campus"].iou_sym  # doctest: +SKIP
     """
 
     method: str
