@@ -49,8 +49,3 @@ def test_states_follow_one_another_and_a_lost_room_leaves_a_gap(tmp_path):
     assert found["/room/001"] == [(10, FORMING), (12, SHAPED), (14, SETTLED)]
     assert found["/room/002"] == [(11, FORMING), (13, LOST), (14, SETTLED)]
     assert found["/room/003"] == [(12, SETTLED), (13, LOST)]
-
-
-def test_without_hindsight_a_room_is_there_or_not(tmp_path):
-    found = lanes(tmp_path, [(1,), (), (1,)], None)
-    assert found["/room/001"] == [(10, FORMING), (11, LOST), (12, FORMING)]
