@@ -106,7 +106,7 @@ def analyze(
     >>> import rose2_logs as rl
     >>> run = rl.analyze("sample_logs/office.mcap", max_snapshots=3)
     >>> run.snapshots.arrow["rooms"].to_pylist()
-    [2, 12, 19]
+    [3, 11, 19]
     """
     log = Path(log)
     if out is None:
@@ -164,9 +164,9 @@ def track(
     >>> import rose2_logs as rl
     >>> for step in rl.track(rl.open_log("sample_logs/office.mcap", max_snapshots=3)):
     ...     print(f"{step.coverage:.2f}", len(step.rooms), step.track_ids[:3])
-    0.26 2 (1, 2)
-    0.79 12 (1, 2, 3)
-    1.00 19 (1, 2, 3)
+    0.26 3 (1, 2, 3)
+    0.72 11 (4, 2, 5)
+    1.00 19 (12, 13, 14)
     """
     options = _options(parameters, {"method": method, "workers": workers})
     if isinstance(log, str | Path):
@@ -232,7 +232,7 @@ def segment(
     >>> grid[[10, 11, 108, 109], 10:190] = 100
     >>> grid[50:70, 99:101] = 0
     >>> rl.segment(grid, resolution_m=0.05).rooms
-    <RoomMap: 2 rooms, 120 x 200 cells of 0.05 m>
+    RoomMap(2 rooms, 1 doorways, 200 x 120 cells of 0.05 m)
     """
     if isinstance(map_, OccupancySnapshot):
         snapshot = map_
@@ -284,7 +284,7 @@ def open_log(
     >>> import rose2_logs as rl
     >>> with rl.open_log("sample_logs/wing.bag") as reader:
     ...     print(reader.topic, reader.first())
-    /map <OccupancySnapshot 0 of /map: ...>
+    /map OccupancySnapshot(index=0, topic='/map', 384 x 320 cells of 0.05 m)
     """
     limits = Parameters.from_any(parameters).reading
     return open_log_reader(log, topic=topic, selection=Selection(**selection), limits=limits)

@@ -1,6 +1,6 @@
 """Run the tutorial notebook and store its outputs, without what differs from run to run.
 
-    python tools/run_notebook.py docs/notebooks/tour.ipynb
+python tools/run_notebook.py docs/notebooks/tour.ipynb
 """
 
 from __future__ import annotations
@@ -42,6 +42,7 @@ def run_notebook(path: Path, timeout_s: int = 300) -> Any:
         kernel_name="python3",
         resources={"metadata": {"path": str(path.parent)}},
         record_timing=False,
+        coalesce_streams=True,
     ).execute()
     return notebook
 
