@@ -1,16 +1,19 @@
-"""Pages of the documentation that are written from the code: commands, parameters, tables.
+"""Pages of the documentation that are generated: commands, parameters and tables from the code, and the notebook.
 
-MkDocs calls `on_files` when it builds the site, see ``mkdocs.yml``. To read a page without building it:
+MkDocs calls `on_files` when it builds the site, see ``mkdocs.yml``. To read a page without building the site:
 
     python tools/docs_pages.py reference/parameters.md
 """
 
 from __future__ import annotations
 
+import base64
 import dataclasses
+import json
 import re
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
@@ -21,29 +24,35 @@ from rose2_logs.config.parameters import Parameters, describe_parameters
 from rose2_logs.runs import table_schemas
 
 NAME = "rose2-logs"
+NOTEBOOK = Path(__file__).parents[1] / "docs" / "notebooks" / "tour.ipynb"
+PICTURES = {"image/svg+xml": "svg", "image/png": "png"}
+"""Kinds of pictures that a cell may put out, the preferred one first."""
 TABLES = {
-    "snapshots.parquet": (table_schemas.SNAPSHOTS, "One row a map."),
-    "rooms.parquet": (table_schemas.ROOMS, "One row a room and map."),
-    "tracks.parquet": (table_schemas.TRACKS, "One row a room over the run."),
-    "events.parquet": (table_schemas.EVENTS, "One row an event."),
-    "doorways.parquet": (table_schemas.DOORWAYS, "One row a doorway and map."),
-    "back_projected.parquet (analyze --back-project)": (
+    "snapshots.parquet": (table_schemas.SNAPSHOTS, "One row per map."),
+    "rooms.parquet": (table_schemas.ROOMS, "One row per room and map."),
+    "tracks.parquet": (table_schemas.TRACKS, "One row per room over the run."),
+    "events.parquet": (table_schemas.EVENTS, "One row per event."),
+    "doorways.parquet": (table_schemas.DOORWAYS, "One row per doorway and map."),
+    "walls.parquet": (table_schemas.WALLS, "One row per wall segment and map."),
+    "lines.parquet": (table_schemas.LINES, "One row per representative line and map."),
+    "maps.parquet": (table_schemas.MAPS, "One row per map: its explored window and its label image."),
+    "back_projected.parquet": (
         table_schemas.BACK_PROJECTED,
-        "One row a room of the last map and map that shows some of it.",
+        "With `--back-project`: one row per room of the last map and map that shows some of it.",
     ),
     "room_changes.parquet": (
         table_schemas.ROOM_CHANGES,
-        "Of `compare`: one row a group of rooms that belong together, or a room alone.",
+        "Written by `compare`: one row per group of rooms that belong together, or per single room.",
     ),
     "wall_changes.parquet": (
         table_schemas.WALL_CHANGES,
-        "Of `compare`: one row a stretch of wall that differs.",
+        "Written by `compare`: one row per stretch of wall that differs.",
     ),
 }
 
 
 def commands_page() -> str:
-    """Every command with its arguments and options, as its help tells them."""
+    """Every command with its arguments and options, from its help."""
     group: Any = typer.main.get_command(app)
     lines = ["# Commands", "", _text(group.help), ""]
     lines += ["Exit codes: 0 done; 1 internal error; 2 a log, a file or an option cannot be used (one line"]
@@ -78,21 +87,22 @@ def _options_table(params: list[Any]) -> list[str]:
         if is_option and not param.is_flag and not callable(default) and default not in (None, False):
             told = f"`{default}`"
         rows.append(f"| {names} | {_escaped(_text(param.help or ''))} | {told} |")
-    return ["| option | what | default |", "|---|---|---|", *rows] if rows else []
+    return ["| option | meaning | default |", "|---|---|---|", *rows] if rows else []
 
 
 def parameters_page() -> str:
-    """Every parameter: default, unit, bounds, and where the value comes from."""
+    """Every parameter with its default, unit, bounds, and the reason for the default."""
     lines = [
         "# Parameters",
         "",
-        "Each can be changed by `--set BLOCK.NAME=VALUE` or in a file for `--config`, see "
-        "[Parameters and methods](../howto/parameters.md). The values used stand in `summary.json`.",
+        "Change a parameter with `--set BLOCK.NAME=VALUE`, in a file for `--config`, or in Python with "
+        '`parameters={"BLOCK.NAME": VALUE}`; see [Parameters and methods](../howto/parameters.md). '
+        "`summary.json` contains the values that were used.",
     ]
     rows = describe_parameters()
     for block in dataclasses.fields(Parameters):
         about = (type(getattr(Parameters(), block.name)).__doc__ or "").strip().splitlines()[0]
-        lines += ["", f"## {block.name}", "", about, "", "| name | default | unit | why | bounds |"]
+        lines += ["", f"## {block.name}", "", about, "", "| name | default | unit | reason | bounds |"]
         lines.append("|---|---|---|---|---|")
         for row in (each for each in rows if each["block"] == block.name):
             lines.append(
@@ -114,12 +124,13 @@ def _bounds(row: dict[str, Any]) -> str:
 
 
 def tables_page() -> str:
-    """Every column of every table, as the files' own metadata tells it."""
+    """Every column of every table, from the metadata of the files."""
     lines = [
         "# Tables",
         "",
-        "All tables are Parquet. Lengths are meters in the frame of the map, or as the column says. The "
-        "files hold these descriptions as well: `pyarrow.parquet.read_schema(path).field(name).metadata`.",
+        "All tables are Parquet. Lengths are in meters in the frame of the map unless the column says "
+        "otherwise. The files contain these descriptions as well: `rose2_logs.load(folder).rooms.columns`, or "
+        "`pyarrow.parquet.read_schema(path).field(name).metadata`.",
     ]
     for name, (schema, about) in TABLES.items():
         lines += ["", f"## {name}", "", about, "", "| column | type | meaning |", "|---|---|---|"]
@@ -142,7 +153,7 @@ def _text(markup: str) -> str:
 
 
 def _escaped(text: str) -> str:
-    """Keep a text within its cell of a table, and what stands in angle brackets on the page."""
+    """Escape a text for a cell of a Markdown table."""
     outside_code = re.split(r"(`[^`]*`)", text)
     escaped = [
         part if part.startswith("`") else part.replace("<", "&lt;").replace("*", "\\*")
@@ -151,19 +162,79 @@ def _escaped(text: str) -> str:
     return "".join(escaped).replace("|", "\\|")
 
 
+def notebook_page() -> str:
+    """The tutorial notebook with its outputs, as Markdown."""
+    parts = []
+    for number, cell in enumerate(_cells()):
+        source = "".join(cell["source"])
+        parts.append(source if cell["cell_type"] == "markdown" else f"```python\n{source}\n```")
+        for place, output in enumerate(cell.get("outputs", [])):
+            parts.append(_shown(output, number, place))
+    return "\n\n".join(filter(None, parts)) + "\n"
+
+
+def notebook_pictures() -> dict[str, bytes]:
+    """The pictures that the notebook's cells put out, by their path in the documentation."""
+    found = {}
+    for number, cell in enumerate(_cells()):
+        for place, output in enumerate(cell.get("outputs", [])):
+            if kind := _picture_kind(output):
+                data = "".join(output["data"][kind])
+                content = base64.b64decode(data) if kind == "image/png" else data.encode()
+                found[f"notebooks/{_picture_name(number, place, kind)}"] = content
+    return found
+
+
+def _cells() -> list[dict[str, Any]]:
+    cells: list[dict[str, Any]] = json.loads(NOTEBOOK.read_text(encoding="utf-8"))["cells"]
+    return cells
+
+
+def _shown(output: dict[str, Any], number: int, place: int) -> str:
+    if output["output_type"] == "stream":
+        return "" if output["name"] == "stderr" else _as_text("".join(output["text"]))
+    data = output.get("data", {})
+    if kind := _picture_kind(output):
+        return f"![Output of the cell above]({_picture_name(number, place, kind)})"
+    if "text/html" in data:
+        return _unindented("".join(data["text/html"]))
+    return _as_text("".join(data["text/plain"])) if "text/plain" in data else ""
+
+
+def _unindented(html: str) -> str:
+    """One block of HTML, which Markdown leaves as it is if no line is empty or indented."""
+    html = re.sub(r"<style.*?</style>", "", html, flags=re.DOTALL)
+    return "\n".join(line.strip() for line in html.splitlines() if line.strip())
+
+
+def _as_text(text: str) -> str:
+    return f"```text\n{text.rstrip()}\n```"
+
+
+def _picture_kind(output: dict[str, Any]) -> str | None:
+    return next((kind for kind in PICTURES if kind in output.get("data", {})), None)
+
+
+def _picture_name(number: int, place: int, kind: str) -> str:
+    return f"tour_{number}_{place}.{PICTURES[kind]}"
+
+
 PAGES: dict[str, Callable[[], str]] = {
     "reference/commands.md": commands_page,
     "reference/parameters.md": parameters_page,
     "reference/tables.md": tables_page,
+    "notebooks/tour.md": notebook_page,
 }
 
 
 def on_files(files: Any, config: Any, **_: Any) -> Any:
-    """Add the pages to those that MkDocs builds."""
+    """Add the pages and the pictures of the notebook to what MkDocs builds."""
     from mkdocs.structure.files import File
 
     for name, page in PAGES.items():
         files.append(File.generated(config, name, content=page()))
+    for name, picture in notebook_pictures().items():
+        files.append(File.generated(config, name, content=picture))
     return files
 
 

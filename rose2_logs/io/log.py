@@ -263,6 +263,6 @@ def choose_topic(info: LogInfo, asked: str | None = None) -> str:
             return name
     if len(filled) > 1:
         raise NoMapTopicError(
-            f"{info.path}: several topics hold maps: {', '.join(filled)}; choose one (topic={min(filled)!r})"
+            f"{info.path}: several topics have maps: {', '.join(filled)}; choose one (topic={min(filled)!r})"
         )
     return next(iter(filled))

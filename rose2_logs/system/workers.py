@@ -31,10 +31,10 @@ Result = TypeVar("Result")
 LOOK_AHEAD_PER_WORKER = 2
 """Items submitted ahead for each worker: one being processed and one waiting."""
 MOST_ON_WINDOWS = 61
-"""Processes that one can wait for at once on Windows: 64 objects, less those of the pool itself."""
+"""Processes that Windows can wait for at once: 64 objects, minus those of the pool itself."""
 START_METHOD = "forkserver" if sys.platform == "linux" else "spawn"
-"""How processes start. On Linux they are copies of a fresh process that has imported what the function needs,
-once for all; on other systems libraries do not bear to be copied after their import."""
+"""How processes start. On Linux they are forked from a fresh process that has imported the function's module
+once for all of them; on other systems, forking after imports is not safe for all libraries."""
 THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "RAYON_NUM_THREADS")
 """Where OpenMP, the linear algebra libraries and Rerun read the number of threads when they are loaded."""
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3
@@ -170,10 +170,10 @@ _CONTEXT: Any = multiprocessing.get_context(START_METHOD)
 
 
 class WorkerProcess(_CONTEXT.Process):  # type: ignore[misc]
-    """A process that starts without the user's script, which nothing that it calls needs.
+    """A process that starts without importing the user's script, which its work does not need.
 
-    Python's own way imports it once more in each process, so that a script without a ``__main__`` guard would
-    start all its work again.
+    By default Python imports the script again in each process, so that a script without a ``__main__`` guard
+    would start all its work again.
     """
 
     @staticmethod
@@ -187,7 +187,7 @@ class WorkerProcess(_CONTEXT.Process):  # type: ignore[misc]
 
 
 def _context(function: Callable[..., Any]) -> BaseContext:
-    """Choose how processes start: never by a copy of this one, whose threads (Rerun, Arrow) might lock up."""
+    """Choose how processes start: never by forking this one, whose threads (Rerun, Arrow) could deadlock."""
     context = copy.copy(_CONTEXT)
     if START_METHOD == "forkserver":
         context.set_forkserver_preload([getattr(function, "func", function).__module__])

@@ -21,6 +21,8 @@ PROJECT = Path(__file__).parents[2]
 DOCS = PROJECT / "docs"
 PAGE_FILES = sorted(DOCS.rglob("*.md"))
 PICTURES_MAX_BYTES = 2_000_000
+ENDINGS = ("json", "parquet", "png", "rrd")
+"""Of files that are called like a block of parameters."""
 
 
 def nav_pages(entries) -> list[str]:
@@ -97,7 +99,7 @@ def test_settings_in_the_pages_can_be_copied(page: Path):
             load_parameters(None, [setting])
     for name in re.findall(r"`([a-z_0-9]+\.[a-z_0-9]+)`", text):
         block, _, parameter = name.partition(".")
-        if block in Parameters().resolved() and parameter not in ("json", "png", "rrd"):
+        if block in Parameters().resolved() and parameter not in ENDINGS:
             assert parameter in Parameters().resolved()[block]
 
 

@@ -74,8 +74,8 @@ class AnnotatedMcap(Sink):
     Attributes
     ----------
     facts : dict
-        ``annotated_log``: for each channel the number and the hash of its messages in the input and in the
-        output, once whole.
+        ``annotated_log``: for each channel, number and hash of its messages in the input and in the output;
+        set at the end.
 
     Raises
     ------
@@ -256,7 +256,7 @@ class AnnotatedMcap(Sink):
             if self._is_bag and channel.message_encoding != "cdr":
                 raise OutputError(
                     f"{self._info.log_path}: {channel.topic} holds {channel.message_encoding or 'unknown'} "
-                    "messages, which no bag of ROS 2 can hold; leave out bag=True"
+                    "messages, which a ROS 2 bag cannot contain; leave out bag=True"
                 )
             schema = (channel.schema_name, channel.schema_encoding, channel.schema_data)
             # Copied chunks refer to channels and schemas by their ids, so these must not change.
@@ -286,7 +286,7 @@ class AnnotatedMcap(Sink):
         self._writer.add_message(channel, time_ns, data, time_ns, self._sequence)
 
     def abandon(self) -> None:
-        """Close both files; what has not been renamed by now is removed."""
+        """Close both files, and remove the output if it has not been renamed yet."""
         if self._opened_source is not None:
             self._opened_source.close()
         if self._file is not None:

@@ -182,7 +182,7 @@ def checked_copy(
         if expected.as_json() != got.as_json() or indexed != got.messages:
             raise OutputError(
                 f"{name}: {channel.topic} has {got.messages} messages (hash {got.hash}) after writing, "
-                f"{expected.messages} (hash {expected.hash}) went in; "
+                f"instead of {expected.messages} (hash {expected.hash}); "
                 "try another disk, or leave out the annotated MCAP (annotated_log=False)"
             )
         if number in added:
