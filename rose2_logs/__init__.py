@@ -35,6 +35,7 @@ _HOMES = {
     "runs.table": ("Table",),
     "tracking.tracked_snapshot": ("RoomEvent", "TrackedSnapshot"),
     "workflows.evaluate": ("Evaluation",),
+    "workflows.segment": ("Segmentation",),
 }
 """Where each public name is defined; ``__init__.pyi`` tells the same to type checkers."""
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}

@@ -77,6 +77,7 @@ from rose2_logs.runs.table import Table as Table
 from rose2_logs.tracking.tracked_snapshot import RoomEvent as RoomEvent
 from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot as TrackedSnapshot
 from rose2_logs.workflows.evaluate import Evaluation as Evaluation
+from rose2_logs.workflows.segment import Segmentation as Segmentation
 
 __version__: str
 __all__: list[str]

@@ -20,17 +20,15 @@ from rose2_logs.config.selection import Selection
 from rose2_logs.errors import ParameterError
 from rose2_logs.io import open_log as open_log_reader
 from rose2_logs.io.log import LogReader
-from rose2_logs.model.analysis import SnapshotAnalysis
 from rose2_logs.model.occupancy import GridGeometry, OccupancySnapshot, free_area_m2
 from rose2_logs.runs.run import Run
 from rose2_logs.runs.sink import Sink
 from rose2_logs.runs.stream import TrackedStream, start_workers
-from rose2_logs.segmentation.pipeline import analyze as analyze_snapshot
 from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot
 from rose2_logs.workflows.analyze import OnSnapshot, analyze_log, log_stem
 from rose2_logs.workflows.compare import compare_runs, compare_stored
 from rose2_logs.workflows.evaluate import Evaluation, evaluate_method
-from rose2_logs.workflows.segment import read_static_map
+from rose2_logs.workflows.segment import Segmentation, read_static_map, segment_snapshot
 
 __all__ = ["analyze", "compare", "evaluate", "load", "open_log", "read_map", "segment", "track"]
 
@@ -194,7 +192,7 @@ def segment(
     method: str = "rose2",
     parameters: GivenParameters = None,
     voronoi: bool = False,
-) -> SnapshotAnalysis:
+) -> Segmentation:
     """Segment one map into rooms.
 
     Parameters
@@ -213,8 +211,8 @@ def segment(
 
     Returns
     -------
-    SnapshotAnalysis
-        Rooms, label image, walls, faces, clean map.
+    Segmentation
+        A `SnapshotAnalysis` (rooms, label image, walls, faces, clean map) that can be drawn.
 
     Raises
     ------
@@ -246,7 +244,9 @@ def segment(
         cells = np.asarray(map_)
         geometry = GridGeometry(resolution_m, (0.0, 0.0), 0.0, "map", cells.shape)
         snapshot = OccupancySnapshot(0, 0, 0, "array", cells, geometry)
-    return analyze_snapshot(snapshot, Parameters.from_any(parameters), method, voronoi=voronoi)
+    return segment_snapshot(
+        snapshot, Parameters.from_any(parameters), method, name=snapshot.topic, voronoi=voronoi
+    )
 
 
 def open_log(

@@ -6,22 +6,26 @@ import logging
 import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from rose2_logs.config.parameters import Parameters, ReadingParameters
+from rose2_logs.drawing.drawing import Drawing
 from rose2_logs.drawing.image_files import write_label_image
 from rose2_logs.drawing.plan import draw_segmentation
+from rose2_logs.drawing.plot import plot_plan
 from rose2_logs.errors import LogError, ParameterError
 from rose2_logs.io import open_log
 from rose2_logs.io.discovery import IMAGE_ENDINGS
 from rose2_logs.io.opening import DEFAULT_LIMITS
 from rose2_logs.io.saved_maps import MapFilesSource
+from rose2_logs.model.analysis import SnapshotAnalysis
 from rose2_logs.model.explored import coarser_for_its_size
 from rose2_logs.model.occupancy import OccupancySnapshot
-from rose2_logs.model.room_plan import plan_of_analysis
+from rose2_logs.model.room_plan import RoomPlan, plan_of_analysis
 from rose2_logs.model.rooms import RoomMap
 from rose2_logs.outputs.exports.formats import planned_files, write_plan
 from rose2_logs.outputs.exports.geojson import plan_geojson
@@ -32,6 +36,53 @@ from rose2_logs.system.files import refuse_existing, require_utf8
 logger = logging.getLogger(__name__)
 
 
+@dataclass(frozen=True, eq=False, repr=False)
+class Segmentation(SnapshotAnalysis):
+    """The analysis of a map of its own, which can be drawn.
+
+    Attributes
+    ----------
+    snapshot : OccupancySnapshot
+        The map.
+    parameters : Parameters
+        Those of the analysis.
+    name : str
+        What the map is called.
+    """
+
+    snapshot: OccupancySnapshot = field(kw_only=True)
+    parameters: Parameters = field(kw_only=True)
+    name: str = "map"
+
+    def plan(self) -> RoomPlan:
+        """Return the floor plan: rooms by their numbers, doorways, walls and the map."""
+        assert self.quality is not None  # it comes with every analysis
+        return plan_of_analysis(self.snapshot, self, self.quality, self.name, self.parameters.occupancy)
+
+    def figure(self) -> Drawing:
+        """Draw the map with its rooms, unseen parts, doorways and a scale bar.
+
+        Returns
+        -------
+        Drawing
+            Shown in notebooks; ``drawing.save("rooms.svg")`` or ``.png`` writes it.
+        """
+        return draw_segmentation(self.plan())
+
+    def plot(self, ax: Any = None) -> Any:
+        """Draw the map with its rooms with matplotlib; return the Axes.
+
+        Raises
+        ------
+        MissingPackageError
+            If matplotlib is not installed.
+        """
+        return plot_plan(self.plan(), ax)
+
+    def _repr_svg_(self) -> str:
+        return self.figure()._repr_svg_()
+
+
 @dataclass(frozen=True)
 class StaticMapResult:
     """What `segment_map` found and wrote."""
@@ -39,6 +90,23 @@ class StaticMapResult:
     rooms: RoomMap
     folder: Path
     files: tuple[Path, ...]
+
+
+def segment_snapshot(
+    snapshot: OccupancySnapshot,
+    parameters: Parameters,
+    method: str = "rose2",
+    *,
+    name: str = "map",
+    voronoi: bool = False,
+) -> Segmentation:
+    """Segment a map of its own; warn if it is so large that it was analyzed in coarser cells."""
+    found = analyze(snapshot, parameters, method, voronoi=voronoi)
+    note = coarser_for_its_size(snapshot.geometry, found.resolution_m, parameters.occupancy)
+    if note is not None:
+        logger.warning("%s: %s", name, note)
+    stages = {each.name: getattr(found, each.name) for each in fields(found)}
+    return Segmentation(**stages, snapshot=snapshot, parameters=parameters, name=name)
 
 
 def segment_map(
@@ -85,16 +153,13 @@ def segment_map(
     more = planned_files([each for each in formats if each != "geojson"], folder, name)
     refuse_existing([*files, *more], overwrite=overwrite)
     snapshot = read_static_map(map_file, resolution_m, parameters.reading)
-    analysis = analyze(snapshot, parameters, method)
-    note = coarser_for_its_size(snapshot.geometry, analysis.resolution_m, parameters.occupancy)
-    if note is not None:
-        logger.warning("%s: %s", map_file, note)
-    write_label_image(files[0], np.flipud(analysis.rooms.labels))
-    plan = plan_of_analysis(snapshot, analysis, analysis.quality, name, parameters.occupancy)
-    write_json(files[1], plan_geojson(plan, analysis.walls))
-    draw_segmentation(plan).save(files[2])
+    found = segment_snapshot(snapshot, parameters, method, name=name)
+    plan = found.plan()
+    write_label_image(files[0], np.flipud(found.labels))
+    write_json(files[1], plan_geojson(plan, found.walls))
+    found.figure().save(files[2])
     more = write_plan(plan, [each for each in formats if each != "geojson"], folder, name)
-    return StaticMapResult(analysis.rooms, folder, (*files, *more))
+    return StaticMapResult(found.rooms, folder, (*files, *more))
 
 
 def read_static_map(
