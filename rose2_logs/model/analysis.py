@@ -195,7 +195,7 @@ class SnapshotAnalysis:
             parts.append(f"{len(self.walls.segments_m)} wall segments")
         if self.floor_plan is not None:
             parts.append(f"{len(self.floor_plan.faces)} faces")
-        return f"SnapshotAnalysis({', '.join(parts)})"
+        return f"{type(self).__name__}({', '.join(parts)})"
 
     @property
     def labels(self) -> NDArray[np.int32]:
