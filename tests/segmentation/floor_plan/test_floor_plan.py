@@ -5,8 +5,6 @@ import dataclasses
 import numpy as np
 import pytest
 import shapely
-from rose2_logs.segmentation.floor_plan.doorways import find_doorways
-from rose2_logs.segmentation.floor_plan.rooms import adopt_left_out, settle_borders
 
 from rose2_logs.config.parameters import FloorPlanParameters
 from rose2_logs.model.outlines import outline
