@@ -133,17 +133,17 @@ def _analyze_by_rose2(
     # D: rooms split at the narrow places of their Voronoi graph, with straight borders and doorways
     split = split_rooms(plan.labels, walls, lines_m, directions, cell_m, parameters.topology)
     watch.lap("topology")
-    made = make_rooms(split, plan, free, cell_m, parameters.floor_plan)
-    rooms = _room_map(made.labels, made.shapes, explored, parameters.topology)
+    finished = make_rooms(split, plan, free, cell_m, parameters.floor_plan)
+    rooms = _room_map(finished.labels, finished.shapes, explored, parameters.topology)
     watch.lap("rooms")
 
     graph = None
     if voronoi:
         # Clutter does not keep the free space apart.
-        inside = (made.labels > 0) | (occupied & ~walls)
+        inside = (finished.labels > 0) | (occupied & ~walls)
         graph = explored.segments(voronoi_lines(inside, walls, cell_m, parameters.topology))
         watch.lap("voronoi")
-    floor_plan = _floor_plan(plan, made.room_of_face, explored, parameters.floor_plan)
+    floor_plan = _floor_plan(plan, finished.room_of_face, explored, parameters.floor_plan)
     return _Stages(cell_m, rooms, structure, _walls(built, explored), floor_plan, graph)
 
 

@@ -83,7 +83,7 @@ class RoomTracker:
         self._tracks = _Tracks()
 
     def update(
-        self, snapshot: OccupancySnapshot, found: SnapshotAnalysis | RoomMap
+        self, snapshot: OccupancySnapshot, analysis: SnapshotAnalysis | RoomMap
     ) -> tuple[tuple[int, ...], tuple[RoomEvent, ...]]:
         """Number the rooms of the next map of the run.
 
@@ -91,8 +91,8 @@ class RoomTracker:
         ----------
         snapshot : OccupancySnapshot
             The map; its index goes into the events, its walls tell whether it moved.
-        found : SnapshotAnalysis or RoomMap
-            Its rooms.
+        analysis : SnapshotAnalysis or RoomMap
+            Its rooms, or the analysis that holds them.
 
         Returns
         -------
@@ -103,7 +103,7 @@ class RoomTracker:
             any more gives one lost. The split or merge that explains them comes in addition, and a shift of
             the whole map.
         """
-        rooms = found if isinstance(found, RoomMap) else found.rooms
+        rooms = analysis if isinstance(analysis, RoomMap) else analysis.rooms
         events = self._move(snapshot)
         shapes = cut_out_rooms(rooms.labels, rooms.geometry, len(rooms))
         overlaps = self._overlaps(rooms, shapes)

@@ -128,8 +128,8 @@ def best_lines(lines: CriticalLines, min_gap: float) -> BoolArray:
     pairs = cKDTree(lines.points).query_pairs(reach.max(initial=0.0), output_type="ndarray")
     gap = np.linalg.norm(lines.points[pairs[:, 0]] - lines.points[pairs[:, 1]], axis=1)
     for one, other in (pairs.T, pairs.T[::-1]):
-        turn = lines.angle_rad[other] - lines.angle_rad[one]
+        straighter = lines.angle_rad[other] - lines.angle_rad[one]
         shorter = lines.length[one] - lines.length[other]
-        beaten = (turn > SAME) | ((turn > -SAME) & (shorter > SAME))
+        beaten = (straighter > SAME) | ((straighter > -SAME) & (shorter > SAME))
         best[one[beaten & (gap < reach[one])]] = False
     return best

@@ -38,7 +38,7 @@ def grow(seeds: NDArray[np.int32], free: BoolArray) -> NDArray[np.int32]:
     is_open = np.pad(free, 1).ravel() & (framed.ravel() == 0)
     nobody = len(rank_of_label)
     rank[is_open] = nobody
-    turn = np.zeros(len(rank), np.intp)
+    visit = np.zeros(len(rank), np.intp)
     near_open = cv2.dilate(is_open.reshape(framed.shape).astype(np.uint8), SQUARE).ravel() > 0
     front = np.flatnonzero(near_open & (framed.ravel() > 0))
     while len(front):
@@ -48,8 +48,8 @@ def grow(seeds: NDArray[np.int32], free: BoolArray) -> NDArray[np.int32]:
         reached, by = reached[fresh], by[fresh]
         np.minimum.at(rank, reached, by)
         # Each cell goes on once, however many neighbors reached it.
-        turn[reached] = np.arange(len(reached))
-        front = reached[turn[reached] == np.arange(len(reached))]
+        visit[reached] = np.arange(len(reached))
+        front = reached[visit[reached] == np.arange(len(reached))]
         is_open[front] = False
     rank[is_open] = rank_of_label[0]
     label_of_rank = np.argsort(rank_of_label).astype(np.int32)

@@ -34,7 +34,7 @@ def segment_morphological(
     """
     seeds = np.zeros(free.shape, np.int32)
     left = free
-    found = 0
+    rooms = 0
     for _ in range(parameters.max_rounds):
         left = eroded(left)
         if not left.any():
@@ -42,8 +42,8 @@ def segment_morphological(
         part, size = connected_parts(left)
         area = size * resolution_m**2
         is_room = (area > parameters.room_min_area_m2) & (area < parameters.room_max_area_m2)
-        number = np.where(is_room, found + np.cumsum(is_room), 0).astype(np.int32)
-        found += int(np.count_nonzero(is_room))
+        number = np.where(is_room, rooms + np.cumsum(is_room), 0).astype(np.int32)
+        rooms += int(np.count_nonzero(is_room))
         seeds += number[part]
         left = left & ~is_room[part]
     return grow(seeds, free)

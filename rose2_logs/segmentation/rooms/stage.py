@@ -60,7 +60,7 @@ def make_rooms(
     settled = settle_borders(whole, resolution_m, parameters.border_strip_m)
     number = number_rooms(settled, int(whole.max(initial=0)), parameters.room_min_area_m2, resolution_m)
     settled = renumber_in_place(settled, number)
-    # Which faces are a room's is told by the labels before their borders settled.
+    # Faces belong to the rooms whose labels they had before borders settled.
     room_of_face = rooms_of_faces(renumber_in_place(whole, number), plan)
     shapes = room_shapes(settled, plan, room_of_face, resolution_m, parameters.shape_min_seen)
     return RoomsResult(settled, shapes, room_of_face)

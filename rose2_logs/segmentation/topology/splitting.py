@@ -68,8 +68,8 @@ class _Lines:
 
     def near(self, points: NDArray[np.float32]) -> tuple[FloatArray, FloatArray]:
         """Normals and offsets of the lines that meet the box around some points."""
-        found = np.sort(self.tree.query(box(*points.min(0), *points.max(0)), predicate="intersects"))
-        return self.normals[found], self.offsets[found]
+        near = np.sort(self.tree.query(box(*points.min(0), *points.max(0)), predicate="intersects"))
+        return self.normals[near], self.offsets[near]
 
 
 def _beyond_cut(

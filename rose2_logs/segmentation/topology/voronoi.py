@@ -109,16 +109,16 @@ def voronoi_lines(
     clear = inside & (clearance >= parameters.doorway_min_width_m / 2)
     skeleton = np.pad(skeletonize(clear[::DRAWN_BLOCK, ::DRAWN_BLOCK]), 1)  # type: ignore[no-untyped-call]
     row, column = np.nonzero(skeleton)
-    found = []
+    lines = []
     for down, right in ((0, 1), (1, 0), (1, 1), (1, -1)):
         linked = skeleton[row + down, column + right]
         if down and right:
             # Where a cell at the corner links the two already, a diagonal would close a triangle.
             linked = linked & ~skeleton[row + down, column] & ~skeleton[row, column + right]
         first, last = straight_runs(row[linked], column[linked], (down, right))
-        found.append(np.concatenate([first, last + np.array([down, right])], axis=1))
+        lines.append(np.concatenate([first, last + np.array([down, right])], axis=1))
     # The frame of padding is one cell wide; each cell stands for the middle of the first of its block.
-    cells = (np.concatenate(found) - 1) * float(DRAWN_BLOCK) + 0.5
+    cells = (np.concatenate(lines) - 1) * float(DRAWN_BLOCK) + 0.5
     return cells[:, [1, 0, 3, 2]] * resolution_m
 
 

@@ -100,7 +100,7 @@ def detect_segments(
             reached[runs.point] = np.maximum(reached[runs.point], length[runs.run])
         better = reached > longest + resolution_m / 2
         best[better], longest[better] = number, reached[better]
-    found = [np.zeros((0, 4))]
+    segments = [np.zeros((0, 4))]
     for number, angle in enumerate(directions_rad.tolist()):
         own = np.flatnonzero((best == number) & (longest >= min_length_m))
         rows = [np.zeros((0, 4))]
@@ -112,8 +112,8 @@ def detect_segments(
         of_strip = np.concatenate(rows)
         of_strip = of_strip[np.lexsort((of_strip[:, 2], of_strip[:, 0]))]
         of_strip[:, 0] = number
-        found.append(of_strip)
-    direction, offset, start, end = np.concatenate(found).T
+        segments.append(of_strip)
+    direction, offset, start, end = np.concatenate(segments).T
     return Segments(directions_rad, direction.astype(np.int32), offset, start, end), members
 
 
