@@ -17,7 +17,7 @@ from rose2_logs.comparison.layouts import LayoutComparison
 from rose2_logs.config.parameters import Parameters
 from rose2_logs.config.run_options import RunOptions, options_of
 from rose2_logs.config.selection import Selection
-from rose2_logs.errors import ParameterError
+from rose2_logs.errors import InvalidMapError, ParameterError
 from rose2_logs.io import open_log as open_log_reader
 from rose2_logs.io.log import LogReader
 from rose2_logs.model.occupancy import GridGeometry, OccupancySnapshot, free_area_m2
@@ -241,7 +241,10 @@ def segment(
             raise ParameterError(
                 "an array does not tell how large its cells are; give resolution_m in meters"
             )
-        cells = np.asarray(map_)
+        try:
+            cells = np.asarray(map_)
+        except ValueError as error:
+            raise InvalidMapError("a map's rows must have the same number of cells") from error
         geometry = GridGeometry(resolution_m, (0.0, 0.0), 0.0, "map", cells.shape)
         snapshot = OccupancySnapshot(0, 0, 0, "array", cells, geometry)
     return segment_snapshot(

@@ -169,6 +169,10 @@ def ordered_map(
 _CONTEXT: Any = multiprocessing.get_context(START_METHOD)
 
 
+_STARTING = threading.Lock()
+"""Held while a process starts: two threads that start some would put each other's script back."""
+
+
 class WorkerProcess(_CONTEXT.Process):  # type: ignore[misc]
     """A process that starts without importing the user's script, which its work does not need.
 
@@ -178,12 +182,13 @@ class WorkerProcess(_CONTEXT.Process):  # type: ignore[misc]
 
     @staticmethod
     def _Popen(process: Any) -> Any:  # noqa: N802 (the name that multiprocessing calls)
-        script = sys.modules["__main__"]
-        sys.modules["__main__"] = ModuleType("__main__")
-        try:
-            return _CONTEXT.Process._Popen(process)
-        finally:
-            sys.modules["__main__"] = script
+        with _STARTING:
+            script = sys.modules["__main__"]
+            sys.modules["__main__"] = ModuleType("__main__")
+            try:
+                return _CONTEXT.Process._Popen(process)
+            finally:
+                sys.modules["__main__"] = script
 
 
 def _context(function: Callable[..., Any]) -> BaseContext:

@@ -239,3 +239,40 @@ def test_a_run_is_made_without_pandas_and_matplotlib(tmp_path: Path):
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith("<Run maps: 3 maps, 2 rooms at the end> True ")
+
+
+def test_a_run_and_its_maps_are_drawn(run: rl.Run, tmp_path: Path):
+    """The map that was chosen, in the colors of the tracks; a notebook shows a run with its last map."""
+    drawing = run.figure(coverage=0.5)
+    half = run.at_coverage(0.5)
+    assert drawing.svg() == half.figure().svg()
+    assert drawing.svg() != run.figure().svg()
+    assert drawing.svg() != run.figure(coverage=0.5, back_projected=True).svg()
+    assert half._repr_svg_() == half.figure()._repr_svg_()
+    for name in ("half.svg", "half.png"):
+        assert drawing.save(tmp_path / name).stat().st_size > 1000
+    html = run._repr_html_()
+    assert html.count("<svg") == 1
+    assert run[-1]._repr_svg_() in html
+    assert "office.mcap" in html
+
+
+def test_what_a_log_is_called_is_no_html(tmp_path: Path):
+    log = save_run(tmp_path / "<b>maps&")
+    html = rl.analyze(log)._repr_html_()
+    assert "<b>" not in html
+    assert "&lt;b&gt;maps&amp;" in html
+
+
+def test_maps_are_plotted_into_axes(run: rl.Run):
+    matplotlib = pytest.importorskip("matplotlib")
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    figure, (left, right) = pyplot.subplots(1, 2)
+    try:
+        assert run.plot(left, coverage=0.5) is left
+        assert run[-1].plot(right) is right
+        assert len(left.patches) < len(right.patches)
+    finally:
+        pyplot.close(figure)

@@ -6,6 +6,8 @@ import os
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,6 +17,7 @@ from rose2_logs.system import shared_memory as packed
 from rose2_logs.system.workers import (
     LOOK_AHEAD_PER_WORKER,
     WorkerError,
+    WorkerProcess,
     Workers,
     ordered_map,
     usable_processes,
@@ -102,6 +105,23 @@ def test_items_are_taken_as_they_are_needed():
         assert taken <= done + 2 * LOOK_AHEAD_PER_WORKER
     results.close()
     assert taken < 40
+
+
+def test_the_script_is_in_its_place_after_processes_were_started(monkeypatch):
+    """Also by several threads at a time; while one starts, there is none that it could import."""
+    script, seen = sys.modules["__main__"], []
+
+    def start(_: object) -> None:
+        seen.append(sys.modules["__main__"])
+        time.sleep(0.02)
+
+    context = SimpleNamespace(Process=SimpleNamespace(_Popen=start))
+    monkeypatch.setattr("rose2_logs.system.workers._CONTEXT", context)
+    with ThreadPoolExecutor(4) as threads:
+        list(threads.map(WorkerProcess._Popen, range(8)))
+    assert sys.modules["__main__"] is script
+    assert len(seen) == 8
+    assert not any(hasattr(module, "__file__") for module in seen)
 
 
 def test_work_in_this_process_is_held_to_one_thread_and_lets_go():

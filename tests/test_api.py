@@ -1,0 +1,140 @@
+"""The functions for scripts and notebooks: what they take, and what they say of what they do not take."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from drawn_maps import office, snapshot
+from PIL import Image
+from saved_maps import WALL, save_map, save_run, two_rooms
+
+import rose2_logs as rl
+from rose2_logs.errors import (
+    CasesError,
+    InvalidMapError,
+    LogError,
+    NoMapTopicError,
+    ParameterError,
+    Rose2LogsError,
+)
+
+
+@pytest.fixture(scope="module")
+def cells() -> np.ndarray:
+    return office()[0]
+
+
+def test_an_array_a_map_and_a_file_are_segmented_alike(tmp_path: Path):
+    """Whatever is given, the rooms are the same; a picture has its first row at the top."""
+    image = two_rooms()
+    path = save_map(tmp_path, "map", image)
+    stored = rl.read_map(path)
+    by_path, by_map = rl.segment(path), rl.segment(stored)
+    by_text = rl.segment(str(path))
+    by_array = rl.segment(stored.cells, resolution_m=0.05)
+    by_list = rl.segment(stored.cells.tolist(), resolution_m=0.05)
+    by_picture = rl.segment(path.with_suffix(".png"))
+    for found in (by_map, by_text, by_array, by_list, by_picture):
+        assert np.array_equal(found.labels, by_path.labels)
+    assert len(by_path.rooms) == 2
+    assert by_path.rooms.geometry.origin_xy_m == (1.0, 2.0)
+    assert by_array.rooms.geometry.origin_xy_m == (0.0, 0.0)
+    assert (image[::-1][by_path.labels > 0] != WALL).all()
+
+
+@pytest.mark.parametrize("dtype", [np.int8, np.int16, np.int64])
+def test_arrays_of_any_integers_are_taken_if_they_hold_occupancy(cells: np.ndarray, dtype: type):
+    found = rl.segment(cells.astype(dtype), resolution_m=0.05)
+    assert np.array_equal(found.labels, rl.segment(snapshot(cells)).labels)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        np.zeros((3, 3, 3), np.int8),
+        np.zeros(9, np.int8),
+        np.full((3, 3), 101),
+        np.full((3, 3), -2),
+        np.zeros((3, 3)),
+        np.full((3, 3), np.nan),
+        [["wall"]],
+        [[1, 2], [3]],
+    ],
+    ids=["3-D", "1-D", "over 100", "below -1", "float", "NaN", "text", "ragged"],
+)
+def test_what_is_no_occupancy_is_refused_in_a_line(wrong: object):
+    with pytest.raises(Rose2LogsError) as error:
+        rl.segment(wrong, resolution_m=0.05)
+    assert isinstance(error.value, InvalidMapError | ParameterError)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("resolution_m", [0, -0.05, float("nan"), float("inf")])
+def test_a_resolution_that_is_none_is_refused(cells: np.ndarray, resolution_m: float):
+    with pytest.raises(Rose2LogsError, match="resolution"):
+        rl.segment(cells, resolution_m=resolution_m)
+
+
+def test_an_array_needs_its_resolution(cells: np.ndarray):
+    with pytest.raises(ParameterError, match="give resolution_m in meters"):
+        rl.segment(cells)
+
+
+def test_methods_and_parameters_are_chosen_by_name(cells: np.ndarray):
+    """Parameters whole, or a mapping of dotted names."""
+    few = {"floor_plan.room_min_area_m2": 12.0}
+    found = [
+        rl.segment(cells, resolution_m=0.05, parameters=given)
+        for given in (few, rl.Parameters().replaced({"floor_plan": {"room_min_area_m2": 12.0}}))
+    ]
+    assert np.array_equal(found[0].labels, found[1].labels)
+    assert rl.segment(cells, resolution_m=0.05, method="voronoi").walls is None
+    with pytest.raises(ParameterError, match="rose2, morphological, distance, voronoi"):
+        rl.segment(cells, resolution_m=0.05, method="best")
+    with pytest.raises(ParameterError, match=r"no parameter floor_plan\.of_old"):
+        rl.segment(cells, resolution_m=0.05, parameters={"floor_plan.of_old": 1})
+
+
+def test_a_log_is_opened_with_a_selection(tmp_path: Path):
+    log = save_run(tmp_path / "maps")
+    with rl.open_log(log, max_snapshots=2) as reader:
+        assert len(list(reader.snapshots())) == 2
+    maps = sorted(log.glob("*.yaml"))
+    with rl.open_log([str(each) for each in maps]) as reader:
+        assert len(list(reader.snapshots())) == 3
+    with pytest.raises(NoMapTopicError):
+        rl.open_log(log, topic="/nothing")
+    with pytest.raises(LogError):
+        rl.open_log(tmp_path / "nowhere")
+
+
+def test_an_option_that_there_is_not_is_named(tmp_path: Path):
+    """As one keyword among the others, and with what was meant."""
+    for call in (
+        lambda: rl.analyze(tmp_path, worker=2),
+        lambda: rl.analyze(tmp_path, workers=0),
+        lambda: rl.analyze(tmp_path, method="best"),
+        lambda: rl.open_log(tmp_path, max_snapshot=2),
+    ):
+        with pytest.raises((ParameterError, TypeError)) as error:
+            call()
+        assert "--" not in str(error.value)
+    with pytest.raises(ParameterError, match="workers"):
+        rl.analyze(tmp_path, worker=2)
+
+
+def test_maps_with_known_rooms_are_evaluated(tmp_path: Path):
+    """One map whose rooms are found: figures of the map and means of its group."""
+    path = save_map(tmp_path, "map", two_rooms())
+    Image.fromarray(np.flipud(rl.segment(path).labels).astype(np.uint8)).save(tmp_path / "rooms.png")
+    case = {"name": "one", "group": "drawn", "map": "map.png", "rooms": "rooms.png", "resolution_m": 0.05}
+    (tmp_path / "cases.json").write_text(json.dumps({"cases": [case]}))
+    found = rl.evaluate(tmp_path / "cases.json")
+    assert [each.case.name for each in found.maps] == ["one"]
+    assert found.groups["drawn"].iou_sym == pytest.approx(100)
+    assert found.method == "rose2"
+    with pytest.raises(CasesError):
+        rl.evaluate(tmp_path / "none.json")
