@@ -55,11 +55,15 @@ def texts(path: Path) -> list[str]:
     return [each.value for each in strings if isinstance(each.value, str) and " " in each.value]
 
 
-@pytest.mark.parametrize("path", OTHERS, ids=lambda path: path.relative_to(PACKAGE).as_posix())
-def test_no_message_of_the_library_names_a_flag(path: Path):
+def test_no_message_of_the_library_names_a_flag():
     known = set().union(*(flags(command) for command in COMMANDS))
-    for text in texts(path):
-        assert not known.intersection(re.findall(r"(?<![\w-])--?[a-z][a-z-]*", text)), text
+    naming = [
+        f"{path.relative_to(PACKAGE).as_posix()}: {text}"
+        for path in OTHERS
+        for text in texts(path)
+        if known.intersection(re.findall(r"(?<![\w-])--?[a-z][a-z-]*", text))
+    ]
+    assert not naming, "\n".join(naming)
 
 
 @pytest.mark.parametrize(

@@ -81,26 +81,31 @@ def test_the_navigation_names_every_page():
     assert sorted(listed) == sorted([path.relative_to(DOCS).as_posix() for path in PAGE_FILES] + list(PAGES))
 
 
-@pytest.mark.parametrize("page", PAGE_FILES, ids=lambda page: page.relative_to(DOCS).as_posix())
-def test_links_and_pictures_are_there(page: Path):
+def test_links_and_pictures_are_there():
     """Each points to a file, or to a page that is written from the code."""
-    for link in re.findall(r"\]\(([^)#]+)[^)]*\)", page.read_text(encoding="utf-8")):
-        if "://" not in link:
-            target = (page.parent / link).resolve()
-            assert target.is_file() or target.relative_to(DOCS).as_posix() in PAGES, f"{page}: {link}"
+    missing = [
+        f"{page.relative_to(DOCS)}: {link}"
+        for page in PAGE_FILES
+        for link in re.findall(r"\]\(([^)#]+)[^)]*\)", page.read_text(encoding="utf-8"))
+        if "://" not in link
+        and not (target := (page.parent / link).resolve()).is_file()
+        and target.relative_to(DOCS).as_posix() not in PAGES
+    ]
+    assert missing == []
 
 
-@pytest.mark.parametrize("page", PAGE_FILES, ids=lambda page: page.relative_to(DOCS).as_posix())
-def test_settings_in_the_pages_can_be_copied(page: Path):
+def test_settings_in_the_pages_can_be_copied():
     """Every --set of an example names a parameter and a value that it takes."""
-    text = page.read_text(encoding="utf-8")
-    for setting in re.findall(r"--set '?([a-z_0-9]+\.[a-z_0-9]+=[^\s'`]+)", text):
-        if not setting.endswith("..."):
-            load_parameters(None, [setting])
-    for name in re.findall(r"`([a-z_0-9]+\.[a-z_0-9]+)`", text):
-        block, _, parameter = name.partition(".")
-        if block in Parameters().resolved() and parameter not in ENDINGS:
-            assert parameter in Parameters().resolved()[block]
+    resolved = Parameters().resolved()
+    for page in PAGE_FILES:
+        text = page.read_text(encoding="utf-8")
+        for setting in re.findall(r"--set '?([a-z_0-9]+\.[a-z_0-9]+=[^\s'`]+)", text):
+            if not setting.endswith("..."):
+                load_parameters(None, [setting])
+        for name in re.findall(r"`([a-z_0-9]+\.[a-z_0-9]+)`", text):
+            block, _, parameter = name.partition(".")
+            if block in resolved and parameter not in ENDINGS:
+                assert parameter in resolved[block], f"{page.relative_to(DOCS)}: {name}"
 
 
 def test_every_picture_is_shown_and_all_are_small():
