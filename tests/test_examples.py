@@ -1,4 +1,4 @@
-"""The examples that people copy: in docstrings, in the README, in the notes on the API, and in the notebook."""
+"""The examples that people copy: in docstrings, the README, the notes on the API, and the notebook."""
 
 from __future__ import annotations
 

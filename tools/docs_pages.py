@@ -1,4 +1,4 @@
-"""Pages of the documentation that are generated: commands, parameters and tables from the code, and the notebook.
+"""Pages of the documentation that are generated: commands, parameters, tables, and the notebook.
 
 MkDocs calls `on_files` when it builds the site, see ``mkdocs.yml``. To read a page without building the site:
 
@@ -129,7 +129,7 @@ def tables_page() -> str:
         "# Tables",
         "",
         "All tables are Parquet. Lengths are in meters in the frame of the map unless the column says "
-        "otherwise. The files contain these descriptions as well: `rose2_logs.load(folder).rooms.columns`, or "
+        "otherwise. The files contain these descriptions, too: `rose2_logs.load(folder).rooms.columns`, or "
         "`pyarrow.parquet.read_schema(path).field(name).metadata`.",
     ]
     for name, (schema, about) in TABLES.items():
