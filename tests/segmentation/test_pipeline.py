@@ -8,6 +8,7 @@ from drawn_maps import agreement, office, snapshot
 from rose2_logs.config.parameters import Parameters
 from rose2_logs.errors import ParameterError
 from rose2_logs.segmentation.pipeline import analyze
+from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot
 
 PARAMETERS = Parameters()
 
@@ -144,5 +145,33 @@ def test_a_field_without_walls_is_one_room():
 
 
 def test_a_method_that_does_not_exist_is_named():
-    with pytest.raises(ParameterError, match="no method 'magic'"):
+    with pytest.raises(ParameterError, match="method='magic': it must be one of "):
         analyze(snapshot(three_cells()), PARAMETERS, "magic")
+
+
+def test_an_analysis_needs_no_options_and_shows_itself_in_one_line():
+    cells, _ = office()
+    analysis = analyze(snapshot(cells))
+    rooms = analysis.rooms
+    assert analysis.labels is rooms.labels
+    assert (analysis.polygons, analysis.doorways) == (rooms.polygons, rooms.doorways)
+    assert analysis.areas_m2 is rooms.areas_m2
+    assert len(analysis.quality.wall_support) == len(rooms)
+    for shown in (analysis, rooms, analysis.structure, analysis.walls, analysis.floor_plan):
+        assert len(repr(shown)) < 200
+        assert "\n" not in repr(shown)
+
+
+def test_parameters_are_taken_by_dotted_names():
+    cells, _ = office()
+    by_name = analyze(snapshot(cells), {"floor_plan.room_min_area_m2": 1000})
+    assert len(by_name.rooms) == 0
+
+
+def test_a_tracked_snapshot_gives_its_rooms_and_labels():
+    taken = snapshot(office()[0])
+    analysis = analyze(taken)
+    step = TrackedSnapshot(taken, analysis, 0.5, tuple(range(1, len(analysis.rooms) + 1)), ())
+    assert step.rooms is analysis.rooms
+    assert step.labels is analysis.rooms.labels
+    assert len(repr(step)) < 200
