@@ -104,7 +104,7 @@ def test_the_outlines_are_those_of_the_last_map_from_the_first_on(result):
 
 
 def test_there_is_a_tab_for_them(result, tmp_path: Path):
-    assert {"Smoothed rooms", "Seen share"} < names_of_views(result.folder / "office.rrd")
+    assert {"Rooms projected back", "Seen share"} < names_of_views(result.folder / "office.rrd")
     options = RunOptions(max_snapshots=2, annotated_log=False, layers=())
     plain = analyze_log(SAMPLE_LOGS / "office.mcap", tmp_path / "office", options).folder / "office.rrd"
     assert not {"Rooms projected back", "Seen share"} & names_of_views(plain)
