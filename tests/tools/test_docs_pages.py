@@ -132,7 +132,9 @@ def test_the_method_is_drawn_stage_by_stage():
     assert np.ptp(maps, axis=0).max() == 0
 
 
-@pytest.mark.skipif(find_spec("material") is None, reason="pip install '.[docs]' brings MkDocs Material")
+@pytest.mark.skipif(
+    None in (find_spec("material"), find_spec("mkdocstrings")), reason="pip install '.[docs]' brings MkDocs"
+)
 def test_the_site_is_built_without_a_warning(tmp_path: Path):
     """And no page fetches anything from elsewhere."""
     command = [
