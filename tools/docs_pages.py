@@ -176,7 +176,7 @@ def options_table() -> str:
             default = "all" if about[each.name].text == "all" else f"`{each.default!r}`"
         kind = str(each.type).replace("|", "or")
         lines.append(
-            f"| `{each.name}` | {_escaped(kind)} | {default} | {_escaped(about[each.name].meaning)} |"
+            f"| `{each.name}` | {_escaped(kind)} | {default} | {_escaped(about[each.name].help)} |"
         )
     return "\n".join(lines)
 
