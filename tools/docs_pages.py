@@ -21,10 +21,13 @@ import typer
 
 from rose2_logs.cli.main import app
 from rose2_logs.config.parameters import Parameters, describe_parameters
+from rose2_logs.config.run_options import RunOptions, options_of
 from rose2_logs.runs import table_schemas
 
 NAME = "rose2-logs"
 NOTEBOOK = Path(__file__).parents[1] / "docs" / "notebooks" / "tour.ipynb"
+OPTIONS_MARK = "<!-- options of a run -->"
+"""Where a page shows the options of a run."""
 PICTURES = {"image/svg+xml": "svg", "image/png": "png"}
 """Kinds of pictures that a cell may put out, the preferred one first."""
 TABLES = {
@@ -162,6 +165,22 @@ def _escaped(text: str) -> str:
     return "".join(escaped).replace("|", "\\|")
 
 
+def options_table() -> str:
+    """The options of a run as keywords of the Python functions."""
+    lines = ["| option | type | default | meaning |", "|---|---|---|---|"]
+    about = options_of(RunOptions)
+    for each in dataclasses.fields(RunOptions):
+        if each.default is dataclasses.MISSING:
+            default = "`Parameters()`"
+        else:
+            default = "all" if about[each.name].text == "all" else f"`{each.default!r}`"
+        kind = str(each.type).replace("|", "or")
+        lines.append(
+            f"| `{each.name}` | {_escaped(kind)} | {default} | {_escaped(about[each.name].help)} |"
+        )
+    return "\n".join(lines)
+
+
 def notebook_page() -> str:
     """The tutorial notebook with its outputs, as Markdown."""
     parts = []
@@ -204,6 +223,7 @@ def _shown(output: dict[str, Any], number: int, place: int) -> str:
 def _unindented(html: str) -> str:
     """One block of HTML, which Markdown leaves as it is if no line is empty or indented."""
     html = re.sub(r"<style.*?</style>", "", html, flags=re.DOTALL)
+    html = html.replace('<table border="1" class="dataframe">', "<table>")
     return "\n".join(line.strip() for line in html.splitlines() if line.strip())
 
 
@@ -236,6 +256,11 @@ def on_files(files: Any, config: Any, **_: Any) -> Any:
     for name, picture in notebook_pictures().items():
         files.append(File.generated(config, name, content=picture))
     return files
+
+
+def on_page_markdown(markdown: str, **_: Any) -> str:
+    """Put the table of options where a page asks for it."""
+    return markdown.replace(OPTIONS_MARK, options_table()) if OPTIONS_MARK in markdown else markdown
 
 
 if __name__ == "__main__":
