@@ -287,9 +287,6 @@ class QualityParameters(ParameterBlock):
     wall_reach_m: float = number(
         0.2, "m", "Occupied cells this near support an outline, which runs in the middle of walls.", 0.0
     )
-    unsure_below: float = number(
-        0.7, "share", "Rooms with less wall are unsure; doorways alone take a room to about 0.9."
-    )
 
 
 @dataclass(frozen=True, repr=False)

@@ -16,16 +16,19 @@ from rose2_logs.model.rooms import RoomMap
 
 UNSURE_SIGN = "?"
 """Behind the number of an unsure room, wherever its name is drawn."""
+UNSURE_BELOW = 0.7
+"""Rooms with less wall support are marked as unsure; doorways alone take a room to about 0.9. A matter of
+display: no stored result depends on it."""
 
 
-def is_unsure(wall_support: float | None, unsure_below: float = QualityParameters.unsure_below) -> bool:
+def is_unsure(wall_support: float | None) -> bool:
     """Whether little of a room's outline is known to be wall; of what was not measured nothing is said."""
-    return wall_support is not None and wall_support < unsure_below
+    return wall_support is not None and wall_support < UNSURE_BELOW
 
 
-def unsure_sign(wall_support: float | None, unsure_below: float = QualityParameters.unsure_below) -> str:
+def unsure_sign(wall_support: float | None) -> str:
     """Return what stands behind the number of a room: the sign where it is unsure."""
-    return UNSURE_SIGN if is_unsure(wall_support, unsure_below) else ""
+    return UNSURE_SIGN if is_unsure(wall_support) else ""
 
 
 @dataclass(frozen=True, eq=False)
