@@ -175,9 +175,7 @@ def options_table() -> str:
         else:
             default = "all" if about[each.name].text == "all" else f"`{each.default!r}`"
         kind = str(each.type).replace("|", "or")
-        lines.append(
-            f"| `{each.name}` | {_escaped(kind)} | {default} | {_escaped(about[each.name].help)} |"
-        )
+        lines.append(f"| `{each.name}` | {_escaped(kind)} | {default} | {_escaped(about[each.name].help)} |")
     return "\n".join(lines)
 
 
