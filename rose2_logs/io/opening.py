@@ -155,7 +155,8 @@ def _open_files(
     kinds = _kinds(files)
     if len(kinds) > 1:
         raise LogError(
-            f"{log}: files of different kinds ({', '.join(sorted(kinds))}) cannot be one log; give files of one kind",
+            f"{log}: files of different kinds ({', '.join(sorted(kinds))}) cannot be one log; "
+            "give files of one kind",
             file=log,
         )
     match kinds.pop():
