@@ -150,12 +150,14 @@ def _open_files(
 ) -> MessageSource:
     """Open files of one kind as one log."""
     if missing := [file for file in files if not file.is_file()]:
-        what = "is not a file; several logs are read as one only if all are files"
+        what = "is not a file; only files can be read together as one log"
         raise LogError(f"{missing[0]}: {what}", file=missing[0])
     kinds = _kinds(files)
     if len(kinds) > 1:
         raise LogError(
-            f"{log}: files of different kinds ({', '.join(sorted(kinds))}) cannot be one log", file=log
+            f"{log}: files of different kinds ({', '.join(sorted(kinds))}) cannot be one log; "
+            "give files of one kind",
+            file=log,
         )
     match kinds.pop():
         case ".yaml":
@@ -173,7 +175,7 @@ def _open_files(
 def _open_storage(
     log: Path, files: list[Path], kind: str, limits: ReadingParameters, *, is_bag: bool
 ) -> FileLog:
-    """Open MCAP files, bags or databases; compressed ones are decompressed beside the log first."""
+    """Open MCAP files, bags or databases; compressed ones are first decompressed into a temporary folder."""
     from rose2_logs.io.file_log import FileLog
 
     open_file, name, bag_name = _formats()[kind]

@@ -174,7 +174,7 @@ class AnnotatedMcap(Sink):
             self._sequence += 1
 
     def finish(self, summary: RunSummary) -> None:
-        """Copy the rest of the log, hold the file against the log, and give it its name."""
+        """Copy the rest of the log, compare the file with the log, and give it its name."""
         with self._writing():
             self._copy_until(None)
             text = json.dumps(self._info.parameters.resolved(), indent=2)
@@ -255,7 +255,7 @@ class AnnotatedMcap(Sink):
                 )
             if self._is_bag and channel.message_encoding != "cdr":
                 raise OutputError(
-                    f"{self._info.log_path}: {channel.topic} holds {channel.message_encoding or 'unknown'} "
+                    f"{self._info.log_path}: {channel.topic} has {channel.message_encoding or 'unknown'} "
                     "messages, which a ROS 2 bag cannot contain; leave out bag=True"
                 )
             schema = (channel.schema_name, channel.schema_encoding, channel.schema_data)

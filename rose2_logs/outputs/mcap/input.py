@@ -106,7 +106,7 @@ class CopiedLog(ABC):
     def messages(self) -> Iterator[CopiedMessage | CopiedChunk]:
         """Yield every message in log time order, or in file order if there is no index.
 
-        Chunks that can be copied as they are, are yielded whole, in file order.
+        Chunks that can be copied unchanged are yielded as chunks, in file order.
         """
 
     def attachments(self) -> Iterator[Attachment]:

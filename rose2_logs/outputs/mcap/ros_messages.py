@@ -40,7 +40,7 @@ uint32[] neighbors         # tracks of the rooms that a doorway connects it with
 """
 WRITTEN_TYPES = ("nav_msgs/msg/OccupancyGrid", "visualization_msgs/msg/MarkerArray", ROOMS_TYPE)
 HIGHEST_VALUE = 98
-"""`/rose2/segmented_map` holds 1 + (track - 1) % 98 for a room: between free 0 and occupied 100."""
+"""A room has the value 1 + (track - 1) % 98 in `/rose2/segmented_map`: between free, 0, and occupied, 100."""
 FILL_OPACITY = 0.45
 LABEL_HEIGHT_M = 0.5
 OUTLINE_WIDTH_M = 0.06

@@ -138,7 +138,7 @@ def test_a_log_with_messages_of_other_kinds_is_refused_as_a_bag(tmp_path):
             writer.add_message(channel_id, message.log_time, message.data, message.log_time)
         writer.add_message(note, 1, b"{}", 1)
         writer.finish()
-    with pytest.raises(OutputError, match=r"/note holds json messages.*leave out bag=True"):
+    with pytest.raises(OutputError, match=r"/note has json messages.*leave out bag=True"):
         analyzed(mixed, tmp_path / "out")
     assert not [file for file in (tmp_path / "out").rglob("*") if file.is_file()]
 
