@@ -98,6 +98,16 @@ def test_methods_and_parameters_are_chosen_by_name(cells: np.ndarray):
         rl.segment(cells, resolution_m=0.05, parameters={"floor_plan.of_old": 1})
 
 
+def test_what_was_found_in_a_map_is_drawn(cells: np.ndarray, tmp_path: Path):
+    """In a notebook, into a file; its rooms are those of the label image."""
+    found = rl.segment(cells, resolution_m=0.05)
+    plan = found.plan()
+    assert {room.number for room in plan.rooms} == set(np.unique(found.labels)) - {0}
+    assert found._repr_svg_() == found.figure()._repr_svg_()
+    assert found.figure().save(tmp_path / "rooms.png").stat().st_size > 1000
+    assert len(repr(found)) < 200
+
+
 def test_a_log_is_opened_with_a_selection(tmp_path: Path):
     log = save_run(tmp_path / "maps")
     with rl.open_log(log, max_snapshots=2) as reader:

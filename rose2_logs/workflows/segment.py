@@ -48,6 +48,14 @@ class Segmentation(SnapshotAnalysis):
         Those of the analysis.
     name : str
         What the map is called.
+
+    Examples
+    --------
+    >>> import rose2_logs as rl
+    >>> with rl.open_log("sample_logs/office.mcap") as reader:
+    ...     found = rl.segment(reader.last())
+    >>> len(found.plan().rooms), found.figure()
+    (19, Drawing('/map', ...))
     """
 
     snapshot: OccupancySnapshot = field(kw_only=True)
