@@ -14,6 +14,7 @@ _HOMES = {
     "config.run_options": ("RunOptions",),
     "config.selection": ("Selection",),
     "comparison.layouts": ("LayoutComparison",),
+    "drawing.drawing": ("Drawing",),
     "errors": (
         "InvalidMapError",
         "LogError",

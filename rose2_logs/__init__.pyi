@@ -26,6 +26,7 @@ from rose2_logs.comparison.layouts import LayoutComparison as LayoutComparison
 from rose2_logs.config.parameters import Parameters as Parameters
 from rose2_logs.config.run_options import RunOptions as RunOptions
 from rose2_logs.config.selection import Selection as Selection
+from rose2_logs.drawing.drawing import Drawing as Drawing
 from rose2_logs.errors import (
     InvalidMapError as InvalidMapError,
 )

@@ -17,7 +17,9 @@ class MorphologicalParameters(ParameterBlock):
 
     block: ClassVar[str] = "morphological"
 
-    room_min_area_m2: float = number(0.8, "m2", "A part that erosion leaves is a room above; the survey's.")
+    room_min_area_m2: float = number(
+        0.8, "m2", "A part left by erosion is a room above this area; the survey's value."
+    )
     room_max_area_m2: float = number(47.0, "m2", "And below this area; the survey's value.")
     max_rounds: int = number(73, "rounds", "Rounds of erosion, one cell each; the survey's value.", 0, 10**5)
 
@@ -28,8 +30,8 @@ class DistanceParameters(ParameterBlock):
 
     block: ClassVar[str] = "distance"
 
-    room_min_area_m2: float = number(0.35, "m2", "Least area of a room's seed; the survey's value.")
-    room_max_area_m2: float = number(163.0, "m2", "Greatest area of a room's seed; the survey's value.")
+    room_min_area_m2: float = number(0.35, "m2", "Minimum area of a room's seed; the survey's value.")
+    room_max_area_m2: float = number(163.0, "m2", "Maximum area of a room's seed; the survey's value.")
 
 
 @dataclass(frozen=True, repr=False)
@@ -38,10 +40,12 @@ class VoronoiBaselineParameters(ParameterBlock):
 
     block: ClassVar[str] = "voronoi"
 
-    room_min_area_m2: float = number(0.1, "m2", "Least area of a piece between cuts; the survey's value.")
-    room_max_area_m2: float = number(1e6, "m2", "Greatest area of a piece; the survey's value: any.")
-    clear_rounds: int = number(2, "rounds", "The graph keeps this many cells clear of obstacles.", 0, 100)
-    prune_passes: int = number(100, "passes", "Loose ends of the graph shorter than this go.", 0, 10**5)
+    room_min_area_m2: float = number(0.1, "m2", "Minimum area of a piece between cuts; the survey's value.")
+    room_max_area_m2: float = number(1e6, "m2", "Maximum area of a piece; the survey's value: any.")
+    clear_rounds: int = number(2, "rounds", "Minimum distance of the graph from obstacles, in cells.", 0, 100)
+    prune_passes: int = number(
+        100, "passes", "Loose ends of the graph shorter than this are removed.", 0, 10**5
+    )
     neighborhood_cells2: float = number(
         280.0, "cells^2", "Cells of a neighborhood times the distance from obstacles; the survey's value.", 1
     )

@@ -1,4 +1,4 @@
-"""Parameters of the comparison of two runs: how one layout lies over another, and what is a change."""
+"""Parameters of the comparison of two runs: how layouts are aligned, and what counts as a change."""
 
 from __future__ import annotations
 
@@ -18,113 +18,131 @@ class ComparisonParameters(ParameterBlock):
     wall_reach_m: float = number(
         0.2,
         "m",
-        "A wall of the other map this near is the same: a wall's thickness, and SLAM's drift.",
+        "A wall of the other map within this distance is the same one: a wall's thickness, plus drift.",
         0.001,
     )
-    wall_reach_min_cells: float = number(2.0, "cells", "And this many cells of the coarser map at least.")
+    wall_reach_min_cells: float = number(
+        2.0, "cells", "The same distance is at least this many cells of the coarser map."
+    )
     contradiction: float = number(
         0.5,
         "share",
-        "A wall on free space counts this much against a placement: maps of one building, drawn years apart, "
-        "still share more walls than not.",
+        "Weight of a wall on free space against a placement: maps of one building, even years apart, still "
+        "share most walls.",
     )
     raster_m: float = number(
-        0.2, "m", "Cells of the rasters whose shifts are searched; the fit bridges two of them.", 0.01
+        0.2,
+        "m",
+        "Cell size of the grids on which shifts are searched; the fit corrects up to two cells.",
+        0.01,
     )
     raster_max_cells: int = number(
-        1024, "cells", "Most such cells along a side; they are larger in larger maps.", 16, 2**15
+        1024,
+        "cells",
+        "Most cells of these grids along a side; in larger maps the cells are larger.",
+        16,
+        2**15,
     )
     wall_blur_m: float = number(
-        0.5, "m", "Nearness to a wall falls from 1 to 0 over this length: the fit's first gate.", 0.01
+        0.5,
+        "m",
+        "Closeness to a wall falls from 1 to 0 over this distance: as in the fit's first step.",
+        0.01,
     )
     turns_max: int = number(
-        6, "turns", "Turns tried, each both ways: two for walls at right angles, more for others.", 1, 1000
+        6,
+        "turns",
+        "Rotations tried, each also turned by 180 degrees: two for right angles, more for others.",
+        1,
+        1000,
     )
     turn_min_gap_rad: float = number(
-        math.radians(3.0), "rad", "Turns closer than this are one: the fit bridges them.", 1e-3
+        math.radians(3.0), "rad", "Rotations closer than this are one: the fit corrects the difference.", 1e-3
     )
-    starts_per_turn: int = number(3, "starts", "Best positions of each turn.", 1, 1000)
-    starts_fitted: int = number(10, "starts", "Best positions of all turns, which are fitted.", 1, 1000)
-    start_min_gap_m: float = number(1.0, "m", "Starts of one turn are this far apart.")
+    starts_per_turn: int = number(3, "starts", "Number of best positions of each rotation.", 1, 1000)
+    starts_fitted: int = number(
+        10, "starts", "Number of best positions of all rotations that are refined by the fit.", 1, 1000
+    )
+    start_min_gap_m: float = number(1.0, "m", "Minimum distance between the positions of one rotation.")
     points_max: int = number(
-        4000, "points", "Wall cells of each map, evenly taken, that agreement is counted over.", 10, 10**6
+        4000, "points", "Wall cells of each map, evenly sampled, for which agreement is counted.", 10, 10**6
     )
     faces_min_share: float = number(
         0.05,
         "share",
-        "With fewer occupied cells beside free ones, as in blurred drawings, all occupied cells are walls.",
+        "If fewer occupied cells are next to free ones, as in blurred drawings, all of them are walls.",
     )
-    same_place_m: float = number(
-        1.0, "m", "Placements closer than this are one and not each other's alternative."
-    )
-    same_turn_rad: float = number(math.radians(3.0), "rad", "The same of their turns.")
+    same_place_m: float = number(1.0, "m", "Placements closer than this are the same one, not alternatives.")
+    same_turn_rad: float = number(math.radians(3.0), "rad", "The same for their rotations.")
     same_building_min_score: float = number(
         0.4,
         "score",
-        "From this score on two maps show one building: pairs of the benchmark that do have 0.54 or more, "
+        "From this score on, two maps show the same building: in the benchmark such pairs have 0.54 or more, "
         "others 0.34 or less.",
     )
     parts_min_agreement: float = number(
         0.85,
         "share",
-        "So do parts of one that agree by this where both are explored: others do by 0.8 or less.",
+        "So do maps that agree by this where both are explored; other pairs agree by 0.8 or less.",
     )
-    parts_min_common_share: float = number(0.2, "share", "And have this share of the smaller one in common.")
+    parts_min_common_share: float = number(
+        0.2, "share", "For this, they must have this share of the smaller one in common."
+    )
     ambiguous_share: float = number(
-        0.85, "share", "Another placement with this share of the score leaves it open how the two lie."
+        0.85, "share", "With another placement at this share of the score, the alignment is ambiguous."
     )
     scaled_min_score: float = number(
         0.6,
         "score",
-        "A placement at another scale needs this: two buildings of the benchmark reach 0.43, one at two "
+        "Minimum score of a placement at another scale: different buildings reach 0.43, one building at two "
         "scales 0.93.",
     )
-    scale_min_change: float = number(0.03, "share", "Scales nearer to 1 are no other scale.")
+    scale_min_change: float = number(0.03, "share", "Scales closer to 1 do not count as another scale.")
     outside_share: float = number(
         0.01,
         "share",
-        "A building's sides leave out this share of its walls at each end: what was seen through a window.",
+        "Share of the walls at each side that is ignored for the building's extent: seen through windows.",
         0,
         0.49,
     )
     same_room_min_iou: float = number(
-        0.8, "share", "Rooms that overlap by this are the same: as in the tables of a run."
+        0.8, "share", "Rooms that overlap by this much are the same, as in the tables of a run."
     )
     pair_min_iou: float = number(
-        0.3, "share", "Rooms that overlap by less are no pair unless one is part of the other."
+        0.3, "share", "Rooms that overlap by less are not a pair, unless one is part of the other."
     )
     part_min_share: float = number(
-        0.5, "share", "A room is part of another when most of it lies in it: never of two at once."
+        0.5, "share", "A room is part of another room if most of it is inside: never of two at once."
     )
     explored_min_share: float = number(
-        0.5, "share", "A room is missing where the other run has explored most of its place."
+        0.5, "share", "A room is missing only if the other run has explored most of its area."
     )
     sample_m: float = number(
-        0.1, "m", "What is explored is looked up every so many meters: two cells of 5 cm.", 0.001
+        0.1, "m", "Spacing of the points at which explored areas are sampled: two cells of 5 cm.", 0.001
     )
     samples_max: int = number(
         250_000,
         "points",
-        "Most points looked up for one room; coarser in halls of more than 50 m.",
+        "Most such points per room; the spacing is larger in halls of more than 50 m.",
         100,
         10**9,
     )
     wall_step_m: float = number(
-        0.1, "m", "Walls are looked at every so many meters: two cells of 5 cm.", 0.001
+        0.1, "m", "Spacing of the points at which walls are examined: two cells of 5 cm.", 0.001
     )
     change_min_length_m: float = number(
-        0.5, "m", "Shorter stretches of wall are no change: the least jamb beside a door is as long."
+        0.5, "m", "Shorter stretches of wall are not a change: the length of the shortest jamb."
     )
     gap_max_m: float = number(
-        0.3, "m", "Stretches of one wall closer than this are one: furniture may hide it between them."
+        0.3, "m", "Stretches of one wall closer than this are joined: furniture may hide what is between."
     )
     beyond_m: float = number(
-        1.0, "m", "Walls are followed this far beyond their segments where cells are occupied."
+        1.0, "m", "Walls are followed this far beyond their segments as long as cells are occupied."
     )
     moved_max_m: float = number(
-        1.5, "m", "A new wall further from a missing one is another wall: less than the narrowest corridor."
+        1.5, "m", "A new wall within this distance of a missing one is the same, moved: less than a corridor."
     )
-    moved_max_turn_rad: float = number(math.radians(10.0), "rad", "And at most so much turned against it.")
+    moved_max_turn_rad: float = number(math.radians(10.0), "rad", "Largest angle between the two.")
     moved_min_overlap: float = number(
-        0.5, "share", "And beside at least this share of the shorter one: most of it."
+        0.5, "share", "Minimum share of the shorter one that is next to the other: most of it."
     )

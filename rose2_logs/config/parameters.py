@@ -35,19 +35,19 @@ class ReadingParameters(ParameterBlock):
     map_max_cells: int = number(
         2**27,
         "cells",
-        "Largest map that is read: 579 m squared at 5 cm; of an image 2.7 GB are needed.",
+        "Largest map that is read: 579 m by 579 m at 5 cm. Reading an image of this size takes 2.7 GB.",
         1,
         2**40,
     )
     chunk_max_bytes: int = number(
         2**28,
         "bytes",
-        "Largest chunk or message once decompressed: a largest map; usual is 1 MB.",
+        "Largest decompressed chunk or message: enough for the largest map; 1 MB is usual.",
         1024,
         2**40,
     )
     map_max_messages: int = number(
-        2_000_000, "messages", "Most messages of a map's topics: one a second for 23 days.", 1, 10**12
+        2_000_000, "messages", "Most map messages in a log: one per second for 23 days.", 1, 10**12
     )
 
 
@@ -65,12 +65,12 @@ class OccupancyParameters(ParameterBlock):
         19.6, "%", "Known cells below are free; map_server's default free_thresh.", 0, 100
     )
     working_resolution_m: float = number(
-        0.05, "m", "Finer maps are analyzed in blocks up to this size: SLAM's usual cell.", 0.0
+        0.05, "m", "Finer maps are analyzed in blocks of up to this size: the usual cell size of SLAM.", 0.0
     )
     analyzed_max_cells: int = number(
         20_000_000,
         "cells",
-        "Explored parts with more are analyzed in blocks; 220 m squared at 5 cm.",
+        "Explored areas with more cells are analyzed in blocks: 220 m by 220 m at 5 cm.",
         10_000,
         2**40,
     )
@@ -86,14 +86,25 @@ class SpectrumParameters(ParameterBlock):
         ("threshold_min", "threshold_max"),
     )
 
-    wall_sigma_m: float = number(0.06, "m", "Walls in SLAM maps wobble by about one cell of 5 cm.", 0.001)
+    wall_sigma_m: float = number(
+        0.06, "m", "Walls in SLAM maps deviate from a line by about one cell of 5 cm.", 0.001
+    )
     wall_sigma_min_cells: float = number(
-        0.5, "cells", "Blur of coarse maps, whose cells are wider than the wobble: less leaves steps.", 0.1
+        0.5,
+        "cells",
+        "Blur of coarse maps, whose cells are larger than this deviation: less leaves steps.",
+        0.1,
     )
     longest_wave_m: float = number(10.0, "m", "Longer waves show the building's outline, not its walls.", 0.1)
-    shortest_wave_m: float = number(0.25, "m", "Shorter waves show the raster (five cells of 5 cm).", 0.001)
+    shortest_wave_m: float = number(
+        0.25, "m", "Shorter waves show the grid itself (five cells of 5 cm).", 0.001
+    )
     angle_step_rad: float = number(
-        math.radians(0.25), "rad", "A wall of 10 m leaves its line by less than a cell.", 1e-4, 0.2
+        math.radians(0.25),
+        "rad",
+        "Over 10 m of wall, an error of half a step is less than a cell.",
+        1e-4,
+        0.2,
     )
     angle_sigma_rad: float = number(
         math.radians(0.75), "rad", "Smoothing of the angular energy, three bins.", 0.0, 0.2
@@ -101,7 +112,7 @@ class SpectrumParameters(ParameterBlock):
     peak_min_prominence: float = number(
         0.12,
         "share of the range",
-        "A direction's peak stands out by this much: one wing of a building.",
+        "A direction's peak must stand out by this much: enough for one wing of a building.",
         0,
         1,
     )
@@ -111,24 +122,29 @@ class SpectrumParameters(ParameterBlock):
     structure_length_m: float = number(
         4.0,
         "m",
-        "Length of wall over which a cell gathers its score: a room's side, more than furniture.",
+        "Length of wall that contributes to a cell's score: the side of a room, longer than furniture.",
         0.01,
     )
-    piece_max_gap_m: float = number(0.25, "m", "Occupied cells hang together over gaps of five cells.", 0.0)
+    piece_max_gap_m: float = number(
+        0.25, "m", "Occupied cells belong together across gaps of up to five cells.", 0.0
+    )
     piece_min_extent_m: float = number(
-        1.6, "m", "Pieces longer than a door is wide may be walls by themselves.", 0.0
+        1.6, "m", "Pieces longer than a door is wide may be walls on their own.", 0.0
     )
     piece_min_score: float = number(
-        0.5, "score", "Shorter pieces are walls where this share of the line through them is wall.", 0, 1
+        0.5, "score", "Shorter pieces are walls if this share of the line through them is wall.", 0, 1
     )
-    threshold_min: float = number(0.25, "score", "Least threshold of the clean map that is tried.", 0, 1)
-    threshold_max: float = number(0.85, "score", "Greatest threshold of the clean map that is tried.", 0, 1)
+    threshold_min: float = number(0.25, "score", "Lowest threshold that is tried for the clean map.", 0, 1)
+    threshold_max: float = number(0.85, "score", "Highest threshold that is tried for the clean map.", 0, 1)
     threshold_step: float = number(0.05, "score", "Step of the search for the threshold.", 0.001, 1)
     attached_share: float = number(
-        0.5, "share", "Cells of this share of the threshold that touch the clean map are wall too.", 0, 1
+        0.5, "share", "Cells with this share of the threshold next to the clean map are walls, too.", 0, 1
     )
     walls_max_per_m2: float = number(
-        0.15, "1/m2", "Wall clusters per free area of a clean map; empty floor plans have about 0.1.", 0.0
+        0.15,
+        "1/m2",
+        "Most wall clusters per free area in the clean map; empty floor plans have about 0.1.",
+        0.0,
     )
 
 
@@ -141,29 +157,36 @@ class WallParameters(ParameterBlock):
     segment_min_length_m: float = number(0.4, "m", "Shortest segment: a wall beside a door.", 0.01)
     segment_max_gap_m: float = number(0.25, "m", "Gap bridged within a segment; the paper's 5 cells.", 0.0)
     segment_cover_cells: float = number(
-        1.5, "cells", "Cells of a line this near cover what is between them: a diagonal, rounded up.", 1.0
+        1.5,
+        "cells",
+        "Cells along a line that are this close cover the gap between them: a diagonal, rounded up.",
+        1.0,
     )
     segment_min_fill: float = number(
-        0.6, "share", "Least share of a segment that cells cover: more than half is wall.", 0, 1
+        0.6, "share", "Minimum share of a segment that is covered by occupied cells: more than half.", 0, 1
     )
     direction_tolerance_rad: float = number(
-        math.radians(6.0), "rad", "A segment this near to a dominant direction follows it.", 0.0, 0.8
+        math.radians(6.0), "rad", "A segment within this angle of a dominant direction follows it.", 0.0, 0.8
     )
     local_direction_step_rad: float = number(
         math.pi / 36, "rad", "Curved walls are approximated by chords every 5 degrees.", 0.02, 0.8
     )
     cluster_lateral_m: float = number(0.15, "m", "Offset within one wall cluster: a wall's thickness.", 0.01)
-    cluster_gap_m: float = number(0.6, "m", "Gap along one wall cluster: furniture before a wall.", 0.01)
+    cluster_gap_m: float = number(0.6, "m", "Gap along one wall cluster: furniture in front of a wall.", 0.01)
     local_segment_min_length_m: float = number(
-        1.2, "m", "Off the dominant directions only walls longer than most furniture count.", 0.01
+        1.2, "m", "Away from the dominant directions, only walls longer than most furniture count.", 0.01
     )
     line_lateral_m: float = number(0.2, "m", "Both faces of one wall share a representative line.", 0.0)
     extension_m: float = number(
-        8.0, "m", "A wall may go on unseen for a room's width beyond its evidence.", 0.0
+        8.0, "m", "A wall may continue unseen for the width of a room beyond its segments.", 0.0
     )
     local_extension_m: float = number(1.0, "m", "A chord of a curved wall reaches to the next chord.", 0.0)
-    extension_per_length: float = number(4.0, "1", "A short wall reaches no further than this times itself.")
-    line_min_weight: float = number(0.1, "share", "Least covered share of a line; the paper's value.", 0, 1)
+    extension_per_length: float = number(
+        4.0, "1", "A line extends beyond its wall by at most this many times the wall's length."
+    )
+    line_min_weight: float = number(
+        0.1, "share", "Minimum share of a line that is covered by walls; the paper's value.", 0, 1
+    )
 
 
 @dataclass(frozen=True, repr=False)
@@ -173,19 +196,20 @@ class FloorPlanParameters(ParameterBlock):
     block: ClassVar[str] = "floor_plan"
 
     wall_tolerance_m: float = number(
-        0.15, "m", "A wall counts for an edge when it lies this near: a wall's half thickness and drift.", 0.0
+        0.15, "m", "A wall counts for an edge within this distance: half a wall's thickness, plus drift.", 0.0
     )
     blind_look_m: float = number(
         0.4,
         "m",
-        "A wall is blind with no free space this near behind it, more than its thickness; 0: none is.",
+        "A wall without free space within this distance behind it hides what is there; more than its "
+        "thickness; 0 turns this off.",
         0.0,
     )
     frame_margin_m: float = number(
-        1.0, "m", "The plane is cut this far around the map, so that its outer walls lie inside.", 0.01
+        1.0, "m", "The frame around the map is this far away, so that the outer walls are inside.", 0.01
     )
     face_min_seen: float = number(
-        0.1, "share", "A face less seen than this is outside: it holds rays through windows.", 0, 1
+        0.1, "share", "A face seen less than this is outside: it was seen by rays through windows.", 0, 1
     )
     shape_min_seen: float = number(
         0.2, "share", "A face seen this much belongs to its room's predicted shape; the paper's value.", 0, 1
@@ -196,41 +220,58 @@ class FloorPlanParameters(ParameterBlock):
         "How faces are joined to rooms: by whole borders, or pair by pair with DBSCAN as in the paper.",
     )
     known_power: float = number(
-        2.0, "1", "Of a face seen by half three quarters behind its walls are unknown: 1 - 0.5^2.", 0.1, 10
+        2.0,
+        "1",
+        "Of a half seen face, three quarters of what is behind its walls is unknown: 1 - 0.5^2.",
+        0.1,
+        10,
     )
     dbscan_max_weight: float = number(
         0.24, "share", "DBSCAN joins faces with edges up to this weight: exp(-w / 0.125) = 0.15.", 0, 1
     )
     join_min_openness: float = number(
-        0.7, "share", "Faces join when at least this share of their known border is open.", 0, 1
+        0.7, "share", "Faces are joined if at least this share of their known border is open.", 0, 1
     )
-    join_min_open_m: float = number(0.15, "m", "Least open border for faces to join: three cells of 5 cm.")
+    join_min_open_m: float = number(
+        0.15, "m", "Minimum open border for faces to be joined: three cells of 5 cm."
+    )
     join_min_passage: float = number(
-        0.7, "1", "Faces join when the passage is this wide against the narrower one's width.", 0
+        0.7,
+        "1",
+        "Faces are joined if the passage between them is this wide relative to the narrower face.",
+        0,
     )
     passage_wide: float = number(
-        2.0, "1", "Passages wider than this against the room join no sooner than those as wide.", 0.1
+        2.0,
+        "1",
+        "Passages wider than this, relative to the room, are not preferred over those of this width.",
+        0.1,
     )
     passage_look_widths: float = number(
-        2.0, "1", "How far from a passage its width is compared with the room's, in widths.", 0.0
+        2.0, "1", "Distance from a passage at which its width is compared with the room's, in widths.", 0.0
     )
-    passage_look_max_m: float = number(3.0, "m", "The same at most: half a large room.", 0.0)
+    passage_look_max_m: float = number(3.0, "m", "Upper limit of this distance: half a large room.", 0.0)
     passage_look_points: int = number(
-        3, "points", "Points of a passage from which the room is looked at: its quarters.", 1, 100
+        3, "points", "Points of a passage from which the width of the room is measured: its quarters.", 1, 100
     )
-    passage_look_samples: int = number(25, "samples", "Samples of a look; at 3 m one every 12 cm.", 2, 10_000)
+    passage_look_samples: int = number(
+        25, "samples", "Samples per measurement: at 3 m one every 12 cm.", 2, 10_000
+    )
     doorway_max_width_m: float = number(
         2.0, "m", "A gap in a wall up to this width is a doorway: a double door.", 0.0
     )
-    jamb_length_m: float = number(0.5, "m", "Wall beside a gap that makes it one: a jamb.", 0.01)
-    jamb_min_fill: float = number(0.6, "share", "Least share of a jamb that walls cover.", 0, 1)
+    jamb_length_m: float = number(0.5, "m", "Wall next to a gap that makes it a doorway: a jamb.", 0.01)
+    jamb_min_fill: float = number(0.6, "share", "Minimum share of a jamb that is covered by walls.", 0, 1)
     leak_max_width_m: float = number(
-        0.5, "m", "Free space outside rooms that is narrower is rays; wider it is part of a room.", 0.0
+        0.5,
+        "m",
+        "Narrower free space outside rooms was seen by single rays; wider free space is part of a room.",
+        0.0,
     )
     border_strip_m: float = number(
-        0.25, "m", "Strips of a room narrower than this, along a wall's other side, change room.", 0.0
+        0.25, "m", "Narrower strips of a room on the other side of a wall go to the room there.", 0.0
     )
-    room_min_area_m2: float = number(3.0, "m2", "Smaller pieces of free space are no rooms.", 0.0)
+    room_min_area_m2: float = number(3.0, "m2", "Smaller pieces of free space are not rooms.", 0.0)
     room_min_clearance_m: float = number(0.6, "m", "Half the width of the narrowest room.", 0.0)
 
 
@@ -243,25 +284,31 @@ class TopologyParameters(ParameterBlock):
     clearance_blur_cells: float = number(
         1.0,
         "cells",
-        "Blur of the clearance, so that the raster's steps are no summits of their own.",
+        "Blur of the clearance, so that steps of the grid do not become summits.",
         0.1,
         100,
     )
     summit_reach_m: float = number(
-        0.15, "m", "A summit of the clearance is the highest this far around: a wall's thickness.", 0.0
+        0.15, "m", "A summit is the point of highest clearance within this distance: a wall's thickness.", 0.0
     )
     passage_min_ratio: float = number(
-        0.2, "share", "A passage joins with this share of the clearance beside it; gaps have less.", 0, 1
+        0.2,
+        "share",
+        "A passage with at least this share of the clearance next to it joins; gaps in walls have less.",
+        0,
+        1,
     )
     split_min_clearance_m: float = number(
-        0.5, "m", "Parts narrower on both sides of their middle are niches.", 0.0
+        0.5, "m", "Parts with less clearance on both sides of their center line are niches.", 0.0
     )
-    split_min_area_m2: float = number(3.0, "m2", "Smaller parts are niches: the least room.", 0.0)
+    split_min_area_m2: float = number(
+        3.0, "m2", "Smaller parts are niches: the area of the smallest room.", 0.0
+    )
     split_min_purity: float = number(0.98, "share", "A cut leaves this share of each part on its side.", 0, 1)
     cut_tail_share: float = number(
         0.02,
         "share",
-        "A cut lies midway between two parts but for this share of each, their fringes.",
+        "A cut is midway between two parts, ignoring this share of each at its fringe.",
         0,
         0.5,
     )
@@ -270,22 +317,25 @@ class TopologyParameters(ParameterBlock):
     doorway_gap_cells: float = number(
         2.9,
         "cells",
-        "Contacts of two rooms this near are one doorway: a cell may be missing between them.",
+        "Contacts of two rooms this close are one doorway: a cell may be missing between them.",
         1.0,
     )
 
 
 @dataclass(frozen=True, repr=False)
 class QualityParameters(ParameterBlock):
-    """How sure the rooms of a map are: how much of their outlines is wall."""
+    """How certain the rooms of a map are: how much of their outlines is supported by walls."""
 
     block: ClassVar[str] = "quality"
 
     outline_step_m: float = number(
-        0.1, "m", "Outlines are looked at every so many meters: two cells of 5 cm.", 0.001
+        0.1, "m", "Spacing of the points at which outlines are examined: two cells of 5 cm.", 0.001
     )
     wall_reach_m: float = number(
-        0.2, "m", "Occupied cells this near support an outline, which runs in the middle of walls.", 0.0
+        0.2,
+        "m",
+        "Occupied cells within this distance support an outline, which runs along the center of walls.",
+        0.0,
     )
 
 
@@ -299,91 +349,104 @@ class TrackingParameters(ParameterBlock):
     )
 
     match_min_iou: float = number(
-        0.2, "share", "Least overlap for a room to continue a track; half-seen rooms double in size.", 0, 1
+        0.2, "share", "Minimum overlap for a room to continue a track; half seen rooms double in size.", 0, 1
     )
     part_min_share: float = number(
-        0.5, "share", "A room is part of another when most of it lies in it: never of two at once.", 0, 1
+        0.5, "share", "A room is part of another room if most of it is inside: never of two at once.", 0, 1
     )
     match_power: int = number(
-        2, "1", "Pairs are weighed by this power of their overlap: one good pair beats two poor ones.", 1, 10
+        2,
+        "1",
+        "Pairs are weighted by this power of their overlap, so that one good pair beats two poor ones.",
+        1,
+        10,
     )
     shapes_kept: int = number(
-        3, "shapes", "Shapes by which a track is known: whole, part, and as it was seen before.", 1, 1000
+        3, "shapes", "Shapes that a track remembers: the whole room, part of it, and an earlier one.", 1, 1000
     )
-    shape_same_iou: float = number(0.8, "share", "A shape like one in memory by this takes its place.", 0, 1)
+    shape_same_iou: float = number(
+        0.8, "share", "A shape that overlaps a remembered one by this much replaces it.", 0, 1
+    )
     lost_kept: int = number(
-        500, "tracks", "Lost rooms that may return; some kilobytes each, the longest lost go first."
+        500,
+        "tracks",
+        "Lost rooms that are remembered, a few kilobytes each; those lost longest are dropped first.",
     )
     shift_min_m: float = number(
-        0.1, "m", "The whole map moved when its walls did by this on average: two cells of 5 cm.", 0.0
+        0.1, "m", "The whole map has moved if its walls moved by this on average: two cells of 5 cm.", 0.0
     )
     shift_search_m: float = number(
-        2.0, "m", "How far the whole map may leap in a loop closure and still be laid over itself.", 0.0, 50
+        2.0, "m", "Largest shift of the whole map, as in a loop closure, that is searched.", 0.0, 50
     )
-    shift_search_rad: float = number(math.radians(5.0), "rad", "How far it may turn, likewise.", 0.0, math.pi)
+    shift_search_rad: float = number(
+        math.radians(5.0), "rad", "Largest rotation of the whole map that is searched.", 0.0, math.pi
+    )
     shift_min_share: float = number(
-        0.5, "share", "A motion of the map is believed when it brings most of its walls together.", 0, 1
+        0.5, "share", "A motion of the map is accepted if it makes most walls coincide.", 0, 1
     )
     back_projected_min_area_m2: float = number(
-        1.5, "m2", "A lesser glimpse of a room of the last map is no room yet: half the least room.", 0.0
+        1.5,
+        "m2",
+        "Smaller pieces of a room of the last map do not count as the room yet: half the smallest room.",
+        0.0,
     )
     fit_points: int = number(
         2000,
         "points",
-        "Wall cells that are laid over the next map, evenly taken: enough for millimeters.",
+        "Wall cells, evenly sampled, that are aligned with the next map: enough for millimeters.",
         3,
         10**6,
     )
     fit_min_points: int = number(
-        50, "points", "Fewer wall cells do not tell how a map lies: two meters of wall.", 3, 10**6
+        50, "points", "Fewer wall cells cannot determine the alignment: two meters of wall.", 3, 10**6
     )
     fit_neighbors: int = number(
-        12, "points", "Wall cells around one that tell how the wall runs: half a meter of it.", 2, 1000
+        12, "points", "Neighboring wall cells that give the direction of a wall: half a meter of it.", 2, 1000
     )
     fit_gate_1_m: float = number(
         0.5,
         "m",
-        "How far a wall's nearest wall may be in the fit's first step: a loop closure's leap.",
+        "Distance of corresponding walls in the fit's first step, at most: a loop closure's jump.",
         0.001,
     )
     fit_gate_2_m: float = number(0.3, "m", "The same in its second step.", 0.001)
     fit_gate_3_m: float = number(0.2, "m", "The same in its third step.", 0.001)
     fit_gate_4_m: float = number(0.1, "m", "The same in its last step: drift.", 0.001)
     fit_gate_min_cells: float = number(
-        2.0, "cells", "Every gate is at least this wide: a wall's two faces, and its wobble."
+        2.0, "cells", "Minimum of all these distances: the two faces of a wall, plus noise."
     )
     fit_damping: float = number(
         1e-3,
         "share",
-        "Share of the walls that must stand across a direction to tell the shift along it.",
+        "Share of the walls that must be perpendicular to a direction to determine the shift along it.",
         1e-9,
     )
     fit_max_rounds: int = number(
-        8, "rounds", "Rounds of each step of the fit; it has settled before.", 1, 1000
+        8, "rounds", "Most iterations of each step of the fit; it converges earlier.", 1, 1000
     )
-    fit_settled_m: float = number(1e-4, "m", "The fit has settled when no point moves further.")
+    fit_settled_m: float = number(1e-4, "m", "The fit has converged when no point moves further than this.")
     fit_sure_share: float = number(
-        0.75, "share", "With this share of the walls brought together no other position is searched."
+        0.75, "share", "If this share of the walls coincides, no other position is searched."
     )
     fit_better_share: float = number(
-        0.05, "share", "A map moved when that brings this share more of its walls together than staying does."
+        0.05, "share", "A map has moved if this share more of its walls coincide than without the motion."
     )
-    search_points: int = number(
-        500, "points", "Wall cells that the search among many positions tries.", 3, 10**6
+    search_points: int = number(500, "points", "Wall cells used in the search over many positions.", 3, 10**6)
+    search_raster_m: float = number(0.1, "m", "Cell size of the grid on which positions are searched.", 0.01)
+    search_step_m: float = number(
+        0.3, "m", "Step of the search: less than the largest distance in the fit's first step.", 0.01
     )
-    search_raster_m: float = number(0.1, "m", "Cells of the raster on which positions are searched.", 0.01)
-    search_step_m: float = number(0.3, "m", "Step of the search, which the fit's first gate bridges.", 0.01)
     search_candidates: int = number(
-        5, "positions", "The best positions of the search, which are fitted.", 1, 1000
+        5, "positions", "Number of best positions of the search that are refined by the fit.", 1, 1000
     )
     settled_area_tolerance: float = number(
-        0.1, "share", "A room has its last area when it is within this share of it."
+        0.1, "share", "The area of a room has settled when it is within this share of its last area."
     )
     last_shape_min_iou: float = number(
-        0.8, "share", "A room has its last shape from this overlap on: walls a few decimeters off in 5 m."
+        0.8, "share", "A room's shape is right from this overlap with its last one on: decimeters off in 5 m."
     )
     final_min_share: float = number(
-        0.9, "share", "The layout is final when this share of it is in rooms of their last shape."
+        0.9, "share", "The layout is final when this share of it is in rooms whose shape is right."
     )
 
 

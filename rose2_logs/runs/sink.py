@@ -69,7 +69,7 @@ class Sink:
     Attributes
     ----------
     facts : mapping
-        JSON values that ``summary.json`` is to hold, read after `finish`.
+        JSON values that ``summary.json`` is to hold, under names of their own; read after `finish`.
 
     Examples
     --------
@@ -102,7 +102,7 @@ class Sink:
         """Make the output whole: write it beside its final name first, then rename it."""
 
     def abandon(self) -> None:
-        """Remove what was begun; the run has failed. Called once at most, and also if `begin` failed."""
+        """Remove what was begun, if anything: the run has failed. Called once at most."""
 
 
 @contextmanager

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from rose2_logs.config.parameters import OccupancyParameters, Parameters
-from rose2_logs.errors import ParameterError, ResultsError
+from rose2_logs.errors import InvalidMapError, ParameterError, ResultsError
 from rose2_logs.io.discovery import ANNOTATED_ENDING
 from rose2_logs.model.analysis import Walls
 from rose2_logs.model.occupancy import GridGeometry
@@ -198,15 +198,30 @@ class StoredRun:
         return {name: values[place] for name, values in self.columns.items()}
 
     def geometry(self, snapshot: int) -> GridGeometry:
-        """Where the grid of a map lies."""
+        """Where the grid of a map lies.
+
+        Raises
+        ------
+        ResultsError
+            If the grid is none, or larger than the run could have read.
+        """
         row = self.row(snapshot)
-        return GridGeometry(
-            float(row["resolution_m"]),
-            (float(row["origin_x_m"]), float(row["origin_y_m"])),
-            float(row["yaw_rad"]),
-            str(row["frame_id"]),
-            (int(row["height_cells"]), int(row["width_cells"])),
-        )
+        path = self.folder / "snapshots.parquet"
+        shape = int(row["height_cells"]), int(row["width_cells"])
+        most = self.parameters.reading.map_max_cells
+        if min(shape) < 1 or shape[0] * shape[1] > most:
+            text = f"{path}: map {snapshot} cannot have {shape[0]} x {shape[1]} cells; {MAKE_AGAIN}"
+            raise ResultsError(text, file=path)
+        try:
+            return GridGeometry(
+                float(row["resolution_m"]),
+                (float(row["origin_x_m"]), float(row["origin_y_m"])),
+                float(row["yaw_rad"]),
+                str(row["frame_id"]),
+                shape,
+            )
+        except InvalidMapError as error:
+            raise ResultsError(f"{path}: map {snapshot}: {error}; {MAKE_AGAIN}", file=path) from error
 
     def drift(self, snapshot: int) -> RigidMotion:
         """How the whole map moved from the run's first map to this one."""

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from rose2_logs.errors import OutputError
 from rose2_logs.runs.history import RunSummary, median_of
 from rose2_logs.runs.sink import RunInfo
 from rose2_logs.system.files import replacing
@@ -57,7 +58,7 @@ def write_summary(
     Raises
     ------
     OutputError
-        If the file cannot be written.
+        If the file cannot be written, or a fact has the name of another entry or is no JSON value.
     """
     totals = summary.totals
     content = {
@@ -85,7 +86,6 @@ def write_summary(
         },
         "layout": _layout(summary),
         "files": files,
-        **facts,
         "seconds": {
             "run": seconds,
             "workers": workers,
@@ -93,7 +93,9 @@ def write_summary(
             "stages_max": totals.stage_seconds_max,
         },
     }
-    write_json(path, content)
+    if taken := sorted(facts.keys() & content.keys()):
+        raise OutputError(f"{path}: a sink has a fact named {taken[0]!r}, which the summary itself has")
+    write_json(path, content | dict(facts))
 
 
 def _layout(summary: RunSummary) -> dict[str, Any]:
@@ -124,5 +126,9 @@ def write_json(path: Path, value: Any) -> None:
     OutputError
         If the file cannot be written.
     """
+    try:
+        text = json.dumps(value, indent=2, ensure_ascii=False)
+    except (TypeError, ValueError) as error:
+        raise OutputError(f"{path}: cannot be written: {error}") from error
     with replacing(path) as part:
-        part.write_text(json.dumps(value, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+        part.write_text(f"{text}\n", encoding="utf-8")

@@ -51,22 +51,22 @@ _SNAPSHOT: dict[str, tuple[pa.DataType, str]] = {
 _EVIDENCE: dict[str, tuple[pa.DataType, str]] = {
     "wall_support": (
         pa.float64(),
-        "share of the outline, with its predicted part, that occupied cells back; doorways are not backed",
+        "share of the outline, including its predicted part, supported by occupied cells; doorways are not",
     ),
-    "frontier_m": (pa.float64(), "open frontier: sides of its free cells towards unknown ones, meters"),
+    "frontier_m": (pa.float64(), "open frontier: border of its free cells to unknown ones, meters"),
 }
 
 _SNAPSHOTS_ALONG: dict[str, tuple[pa.DataType, str]] = {
     **_SNAPSHOT,
     "stamp_ns": (pa.int64(), "header stamp of the map, nanoseconds"),
     "time_s": (pa.float64(), "log time since the first snapshot, seconds"),
-    "coverage": (pa.float64(), "known free area over that of the run's last map, share in [0, 1]"),
+    "coverage": (pa.float64(), "known free area divided by that of the run's last map, in [0, 1]"),
     "free_area_m2": (pa.float64(), "known free area, square meters"),
     "rooms": (pa.int32(), "number of rooms"),
-    "rooms_area_m2": (pa.float64(), "area of all rooms as far as they were seen, square meters"),
+    "rooms_area_m2": (pa.float64(), "area seen of all rooms, square meters"),
     "rooms_predicted_area_m2": (
         pa.float64(),
-        "area of all rooms with their predicted parts, square meters",
+        "area of all rooms including their predicted parts, square meters",
     ),
     "doorways": (pa.int32(), "number of doorways between rooms"),
     "directions_rad": (
@@ -77,12 +77,13 @@ _SNAPSHOTS_ALONG: dict[str, tuple[pa.DataType, str]] = {
     "wall_segments": (pa.int32(), "number of wall segments"),
     "lines": (pa.int32(), "number of representative lines"),
     "faces": (pa.int32(), "number of faces"),
-    "repeats_before": (pa.int32(), "identical maps dropped since the snapshot before"),
+    "repeats_before": (pa.int32(), "identical maps dropped since the previous snapshot"),
     "frame_id": (pa.string(), "name of the world frame"),
     "resolution_m": (pa.float64(), "side of a cell, meters"),
     "analyzed_resolution_m": (
         pa.float64(),
-        "side of the cells that the map was analyzed in, meters: larger for maps that are very fine or large",
+        "cell size at which the map was analyzed, meters; larger than resolution_m if that is very fine, "
+        "or the map very large",
     ),
     "origin_x_m": (pa.float64(), "world x of the grid's origin, meters"),
     "origin_y_m": (pa.float64(), "world y of the grid's origin, meters"),
@@ -97,11 +98,14 @@ _SNAPSHOTS_ALONG: dict[str, tuple[pa.DataType, str]] = {
     ),
     "changed_share": (
         pa.float64(),
-        "share of this floor that is in a room of another track than in the map before",
+        "share of this floor whose track is not the one of the previous map",
     ),
-    "drift_x_m": (pa.float64(), "where the first map's frame lies now: x of its origin, meters"),
+    "drift_x_m": (pa.float64(), "position of the first map's frame in this map: x of its origin, meters"),
     "drift_y_m": (pa.float64(), "y of its origin, meters"),
-    "drift_yaw_rad": (pa.float64(), "its turn, radians counter-clockwise; changes with shifted events"),
+    "drift_yaw_rad": (
+        pa.float64(),
+        "rotation of that frame, radians counter-clockwise; changes with shifted events",
+    ),
 }
 
 SNAPSHOTS_ALONG = _table(_SNAPSHOTS_ALONG)
@@ -112,8 +116,8 @@ SNAPSHOTS = _table(
         **_SNAPSHOTS_ALONG,
         "final_iou": (
             pa.float64(),
-            "mean intersection over union of the last map's rooms with their shape in this one, by area; "
-            "0 for a room that is not there yet",
+            "mean intersection over union of the last map's rooms with their shapes in this map, weighted by "
+            "area; 0 for a room that does not exist yet",
         ),
         "final_share": (
             pa.float64(),
@@ -136,10 +140,13 @@ ROOMS = _table(
         **_SNAPSHOT,
         "track": (pa.int32(), "number of the room over the run, from 1"),
         "room": (pa.int32(), "number of the room in this snapshot, from 1"),
-        "area_m2": (pa.float64(), "area as far as it was seen, square meters"),
-        "predicted_area_m2": (pa.float64(), "area of the polygon, with the predicted part, square meters"),
-        "label_x_m": (pa.float64(), "world x of a point well inside what was seen of the room, meters"),
-        "label_y_m": (pa.float64(), "world y of a point well inside what was seen of the room, meters"),
+        "area_m2": (pa.float64(), "area seen, square meters"),
+        "predicted_area_m2": (
+            pa.float64(),
+            "area of the polygon, including the predicted part, square meters",
+        ),
+        "label_x_m": (pa.float64(), "world x of a point well inside the part seen, meters"),
+        "label_y_m": (pa.float64(), "world y of the same point, meters"),
         "neighbors": (pa.list_(pa.int32()), "tracks of the rooms behind its doorways, ascending"),
         **_EVIDENCE,
         "polygon_wkb": (pa.binary(), "shape with the predicted part, well-known binary, world meters"),
@@ -153,16 +160,16 @@ EVENTS = _table(
         "kind": (pa.string(), "shifted, continued, returned, born, split, merged or lost"),
         "track": (
             pa.int32(),
-            "the track that it is about; of a merge the one that stays; 0 where the whole map shifted",
+            "the track concerned; for a merge the one that remains; 0 if the whole map shifted",
         ),
         "others": (pa.list_(pa.int32()), "tracks of the parts of a split, tracks that a merge ended"),
         "overlap_iou": (
             pa.float64(),
             "intersection over union with the track's last shape, share; 0 for none",
         ),
-        "shift_x_m": (pa.float64(), "of a shift, how far the middle of the walls moved: x, meters"),
+        "shift_x_m": (pa.float64(), "for a shift, how far the center of the walls moved in x, meters"),
         "shift_y_m": (pa.float64(), "y, meters"),
-        "turn_rad": (pa.float64(), "and how far the map turned about it, radians counter-clockwise"),
+        "turn_rad": (pa.float64(), "rotation of the map about that center, radians counter-clockwise"),
     }
 )
 
@@ -186,7 +193,7 @@ BACK_PROJECTED = _table(
         "area_m2": (pa.float64(), "area of it that this map shows, square meters"),
         "last_area_share": (
             pa.float64(),
-            "that over its area in the last map; above 1 where a later map lost some",
+            "this area divided by the room's area in the last map; above 1 if later maps lost some of it",
         ),
     }
 )
@@ -216,11 +223,11 @@ TRACKS = _table(
         "shape_right_coverage": (pa.float64(), "coverage then, share in [0, 1]"),
         "shape_right_seen_share": (
             pa.float64(),
-            "area seen of it then over its last: how early the prediction was right; low is early",
+            "area seen by then divided by its last area: the lower, the earlier the prediction was right",
         ),
         **_EVIDENCE,
         "splits": (pa.int32(), "how often it was split"),
-        "merges": (pa.int32(), "how often it took in others"),
+        "merges": (pa.int32(), "how often it absorbed other tracks"),
         "losses": (pa.int32(), "how often it was lost"),
         "polygon_wkb": (pa.binary(), "its last shape, well-known binary, world meters"),
     },

@@ -176,3 +176,16 @@ def test_sinks_are_not_called_if_the_run_cannot_begin(log: Path, tmp_path: Path)
     with pytest.raises(OutputError, match="already exists"):
         rl.analyze(log, tmp_path / "out", sinks=[sink])
     assert sink.calls == []
+
+
+@pytest.mark.parametrize("facts", [{"results": {}}, {"mine": {1, 2}}])
+def test_facts_that_the_summary_cannot_hold_are_one_line(log: Path, tmp_path: Path, facts):
+    """A name that it has itself, and values that are not JSON; no folder is made."""
+
+    class Fact(rl.Sink):
+        def write(self, step: rl.TrackedSnapshot) -> None:
+            self.facts = facts
+
+    with pytest.raises(OutputError, match=r"summary\.json"):
+        rl.analyze(log, tmp_path / "out", sinks=[Fact()], recording=False, annotated_log=False)
+    assert not (tmp_path / "out").exists()
