@@ -230,7 +230,7 @@ def segment(
     >>> grid[[10, 11, 108, 109], 10:190] = 100
     >>> grid[50:70, 99:101] = 0
     >>> rl.segment(grid, resolution_m=0.05).rooms
-    RoomMap(2 rooms, 1 doorways, 200 x 120 cells of 0.05 m)
+    RoomMap(2 rooms, 1 doorway, 200 x 120 cells of 0.05 m)
     """
     if isinstance(map_, OccupancySnapshot):
         snapshot = map_

@@ -12,6 +12,7 @@ from shapely.geometry.base import BaseGeometry
 
 from rose2_logs.model.labels import label_sizes
 from rose2_logs.model.occupancy import FloatArray, GridGeometry
+from rose2_logs.system.text import counted
 
 LABEL_DEPTH_SHARE = 0.8
 """A label stands at most this much less deep than its room is at most: along a corridor in the middle."""
@@ -78,7 +79,8 @@ class RoomMap:
     doorways: tuple[Doorway, ...] = ()
 
     def __repr__(self) -> str:
-        return f"RoomMap({len(self)} rooms, {len(self.doorways)} doorways, {self.geometry.size_text})"
+        rooms, doorways = counted(len(self), "room"), counted(len(self.doorways), "doorway")
+        return f"RoomMap({rooms}, {doorways}, {self.geometry.size_text})"
 
     def __post_init__(self) -> None:
         labels = self.labels.view()

@@ -1,4 +1,4 @@
-"""Percentages as text."""
+"""Numbers as text."""
 
 from __future__ import annotations
 
@@ -24,3 +24,14 @@ def percent(share: float, unit: str = "%") -> str:
     if share < 1 and text == "100":
         text = f"{min(100 * share, 99.9):.1f}"
     return text + unit
+
+
+def counted(number: int, noun: str) -> str:
+    """Return how many there are of something.
+
+    Examples
+    --------
+    >>> counted(1, "room"), counted(2, "room")
+    ('1 room', '2 rooms')
+    """
+    return f"{number} {noun}{'' if number == 1 else 's'}"

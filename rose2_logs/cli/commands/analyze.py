@@ -110,7 +110,7 @@ def print_run(result: RunResult) -> None:
         span_ns = (totals.last_log_time_ns or 0) - (totals.first_log_time_ns or 0)
         if totals.snapshots > 1 and since.time_s == span_ns / 1e9:
             in_the_end = "only in the last map: take the rooms as preliminary"
-        table.add_row("layout as in the end", in_the_end)
+        table.add_row("layout final", in_the_end)
     if result.warnings.count:
         kinds = ", ".join(f"{found.count} {kind}" for kind, found in result.warnings.kinds.items())
         table.add_row("warnings", f"{kinds}; see warnings in summary.json")

@@ -9,7 +9,7 @@ from rose2_logs.model.room_quality import UNSURE_SIGN, is_unsure
 from rose2_logs.outputs.rerun.blueprint import COVERAGE_UNIT
 from rose2_logs.runs.history import RunSummary
 from rose2_logs.runs.sink import RunInfo
-from rose2_logs.system.text import percent
+from rose2_logs.system.text import counted, percent
 from rose2_logs.tracking.track_history import SnapshotRef, TrackHistories
 
 NAMED_MOST = 6
@@ -33,8 +33,8 @@ def summary_text(info: RunInfo, summary: RunSummary) -> str:
     rooms = len(histories.in_last_map)
     text = [
         f"# {_cell(info.log_path.name)}",
-        f"**{rooms} room{'' if rooms == 1 else 's'}** at the end, {len(histories.tracks)} over the run; "
-        f"{maps} map{'' if maps == 1 else 's'}{minutes}.",
+        f"**{counted(rooms, 'room')}** at the end, {len(histories.tracks)} over the run; "
+        f"{counted(maps, 'map')}{minutes}.",
     ]
     final = summary.layout_final
     last = None if maps == 1 or histories.last is None else histories.last.snapshot
