@@ -52,7 +52,7 @@ class Convergence:
         By snapshot, the mean overlap of the last layout's rooms with their shape then, by area; None where
         the last map has no room.
     final_share : dict
-        By snapshot, the share of the last layout's area that was in rooms of their last shape.
+        By snapshot, the share of the last layout's area that was in rooms in their final shape.
     layout_final : SnapshotRef or None
         The map from which on this share stayed above `final_min_share`; None where the last map has no room.
     """

@@ -86,7 +86,9 @@ def make_blueprint(
             rrb.Tabs(*views, active_tab=0),
             rrb.Vertical(
                 _curves(
-                    "How right the layout was", ("/run/coverage", FINAL_SHARE, FINAL_IOU, SHIFTS), (0.0, 1.05)
+                    "Agreement with the final layout",
+                    ("/run/coverage", FINAL_SHARE, FINAL_IOU, SHIFTS),
+                    (0.0, 1.05),
                 ),
                 rrb.Tabs(
                     _lives(),

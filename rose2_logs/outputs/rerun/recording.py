@@ -34,8 +34,8 @@ logger = logging.getLogger(__name__)
 FLUSH_TIMEOUT_S = 60.0
 CURVES = {
     "/run/coverage": ("coverage", (90, 190, 90)),
-    FINAL_SHARE: ("rooms of their last shape", (250, 160, 50)),
-    FINAL_IOU: ("overlap with the last layout", (90, 150, 250)),
+    FINAL_SHARE: ("rooms in their final shape", (250, 160, 50)),
+    FINAL_IOU: ("overlap with the final layout", (90, 150, 250)),
     "/run/rooms": ("rooms", (190, 130, 250)),
     "/run/variation_bits": ("variation of information, bits", (250, 100, 100)),
 }
