@@ -8,7 +8,7 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from rose2_logs.config.parameters import QualityParameters
+from rose2_logs.config.tracking import QualityParameters
 from rose2_logs.model.explored import ExploredPart
 from rose2_logs.model.labels import contacts, known_window
 from rose2_logs.model.occupancy import UNKNOWN, BoolArray, FloatArray, OccupancySnapshot

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from skimage.measure import label as connected
 
-from rose2_logs.config.parameters import OccupancyParameters, Parameters, TrackingParameters
+from rose2_logs.config.parameters import OccupancyParameters, Parameters
+from rose2_logs.config.tracking import TrackingParameters
 from rose2_logs.model.labels import known_window, label_sizes
 from rose2_logs.model.occupancy import BoolArray, FloatArray, GridGeometry, OccupancySnapshot, classify
 from rose2_logs.model.rooms import RoomMap

@@ -9,7 +9,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from rose2_logs.config.parameters import TrackingParameters
+from rose2_logs.config.tracking import TrackingParameters
 from rose2_logs.model.occupancy import FloatArray
 from rose2_logs.tracking.overlap import share_of
 from rose2_logs.tracking.registration import RigidMotion

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rose2_logs.config.parameters import OccupancyParameters, TrackingParameters
+from rose2_logs.config.parameters import OccupancyParameters
+from rose2_logs.config.tracking import TrackingParameters
 from rose2_logs.model.occupancy import BoolArray, FloatArray, GridGeometry, OccupancySnapshot, classify
 
 if TYPE_CHECKING:

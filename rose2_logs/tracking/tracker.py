@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from rose2_logs.config.parameters import OccupancyParameters, TrackingParameters
+from rose2_logs.config.parameters import OccupancyParameters
+from rose2_logs.config.tracking import TrackingParameters
 from rose2_logs.model.analysis import SnapshotAnalysis
 from rose2_logs.model.occupancy import BoolArray, FloatArray, OccupancySnapshot
 from rose2_logs.model.rooms import RoomMap

@@ -16,11 +16,11 @@ from rose2_logs.config.parameters import (
     OccupancyParameters,
     Parameters,
     SpectrumParameters,
-    TrackingParameters,
     WallParameters,
     describe_parameters,
     load_parameters,
 )
+from rose2_logs.config.tracking import TrackingParameters
 from rose2_logs.errors import ParameterError
 
 

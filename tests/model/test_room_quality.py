@@ -10,7 +10,8 @@ import shapely
 from drawn_maps import office, snapshot
 from drawn_rooms import rows
 
-from rose2_logs.config.parameters import OccupancyParameters, QualityParameters
+from rose2_logs.config.parameters import OccupancyParameters
+from rose2_logs.config.tracking import QualityParameters
 from rose2_logs.model.explored import ExploredPart
 from rose2_logs.model.occupancy import OccupancySnapshot
 from rose2_logs.model.room_quality import RoomQuality, room_quality

@@ -13,7 +13,8 @@ import pytest
 import shapely
 from drawn_rooms import drawn, rows
 
-from rose2_logs.config.parameters import OccupancyParameters, Parameters, TrackingParameters
+from rose2_logs.config.parameters import OccupancyParameters, Parameters
+from rose2_logs.config.tracking import TrackingParameters
 from rose2_logs.errors import OutputError
 from rose2_logs.model.rooms import Doorway
 from rose2_logs.runs import parquet_table

@@ -9,7 +9,7 @@ import pytest
 from drawn_maps import office
 from moved_maps import motion_about, moved
 
-from rose2_logs.config.parameters import TrackingParameters
+from rose2_logs.config.tracking import TrackingParameters
 from rose2_logs.model.occupancy import GridGeometry, OccupancySnapshot
 from rose2_logs.model.rooms import RoomMap
 from rose2_logs.tracking.back_projection import BackProjector, motions_to_last

@@ -10,7 +10,7 @@ import pytest
 import shapely
 from drawn_rooms import drawn, rows
 
-from rose2_logs.config.parameters import TrackingParameters
+from rose2_logs.config.tracking import TrackingParameters
 from rose2_logs.model.rooms import RoomMap
 from rose2_logs.tracking.convergence import Convergence, RoomRows, measure_convergence
 from rose2_logs.tracking.layout_change import LayoutFollower, variation_of_information

@@ -11,7 +11,7 @@ from moved_maps import motion_about, moved
 from numpy.typing import NDArray
 from PIL import Image
 
-from rose2_logs.config.parameters import TrackingParameters
+from rose2_logs.config.tracking import TrackingParameters
 from rose2_logs.evaluation.tracks import TrackComparison, TrackScores
 from rose2_logs.io import open_log
 from rose2_logs.model.occupancy import GridGeometry, OccupancySnapshot

@@ -10,7 +10,7 @@ import pytest
 from drawn_maps import office, snapshot
 from moved_maps import motion_about, moved
 
-from rose2_logs.config.parameters import TrackingParameters
+from rose2_logs.config.tracking import TrackingParameters
 from rose2_logs.io import open_log
 from rose2_logs.model.occupancy import GridGeometry, OccupancySnapshot
 from rose2_logs.tracking.registration import MapAligner, RigidMotion

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from moved_maps import motion_about, moved
 
-from rose2_logs.config.parameters import TrackingParameters
+from rose2_logs.config.tracking import TrackingParameters
 from rose2_logs.model.rooms import RoomMap
 from rose2_logs.tracking.tracked_snapshot import MAP_TRACK
 from rose2_logs.tracking.tracker import RoomTracker

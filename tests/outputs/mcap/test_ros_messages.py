@@ -9,7 +9,8 @@ import pytest
 import shapely
 from drawn_maps import office, snapshot
 
-from rose2_logs.config.parameters import Parameters, TrackingParameters
+from rose2_logs.config.parameters import Parameters
+from rose2_logs.config.tracking import TrackingParameters
 from rose2_logs.model.occupancy import GridGeometry
 from rose2_logs.model.outlines import outer_rings, outline
 from rose2_logs.model.rooms import RoomMap
