@@ -43,12 +43,12 @@ class DaskWorkers:
             import distributed
         except ImportError as error:
             raise ParameterError(f"a scheduler needs Dask: {EXTRA}") from error
-        # What its client logs about a lost scheduler, traceback and all, is told here in one line.
+        # What its client logs about a lost scheduler, traceback and all, is reported here in one line.
         for name in ("distributed", "distributed.client", "distributed.core"):
             logging.getLogger(name).setLevel(logging.CRITICAL)
         self._address = address
         self._topic = f"rose2-logs-{uuid.uuid4().hex}"
-        self._told: queue.Queue[Progress | Any] = queue.Queue()
+        self._news: queue.Queue[Progress | Any] = queue.Queue()
         self._tasks: dict[Any, LogTask] = {}
         self._looked = False
         where: dict[str, Any] = (
@@ -64,7 +64,7 @@ class DaskWorkers:
                 f"{address}: no Dask scheduler answers; `dask scheduler` prints its address"
             ) from error
         self._killed_worker = distributed.KilledWorker
-        self._client.subscribe_topic(self._topic, lambda event: self._told.put(Progress(*event[1])))
+        self._client.subscribe_topic(self._topic, lambda event: self._news.put(Progress(*event[1])))
 
     def __enter__(self) -> Self:
         return self
@@ -81,7 +81,7 @@ class DaskWorkers:
         key = f"rose2-logs-{task.name}-{uuid.uuid4().hex}"
         future = self._client.submit(analyze_on_worker, task, self._topic, key=key, pure=False)
         self._tasks[future] = task
-        future.add_done_callback(self._told.put)
+        future.add_done_callback(self._news.put)
 
     def events(self) -> Iterator[Progress | LogOutcome]:
         """Yield what the workers report until no task is left; more may be submitted in the meantime.
@@ -97,13 +97,13 @@ class DaskWorkers:
                 self._look()
                 looked = time.monotonic()
             try:
-                told = self._told.get(timeout=LOOK_EVERY_S)
+                news = self._news.get(timeout=LOOK_EVERY_S)
             except queue.Empty:
                 continue
-            if isinstance(told, Progress):
-                yield told
-            elif told in self._tasks:
-                yield self._outcome(told, self._tasks.pop(told))
+            if isinstance(news, Progress):
+                yield news
+            elif news in self._tasks:
+                yield self._outcome(news, self._tasks.pop(news))
 
     def _look(self) -> None:
         """Notice what would make the wait endless."""
@@ -155,4 +155,4 @@ def analyze_on_worker(task: LogTask, topic: str) -> LogOutcome:
     from distributed import get_worker
 
     worker = get_worker()
-    return analyze_task(task, lambda told: worker.log_event(topic, [told.name, told.share]))
+    return analyze_task(task, lambda news: worker.log_event(topic, [news.name, news.share]))

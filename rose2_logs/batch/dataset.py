@@ -128,8 +128,8 @@ def summary_row(out: Path, name: str) -> Row:
 def failed_row(name: str, source: str, reason: str) -> Row:
     """Make the row of a log that failed."""
     # It may hold a name that is not UTF-8.
-    told = " ".join(reason.split()).encode(errors="backslashreplace").decode()
-    known = {"log": name, "status": "failed", "source": source, "reason": told}
+    text = " ".join(reason.split()).encode(errors="backslashreplace").decode()
+    known = {"log": name, "status": "failed", "source": source, "reason": text}
     return dict.fromkeys(SUMMARY_COLUMNS) | known
 
 

@@ -58,12 +58,12 @@ class LocalWorkers:
                 worker.begin(self._waiting.popleft())
             ready = wait([worker.connection for worker in self._busy])
             for worker in [each for each in self._busy if each.connection in ready]:
-                told = worker.told()
-                if isinstance(told, LogOutcome):
+                news = worker.news()
+                if isinstance(news, LogOutcome):
                     self._busy.remove(worker)
                     if worker.is_alive:
                         self._idle.append(worker)
-                yield told
+                yield news
 
 
 class _Worker:
@@ -82,20 +82,20 @@ class _Worker:
 
     def begin(self, task: LogTask) -> None:
         self._task = task
-        # The process may have just died, which `told` will notice.
+        # The process may have just died, which `news` will notice.
         with suppress(OSError):
             self.connection.send(task)
 
-    def told(self) -> Progress | LogOutcome:
+    def news(self) -> Progress | LogOutcome:
         """Receive what the process reports; if it died, the outcome of its task."""
         try:
-            told: Progress | LogOutcome = self.connection.recv()
+            news: Progress | LogOutcome = self.connection.recv()
         except (EOFError, OSError):
             self._process.join(DEATH_TIMEOUT_S)
             self.end()
             assert self._task is not None
             return LogOutcome(self._task.name, "failed", reason=self._cause_of_death(), is_transient=True)
-        return told
+        return news
 
     def end(self) -> None:
         self._process.kill()

@@ -210,10 +210,10 @@ def _asking(url: str) -> Iterator[None]:
     except Exception as error:
         status = getattr(error, "status", None)
         # The text of an HTTP error holds the URL with its signature.
-        told = f"HTTP {status}" if isinstance(status, int) else str(error).replace(url, shown)
+        reason = f"HTTP {status}" if isinstance(status, int) else str(error).replace(url, shown)
         refused = isinstance(status, int) and 400 <= status < 500 and status not in PASSING_STATUS
         kind = LogError if refused else TransferError
-        raise kind(f"{shown}: {type(error).__name__}: {told}") from error
+        raise kind(f"{shown}: {type(error).__name__}: {reason}") from error
 
 
 def _is_web(url: str) -> bool:

@@ -182,10 +182,10 @@ def analyze_task(task: LogTask, report: Report) -> LogOutcome:
                 is_transient=is_transient(error),
                 details=traceback.format_exc(),
             )
-    told = warning_log.texts()[:MOST_WARNINGS]
-    if warning_log.count > len(told):
-        told.append(f"{warning_log.count - len(told)} more warnings")
-    return dataclasses.replace(outcome, warnings=tuple(told))
+    texts = warning_log.texts()[:MOST_WARNINGS]
+    if warning_log.count > len(texts):
+        texts.append(f"{warning_log.count - len(texts)} more warnings")
+    return dataclasses.replace(outcome, warnings=tuple(texts))
 
 
 def is_transient(error: BaseException | None) -> bool:

@@ -83,24 +83,24 @@ class _MessageHandler(logging.Handler):
 
     def emit(self, record: logging.LogRecord) -> None:
         """Show one message; of a kind that came often only that it did."""
-        told = {name: getattr(record, name, None) for name in FIELDS}
-        kind = told["kind"]
+        fields = {name: getattr(record, name, None) for name in FIELDS}
+        kind = fields["kind"]
         if kind is not None and not style.as_json and style.level >= logging.WARNING:
             self._shown[kind] += 1
             if self._shown[kind] == SHOWN_OF_KIND + 1:
                 show("warning", f"more of this kind ({kind}) are only counted; --verbose shows them")
             if self._shown[kind] > SHOWN_OF_KIND:
                 return
-        show(record.levelname.lower(), record.getMessage(), **told)
+        show(record.levelname.lower(), record.getMessage(), **fields)
 
 
-def show(level: str, message: str, **told: Any) -> None:
-    """Show one line; what is told beside its text goes into JSON only."""
+def show(level: str, message: str, **fields: Any) -> None:
+    """Show one line; the further fields go into JSON only."""
     text = printable(with_flags(message))
     if style.as_json:
         now = datetime.now(UTC).isoformat(timespec="milliseconds")
-        entry = {"time": now, "level": level, "message": text} | {name: told.get(name) for name in FIELDS}
-        errors.file.write(json.dumps(entry | told) + "\n")
+        entry = {"time": now, "level": level, "message": text} | {name: fields.get(name) for name in FIELDS}
+        errors.file.write(json.dumps(entry | fields) + "\n")
         errors.file.flush()
     else:
         errors.print(f"[{STYLES.get(level, 'default')}]{level}:[/] {escape(text)}", soft_wrap=True)
@@ -111,14 +111,14 @@ def printable(text: str) -> str:
     return "".join(sign if sign.isprintable() else "\ufffd" for sign in " ".join(text.split()))
 
 
-def error(message: str, **told: Any) -> None:
+def error(message: str, **fields: Any) -> None:
     """Show one line about an error, after the traceback of the one that is handled if that was asked for."""
     if style.debug and sys.exc_info()[0] is not None:
         if style.as_json:
-            told["traceback"] = traceback.format_exc()
+            fields["traceback"] = traceback.format_exc()
         else:
             errors.print(escape(traceback.format_exc()), soft_wrap=True)
-    show("error", message, **told)
+    show("error", message, **fields)
 
 
 def show_error(failure: Rose2LogsError) -> None:

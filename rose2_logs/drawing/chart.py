@@ -354,8 +354,8 @@ class _Chart:
         if count <= DOTS_MAX or not curve.is_joined:
             for place in np.flatnonzero(known).tolist():
                 x, y = points[place].tolist()
-                told = f"{curve.name}: {curve.y[place]:.3g} at {curve.x[place]:.4g}"
-                self.page.add(Dot(x, y, self._style.dot, color, told))
+                tooltip = f"{curve.name}: {curve.y[place]:.3g} at {curve.x[place]:.4g}"
+                self.page.add(Dot(x, y, self._style.dot, color, tooltip))
 
     def names(self, title: str, curves: Sequence[Curve]) -> None:
         """Write the title above the axes, and the names of the curves beside them."""

@@ -191,7 +191,9 @@ def _lay_map(painter: MapPainter, plan: RoomPlan, style: PlanStyle, colors: Mapp
 
 def _told(room: PlanRoom) -> str:
     sure = (
-        "" if room.wall_support is None else f", {percent(room.wall_support)} of its outline backed by walls"
+        ""
+        if room.wall_support is None
+        else f", {percent(room.wall_support)} of its outline supported by walls"
     )
     return f"{room.name}: {room.area_m2:.1f} m² seen of {room.predicted_area_m2:.1f} m²{sure}"
 

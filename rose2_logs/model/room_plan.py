@@ -42,7 +42,7 @@ class PlanRoom:
     neighbors : tuple of int
         Rooms behind its doorways, ascending.
     wall_support : float or None
-        Share of its outline that walls back, see `RoomQuality`; None where it was not measured.
+        Share of its outline supported by walls, see `RoomQuality`; None where it was not measured.
     frontier_m : float or None
         Its open frontier.
     """
@@ -62,7 +62,7 @@ class PlanRoom:
 
     @property
     def is_unsure(self) -> bool:
-        """Whether few walls back its outline."""
+        """Whether little of its outline is supported by walls."""
         return is_unsure(self.wall_support)
 
     @property

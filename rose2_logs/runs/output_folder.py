@@ -76,7 +76,9 @@ class OutputFolder:
             raise OutputError(f"{self._folder}: lies in the log; choose another folder")
 
     @contextmanager
-    def made(self, facts: dict[str, Any], *, overwrite: bool, resume: bool) -> Iterator[tuple[Path, Journal]]:
+    def prepared(
+        self, facts: dict[str, Any], *, overwrite: bool, resume: bool
+    ) -> Iterator[tuple[Path, Journal]]:
         """Give a folder to make the results in and the journal; all results are in place if all went well.
 
         Parameters

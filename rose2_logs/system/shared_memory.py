@@ -52,11 +52,13 @@ def shared_memory_folders() -> Iterator[tuple[str, ...]]:
     """Yield folders for packed values, the best one first; they are removed afterwards with their content."""
     with ExitStack() as stack:
         places = [str(SHARED_MEMORY)] if SHARED_MEMORY.is_dir() else []
-        made = []
+        folders = []
         for place in (*places, tempfile.gettempdir()):
             with suppress(OSError):
-                made.append(stack.enter_context(tempfile.TemporaryDirectory(prefix="rose2_logs_", dir=place)))
-        yield tuple(made)
+                folders.append(
+                    stack.enter_context(tempfile.TemporaryDirectory(prefix="rose2_logs_", dir=place))
+                )
+        yield tuple(folders)
 
 
 def pack(value: Any, folders: Sequence[str]) -> Packed:

@@ -125,7 +125,7 @@ class TrackHistories:
 
 
 def quality_of(step: TrackedSnapshot, number: int) -> tuple[float | None, float | None]:
-    """Share of the outline that walls back, and open frontier in meters, of room `number` + 1."""
+    """Share of the outline supported by walls, and open frontier in meters, of room `number` + 1."""
     if step.quality is None:
         return None, None
     share = float(step.quality.wall_support[number])

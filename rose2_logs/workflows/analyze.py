@@ -138,8 +138,8 @@ def _analyze_log(
             reader.topic,
         )
         info = _run_info(path, reader, options)
-        made = output.made(_facts(info, options), overwrite=options.overwrite, resume=options.resume)
-        with made as (work, journal):
+        prepared = output.prepared(_facts(info, options), overwrite=options.overwrite, resume=options.resume)
+        with prepared as (work, journal):
             planned = _planned_files(work, path, options)
             outputs = [*sinks, *_make_sinks(planned, options, reader)]
             workers = JournaledWorkers(processes, journal) if options.journal else processes

@@ -75,12 +75,12 @@ def test_svg_is_xml_with_the_same_picture_and_shapes():
     texts = [element.text for element in root.iter(f"{SVG}text")]
     assert {"Room 3", "Room 120", "12 m²", "predicted, unseen", "doorway"} <= set(texts)
     told = [element.text for element in root.iter(f"{SVG}title")]
-    assert "Room 3: 12.0 m² seen of 12.0 m², 75% of its outline backed by walls" in told
+    assert "Room 3: 12.0 m² seen of 12.0 m², 75% of its outline supported by walls" in told
     assert as_svg(draw_plan(two_rooms_plan())) == text
 
 
 def test_unsure_rooms_are_marked_and_the_legend_says_so():
-    """A sign behind the number of a room that few walls back, also in small pictures; none without such."""
+    """A sign behind the number of a room with little wall support, also in small pictures."""
     plan = two_rooms_plan()
     unsure, sure = (
         dataclasses.replace(

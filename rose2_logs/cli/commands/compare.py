@@ -50,7 +50,7 @@ def print_comparison(result: ComparisonResult) -> None:
     found = result.comparison
     if not found.same_building:
         warning(
-            "these do not seem to be two runs in one building: hardly any walls agree, and what is told "
+            "these do not seem to be two runs in one building: hardly any walls agree, and what is changes "
             "below means little"
         )
         if found.scale is not None:
@@ -93,8 +93,8 @@ def _print_overview(found: LayoutComparison) -> None:
     table.add_row("rooms", counts)
     if found.walls is not None:
         lengths = found.walls.lengths_m
-        told = ", ".join(f"{length:.1f} m {status}" for status, length in lengths.items())
-        table.add_row("walls", told or "none missing, new or moved")
+        changes = ", ".join(f"{length:.1f} m {status}" for status, length in lengths.items())
+        table.add_row("walls", changes or "none missing, new or moved")
     print_table(table)
 
 

@@ -49,8 +49,8 @@ def print_log_facts(facts: LogFacts) -> None:
     for topic in info.topics:
         count = "?" if topic.message_count is None else str(topic.message_count)
         is_map = "yes" if topic.is_map else ""
-        told = (escape(printable(text)) for text in (topic.name, topic.message_type, topic.encoding))
-        table.add_row(*told, count, is_map)
+        names = (escape(printable(text)) for text in (topic.name, topic.message_type, topic.encoding))
+        table.add_row(*names, count, is_map)
     print_table(table)
     for topic_facts in facts.maps:
         if topic_facts.first is None or topic_facts.last is None:

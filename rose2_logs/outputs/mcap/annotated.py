@@ -160,7 +160,7 @@ class AnnotatedMcap(Sink):
         self._frame_id = step.analysis.geometry.frame_id
         with self._writing():
             self._copy_until(time_ns)
-            made = {
+            messages = {
                 "/rose2/segmented_map": self._maker.segmented_map(step),
                 "/rose2/clean_map": self._maker.clean_map(step),
                 "/rose2/markers": self._maker.markers(step),
@@ -168,7 +168,7 @@ class AnnotatedMcap(Sink):
             }
             if self._own_map is not None:
                 self._add(self._own_map, time_ns, self._maker.source_map(step))
-            for topic, data in made.items():
+            for topic, data in messages.items():
                 if data is not None:
                     self._add(self._added[topic], time_ns, data)
             self._sequence += 1
@@ -273,8 +273,8 @@ class AnnotatedMcap(Sink):
         content = (name, encoding, data)
         key = content if copied_id is None else copied_id
         if key not in self._schemas:
-            made = self._writer.register_schema(name, encoding, data, copied_id)
-            self._schemas[key] = self._schemas[content] = made
+            number = self._writer.register_schema(name, encoding, data, copied_id)
+            self._schemas[key] = self._schemas[content] = number
         return self._schemas[key]
 
     def _add_channel(self, topic: str, kind: str) -> int:

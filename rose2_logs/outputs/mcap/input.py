@@ -227,11 +227,11 @@ class _Files(CopiedLog):
         self._channels: dict[tuple[int, int], CopiedChannel] = {}
         self._converters: dict[int, Callable[[Any], bytes | memoryview]] = {}
         for key, (number, channel) in enumerate(channels, start=1):
-            made = self._as_channel(key, channel)
-            self._channels[number, channel.id] = made
-            if channel.message_encoding == "ros1" and made.message_encoding == "cdr":
+            copied = self._as_channel(key, channel)
+            self._channels[number, channel.id] = copied
+            if channel.message_encoding == "ros1" and copied.message_encoding == "cdr":
                 # Converted with the Header of ROS 2, which drops the sequence number of ROS 1.
-                self._converters[key] = partial(self._target.ros1_to_cdr, typename=made.schema_name)
+                self._converters[key] = partial(self._target.ros1_to_cdr, typename=copied.schema_name)
 
     def channels(self) -> list[CopiedChannel]:
         return list(self._channels.values())

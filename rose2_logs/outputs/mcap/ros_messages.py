@@ -169,7 +169,7 @@ class MessageMaker:
     def markers(self, step: TrackedSnapshot) -> bytearray:
         """Make the markers: delete the old ones, then fills, outlines, labels, walls, lines, doorways."""
         analysis, rooms = step.analysis, step.analysis.rooms
-        made = [Marker("", 0, TRIANGLES, action=DELETE_ALL)]
+        markers = [Marker("", 0, TRIANGLES, action=DELETE_ALL)]
         points = np.nan_to_num(rooms.label_points_m).tolist()
         corners = self._triangles.corners_of(rooms.polygons)
         for track, number in sorted(zip(step.track_ids, range(len(rooms)), strict=True)):
@@ -177,7 +177,7 @@ class MessageMaker:
             fill, line = (red, green, blue, FILL_OPACITY), (red * 0.7, green * 0.7, blue * 0.7, 1.0)
             x, y = points[number]
             sign = unsure_sign(quality_of(step, number)[0])
-            made += [
+            markers += [
                 Marker("rooms", track, TRIANGLES, corners[number], fill),
                 Marker(
                     "outlines",
@@ -199,16 +199,16 @@ class MessageMaker:
             ]
         if analysis.walls is not None:
             walls, lines = analysis.walls.segments_m.reshape(-1, 2), analysis.walls.lines_m.reshape(-1, 2)
-            made.append(Marker("walls", 0, LINE_LIST, walls, (0.1, 0.1, 0.1, 1.0), OUTLINE_WIDTH_M))
-            made.append(Marker("lines", 0, LINE_LIST, lines, (0.2, 0.4, 0.9, 0.35), LINE_WIDTH_M))
+            markers.append(Marker("walls", 0, LINE_LIST, walls, (0.1, 0.1, 0.1, 1.0), OUTLINE_WIDTH_M))
+            markers.append(Marker("lines", 0, LINE_LIST, lines, (0.2, 0.4, 0.9, 0.35), LINE_WIDTH_M))
         doors = np.array([door.ends_m for door in rooms.doorways]).reshape(-1, 2)
-        made.append(Marker("doorways", 0, LINE_LIST, doors, (0.9, 0.3, 0.1, 1.0), OUTLINE_WIDTH_M))
+        markers.append(Marker("doorways", 0, LINE_LIST, doors, (0.9, 0.3, 0.1, 1.0), OUTLINE_WIDTH_M))
         # At different heights, so that layers do not flicker through each other or through the map.
         heights = {name: LAYER_STEP_M * (layer + 1) for layer, name in enumerate(MARKER_LAYERS)}
         message = CdrWriter()
-        message.numbers("I", len(made))
+        message.numbers("I", len(markers))
         shared = SharedFields.of(step.snapshot.stamp_ns, analysis.geometry.frame_id)
-        for marker in made:
+        for marker in markers:
             marker.write(message, shared, heights.get(marker.ns, 0.0))
         return message.message()
 

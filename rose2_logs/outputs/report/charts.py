@@ -220,7 +220,7 @@ def _lanes(results: Run, axes: Sequence[RunAxis], numbers: np.ndarray, present: 
     left_out = len(numbers) - len(shown)
     meaning = (
         "A lane for each room, by its number: pale while it forms, stronger once its shape was right, full "
-        f"once its area has settled. {UNSURE_SIGN}: few walls back its last outline."
+        f"once its area has settled. {UNSURE_SIGN}: little of its last outline is supported by walls."
     ) + (f" {left_out} rooms that were there only shortly are left out." if left_out else "")
     legend = tuple((state, css(color)) for state, color in colors[0].items())
     return [Chart(title, meaning, legend, draw(axes[0]), draw(axes[1]), is_wide=True)]

@@ -147,7 +147,7 @@ def _table(rows: list[tuple[Cell, ...]]) -> Table:
         Column("splits"),
         Column("merges"),
         Column("shifts", "of the whole map"),
-        Column("backed by walls", "share of the outlines that walls back, median of the last map's rooms"),
+        Column("wall support", "share of the outlines supported by walls, median of the last map's rooms"),
         Column("frontier, m", "open frontier of the last map's rooms"),
     )
     return Table("Logs", columns, tuple(rows))

@@ -68,7 +68,7 @@ def room_table(results: Run, plan: RoomPlan) -> Table:
         Column("last map", "whether the last map shows it", is_number=False),
         Column("area, m²", "as far as it was seen"),
         Column("with predicted, m²", "area of its shape, the unseen part included"),
-        Column("backed by walls", "share of its outline that walls back: how sure it is"),
+        Column("wall support", "share of its outline supported by walls: how sure it is"),
         Column("frontier, m", "open border towards unknown floor"),
         Column("doorways to", "rooms behind its doorways in the last map", is_number=False),
         Column("first seen", "coverage when it was first seen"),
