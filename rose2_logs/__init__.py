@@ -16,6 +16,8 @@ _HOMES = {
     "comparison.layouts": ("LayoutComparison",),
     "drawing.drawing": ("Drawing",),
     "errors": (
+        "AlreadyWholeError",
+        "CasesError",
         "InvalidMapError",
         "LogError",
         "MissingPackageError",
@@ -34,6 +36,8 @@ _HOMES = {
     "runs.run": ("Run", "RunSnapshot"),
     "runs.sink": ("RunInfo", "Sink"),
     "runs.table": ("Table",),
+    "system.warnings": ("StrictError",),
+    "system.workers": ("WorkerError",),
     "tracking.tracked_snapshot": ("RoomEvent", "TrackedSnapshot"),
     "workflows.evaluate": ("Evaluation",),
     "workflows.segment": ("Segmentation",),

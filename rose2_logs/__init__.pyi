@@ -28,6 +28,12 @@ from rose2_logs.config.run_options import RunOptions as RunOptions
 from rose2_logs.config.selection import Selection as Selection
 from rose2_logs.drawing.drawing import Drawing as Drawing
 from rose2_logs.errors import (
+    AlreadyWholeError as AlreadyWholeError,
+)
+from rose2_logs.errors import (
+    CasesError as CasesError,
+)
+from rose2_logs.errors import (
     InvalidMapError as InvalidMapError,
 )
 from rose2_logs.errors import (
@@ -75,6 +81,8 @@ from rose2_logs.runs.run import RunSnapshot as RunSnapshot
 from rose2_logs.runs.sink import RunInfo as RunInfo
 from rose2_logs.runs.sink import Sink as Sink
 from rose2_logs.runs.table import Table as Table
+from rose2_logs.system.warnings import StrictError as StrictError
+from rose2_logs.system.workers import WorkerError as WorkerError
 from rose2_logs.tracking.tracked_snapshot import RoomEvent as RoomEvent
 from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot as TrackedSnapshot
 from rose2_logs.workflows.evaluate import Evaluation as Evaluation

@@ -5,7 +5,9 @@ from __future__ import annotations
 import dataclasses
 import difflib
 import inspect
+import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from numbers import Real
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -15,12 +17,12 @@ from numpy.typing import ArrayLike
 
 from rose2_logs.comparison.layouts import LayoutComparison
 from rose2_logs.config.parameters import Parameters
-from rose2_logs.config.run_options import RunOptions, options_of
+from rose2_logs.config.run_options import RunOptions, check_option, options_of
 from rose2_logs.config.selection import Selection
 from rose2_logs.errors import InvalidMapError, ParameterError
 from rose2_logs.io import open_log as open_log_reader
 from rose2_logs.io.log import LogReader
-from rose2_logs.model.occupancy import GridGeometry, OccupancySnapshot, free_area_m2
+from rose2_logs.model.occupancy import UNKNOWN, GridGeometry, OccupancySnapshot, free_area_m2
 from rose2_logs.runs.run import Run
 from rose2_logs.runs.sink import Sink
 from rose2_logs.runs.stream import TrackedStream, start_workers
@@ -75,8 +77,8 @@ def analyze(
     log : str or path
         An MCAP file, a ROS 1 bag, a ROS 2 bag, saved maps.
     out : str or path, optional
-        Folder for the results; it is made. Without it nothing stays on the disk: what the run stores goes
-        with the `Run`, and no recording and no annotated MCAP are made unless asked for.
+        Folder for the results, which is created. Without it, nothing stays on the disk: the stored run is
+        deleted together with the `Run` object, and there is no recording or annotated MCAP unless asked for.
     parameters : Parameters or mapping, optional
         Those of all stages; of a mapping as ``{"walls.extension_m": 6}`` the others keep their defaults.
     sinks : sequence of Sink
@@ -106,13 +108,14 @@ def analyze(
     >>> run.snapshots.arrow["rooms"].to_pylist()
     [3, 11, 19]
     """
-    log = Path(log)
-    if out is None:
+    log = _path(log, "log")
+    folder = None if out is None else _path(out, "out")
+    if folder is None:
         options = {"recording": False, "annotated_log": False, "journal": False} | options
     chosen = _options(parameters, options)
-    if out is not None:
-        analyze_log(log, Path(out), chosen, on_snapshot, sinks)
-        return Run(out)
+    if folder is not None:
+        analyze_log(log, folder, chosen, on_snapshot, sinks)
+        return Run(folder)
     temporary = TemporaryDirectory(prefix="rose2_logs_", ignore_cleanup_errors=True)
     folder = Path(temporary.name) / log_stem(log)
     try:
@@ -136,8 +139,8 @@ def track(
     Parameters
     ----------
     log : str, path, LogReader or iterable of OccupancySnapshot
-        The log, or what `open_log` gives, or maps of your own. Of an iterator, whose last map is not known
-        beforehand, the coverage is NaN; a list has one.
+        The log, or what `open_log` returns, or your own maps. Coverage refers to the last map; it is NaN for
+        an iterator, whose last map is not known in advance.
     parameters : Parameters or mapping, optional
         As for `analyze`.
     method : str
@@ -166,12 +169,16 @@ def track(
     0.72 11 [1, 2, 3, 4]
     1.00 19 [1, 2, 3, 4]
     """
-    options = _options(parameters, {"method": method, "workers": workers})
-    if isinstance(log, str | Path):
-        with open_log(log, topic=topic, parameters=options.parameters) as reader:
-            yield from _tracked(reader, options)
-    else:
-        yield from _tracked(log, options)
+    # What cannot be used is refused by the call, not when the first map is asked for.
+    options = _options(parameters, {"method": method, "workers": workers, "topic": topic})
+    if isinstance(log, LogReader) or (isinstance(log, Iterable) and not isinstance(log, str | bytes)):
+        return _tracked(log, options)
+    return _tracked_and_closed(open_log(log, topic=topic, parameters=options.parameters), options)
+
+
+def _tracked_and_closed(reader: LogReader, options: RunOptions) -> Iterator[TrackedSnapshot]:
+    with reader:
+        yield from _tracked(reader, options)
 
 
 def _tracked(maps: LogReader | Iterable[OccupancySnapshot], options: RunOptions) -> Iterator[TrackedSnapshot]:
@@ -180,9 +187,15 @@ def _tracked(maps: LogReader | Iterable[OccupancySnapshot], options: RunOptions)
         if isinstance(maps, LogReader):
             yield from TrackedStream.of_log(maps, workers, parameters)
             return
-        last = maps[-1] if isinstance(maps, Sequence) and len(maps) else None
+        last = _checked_map(maps[-1]) if isinstance(maps, Sequence) and len(maps) else None
         final_m2 = None if last is None else free_area_m2(last, parameters.occupancy)
-        yield from TrackedStream(maps, final_m2, workers, parameters)
+        yield from TrackedStream(map(_checked_map, maps), final_m2, workers, parameters)
+
+
+def _checked_map(given: OccupancySnapshot) -> OccupancySnapshot:
+    if not isinstance(given, OccupancySnapshot):
+        raise ParameterError(f"only maps of the type OccupancySnapshot can be tracked, not {_type(given)}")
+    return given
 
 
 def segment(
@@ -234,22 +247,28 @@ def segment(
     """
     if isinstance(map_, OccupancySnapshot):
         snapshot = map_
-    elif isinstance(map_, str | Path):
-        snapshot = read_map(map_, resolution_m)
+    elif isinstance(map_, str | Path | bytes):
+        snapshot = read_map(map_, resolution_m)  # type: ignore[arg-type]
     else:
-        if resolution_m is None:
-            raise ParameterError(
-                "an array does not tell how large its cells are; give resolution_m in meters"
-            )
-        try:
-            cells = np.asarray(map_)
-        except ValueError as error:
-            raise InvalidMapError("a map's rows must have the same number of cells") from error
-        geometry = GridGeometry(resolution_m, (0.0, 0.0), 0.0, "map", cells.shape)
-        snapshot = OccupancySnapshot(0, 0, 0, "array", cells, geometry)
+        snapshot = _snapshot_of_array(map_, resolution_m)
+    if not snapshot.cells.size:
+        raise InvalidMapError("the map has no cells")
     return segment_snapshot(
         snapshot, Parameters.from_any(parameters), method, name=snapshot.topic, voronoi=voronoi
     )
+
+
+def _snapshot_of_array(array: ArrayLike, resolution_m: float | None) -> OccupancySnapshot:
+    if array is None or isinstance(array, Mapping):
+        raise ParameterError(f"a map is an array, a path or an OccupancySnapshot, not {_type(array)}")
+    if resolution_m is None:
+        raise ParameterError("an array does not tell how large its cells are; give resolution_m in meters")
+    try:
+        cells = np.ma.filled(array, UNKNOWN) if isinstance(array, np.ma.MaskedArray) else np.asarray(array)
+    except ValueError as error:
+        raise InvalidMapError("all rows of a map must have the same number of cells") from error
+    geometry = GridGeometry(resolution_m, (0.0, 0.0), 0.0, "map", cells.shape)
+    return OccupancySnapshot(0, 0, 0, "array", cells, geometry)
 
 
 def open_log(
@@ -289,8 +308,12 @@ def open_log(
     ...     print(reader.topic, reader.first())
     /map OccupancySnapshot(index=0, topic='/map', 384 x 320 cells of 0.05 m)
     """
+    known = [each.name for each in dataclasses.fields(Selection)]
+    _refuse_unknown(selection, known)
+    check_option(RunOptions, "topic", topic)
     limits = Parameters.from_any(parameters).reading
-    return open_log_reader(log, topic=topic, selection=Selection(**selection), limits=limits)
+    path = [_path(each, "log") for each in log] if isinstance(log, list | tuple) else _path(log, "log")
+    return open_log_reader(path, topic=topic, selection=Selection(**selection), limits=limits)
 
 
 def read_map(map_file: str | Path, resolution_m: float | None = None) -> OccupancySnapshot:
@@ -319,7 +342,8 @@ def read_map(map_file: str | Path, resolution_m: float | None = None) -> Occupan
     ...     rl.read_map(f"{folder}/plan.png", resolution_m=0.05)
     OccupancySnapshot(index=0, topic='/map', 200 x 120 cells of 0.05 m)
     """
-    return read_static_map(Path(map_file), resolution_m)
+    _check_resolution(resolution_m)
+    return read_static_map(_path(map_file, "map_file"), resolution_m)
 
 
 def load(folder: str | Path) -> Run:
@@ -344,7 +368,7 @@ def load(folder: str | Path) -> Run:
     ...     rl.load(f"{folder}/office")
     <Run office: 3 maps, 19 rooms at the end>
     """
-    return Run(folder)
+    return Run(_path(folder, "folder"))
 
 
 def compare(
@@ -387,12 +411,12 @@ def compare(
     >>> rl.compare(run, run).room_counts
     {'same': 19}
     """
-    run_a, run_b = (each if isinstance(each, Run) else Run(each) for each in (a, b))
+    run_a, run_b = (each if isinstance(each, Run) else Run(_path(each, "run")) for each in (a, b))
     used = Parameters.from_any(parameters)
     if out is None:
         return compare_stored(run_a, run_b, parameters=used)
     return compare_runs(
-        run_a.folder, run_b.folder, Path(out), overwrite=overwrite, parameters=used
+        run_a.folder, run_b.folder, _path(out, "out"), overwrite=overwrite, parameters=used
     ).comparison
 
 
@@ -442,7 +466,7 @@ def evaluate(
     >>> found.groups["campus"].iou_sym  # doctest: +SKIP
     """
     return evaluate_method(
-        cases,
+        _path(cases, "cases"),
         method=method,
         parameters=Parameters.from_any(parameters),
         group=group,
@@ -453,9 +477,32 @@ def evaluate(
 
 def _options(parameters: GivenParameters, options: Mapping[str, Any]) -> RunOptions:
     """Make the options of a run, of keywords that people give."""
-    known = [each.name for each in dataclasses.fields(RunOptions) if each.name != "parameters"]
+    _refuse_unknown(
+        options, [each.name for each in dataclasses.fields(RunOptions) if each.name != "parameters"]
+    )
+    return RunOptions(parameters=Parameters.from_any(parameters), **options)
+
+
+def _refuse_unknown(options: Mapping[str, Any], known: Sequence[str]) -> None:
     if unknown := [name for name in options if name not in known]:
         meant = difflib.get_close_matches(unknown[0], known, 1)
-        hint = f"; did you mean {meant[0]!r}?" if meant else ""
-        raise ParameterError(f"no option {unknown[0]!r}{hint}; there are: {', '.join(known)}")
-    return RunOptions(parameters=Parameters.from_any(parameters), **options)
+        hint = f"did you mean {meant[0]!r}?" if meant else f"there are: {', '.join(known)}"
+        raise ParameterError(f"no option {unknown[0]!r}; {hint}")
+
+
+def _path(given: Any, name: str) -> Path:
+    """Return what was given as a path; anything else, and an empty text, is refused."""
+    if not isinstance(given, str | os.PathLike):
+        raise ParameterError(f"{name} must be a str or a Path, not {_type(given)}")
+    if not os.fspath(given):
+        raise ParameterError(f"{name} is an empty text; '.' is the current folder")
+    return Path(given)
+
+
+def _check_resolution(given: object) -> None:
+    if isinstance(given, bool) or not isinstance(given, Real | None):
+        raise ParameterError(f"resolution_m={given!r}: it must be a number, in meters")
+
+
+def _type(given: object) -> str:
+    return type(given).__name__

@@ -40,6 +40,10 @@ MAPS, OUTPUTS, METHOD = "Which maps", "What to write", "Method and parameters"
 """Groups of options in the help."""
 
 
+KINDS: dict[str, tuple[type, str]] = {"bool": (bool, "True or False"), "str": (str, "a text")}
+"""Types of options that are checked as they are, and what they are called."""
+
+
 @dataclass(frozen=True)
 class Option:
     """What is to be known of an option beside its name, type and default.
@@ -121,7 +125,7 @@ def check_options(given: Any) -> None:
     """
     for each in dataclasses.fields(given):
         value = getattr(given, each.name)
-        if each.metadata and not (value is None and each.default is None):
+        if each.metadata:
             _check(each, value)
 
 
@@ -132,6 +136,11 @@ def check_option(kind: Any, name: str, value: Any) -> None:
 
 def _check(declared: dataclasses.Field[Any], value: Any) -> None:
     about: Option = declared.metadata["option"]
+    if value is None and declared.default is None:
+        return
+    kind = KINDS.get(str(declared.type).removesuffix(" | None"))
+    if kind is not None and not isinstance(value, kind[0]):
+        raise ParameterError(f"{declared.name}={value!r}: it must be {kind[1]}")
     if about.choices and value not in about.choices:
         raise ParameterError(f"{declared.name}={value!r}: it must be one of {', '.join(about.choices)}")
     if about.low == -math.inf and about.high == math.inf:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from dataclasses import dataclass
+from numbers import Integral, Real
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +13,10 @@ from numpy.typing import NDArray
 from rose2_logs.errors import ParameterError
 
 Times = NDArray[np.int64]
+
+
+def _is_number(value: object, kind: type) -> bool:
+    return isinstance(value, kind) and not isinstance(value, bool | np.bool_)
 
 
 @dataclass(frozen=True)
@@ -60,10 +66,13 @@ class Selection:
             )
         for name in ("every_s", "min_change_m2", "start_s", "end_s"):
             value = getattr(self, name)
-            if value is not None and not (np.isfinite(value) and value >= 0):
+            if value is not None and not (_is_number(value, Real) and math.isfinite(value) and value >= 0):
                 raise ParameterError(f"{name}={value!r}: it must be a number, 0 or more")
-        if self.max_snapshots is not None and self.max_snapshots < 1:
-            raise ParameterError(f"max_snapshots={self.max_snapshots!r}: it must be 1 or more")
+        if self.start_s is not None and self.end_s is not None and self.start_s > self.end_s:
+            raise ParameterError(f"start_s={self.start_s:g}: it lies after end_s={self.end_s:g}")
+        most = self.max_snapshots
+        if most is not None and not (_is_number(most, Integral) and most >= 1):
+            raise ParameterError(f"max_snapshots={most!r}: it must be a whole number, 1 or more")
 
     def since(self, first_ns: int | None) -> Selection:
         """Return the same with a time range in log times, for a log whose first message is of `first_ns`."""

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import operator
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from numbers import Real
 from typing import Generic, TypeVar
 
 import numpy as np
@@ -22,6 +24,10 @@ SMALLEST_CELL_M, LARGEST_CELL_M = 1e-4, 100.0
 """Sides of cells that maps are made of, in meters: a laser's noise is above, a building below."""
 FARTHEST_ORIGIN_M = 1e8
 """No place on earth lies farther from the origin of its frame, in meters, in no projection."""
+
+
+def _are_numbers(*values: object) -> bool:
+    return all(isinstance(value, Real) and not isinstance(value, bool | np.bool_) for value in values)
 
 
 @dataclass(frozen=True)
@@ -68,6 +74,12 @@ class GridGeometry:
         if height < 0 or width < 0:
             raise InvalidMapError(f"a grid's shape must be rows and columns, not {self.shape!r}")
         object.__setattr__(self, "shape", (height, width))
+        is_pair = isinstance(self.origin_xy_m, Sequence) and len(self.origin_xy_m) == 2
+        if not is_pair or not _are_numbers(self.resolution_m, self.yaw_rad, *self.origin_xy_m):
+            raise InvalidMapError(
+                f"a grid's resolution, origin and yaw must be numbers, not {self.resolution_m!r}, "
+                f"{self.origin_xy_m!r}, {self.yaw_rad!r}"
+            )
         if not SMALLEST_CELL_M <= self.resolution_m <= LARGEST_CELL_M:
             raise InvalidMapError(
                 f"the map's resolution is {self.resolution_m:g} m; it must be positive, from "
@@ -180,7 +192,10 @@ class OccupancySnapshot:
         return f"OccupancySnapshot(index={self.index}, topic={self.topic!r}, {self.geometry.size_text})"
 
     def __post_init__(self) -> None:
-        given = np.asarray(self.cells)
+        if not isinstance(self.geometry, GridGeometry):
+            raise InvalidMapError(f"map {self.index} of {self.topic}: {self.geometry!r} is no GridGeometry")
+        given = np.ma.filled(self.cells, UNKNOWN) if isinstance(self.cells, np.ma.MaskedArray) else self.cells
+        given = np.asarray(given)
         if given.shape != self.geometry.shape:
             raise InvalidMapError(
                 f"map {self.index} of {self.topic}: data of shape {given.shape} "

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rose2_logs.config.parameters import Parameters
+from rose2_logs.errors import ParameterError
 from rose2_logs.tracking.back_projection import BackProjectedSnapshot
 from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot
 
@@ -103,6 +104,48 @@ class Sink:
 
     def abandon(self) -> None:
         """Remove what was begun, if anything: the run has failed. Called once at most."""
+
+
+def as_sinks(given: Any) -> list[Sink]:
+    """Return a list of sinks; anything with methods `begin`, `write` and `finish` is made one.
+
+    Raises
+    ------
+    ParameterError
+        If it is no list, or an entry lacks one of these methods.
+    """
+    if not isinstance(given, list | tuple):
+        raise ParameterError(f"sinks must be a list of sinks, not {given!r:.60}")
+    return [_as_sink(each) for each in given]
+
+
+def _as_sink(given: Any) -> Sink:
+    if isinstance(given, Sink):
+        if type(given).write is Sink.write:
+            raise ParameterError(f"the sink {type(given).__name__} has no method write(step)")
+        return given
+    for name in ("begin", "write", "finish"):
+        if isinstance(given, type) or not callable(getattr(given, name, None)):
+            raise ParameterError(
+                f"a sink needs the methods begin, write and finish, which {given!r:.60} has not; "
+                "derive from rose2_logs.Sink"
+            )
+    return _WrappedSink(given)
+
+
+class _WrappedSink(Sink):
+    """Something with the methods of a sink; those that it lacks do nothing."""
+
+    def __init__(self, given: Any) -> None:
+        self._given = given
+        self.begin, self.write, self.finish = given.begin, given.write, given.finish  # type: ignore[method-assign]
+        for name in ("write_back_projected", "abandon"):
+            if callable(method := getattr(given, name, None)):
+                setattr(self, name, method)
+
+    @property
+    def facts(self) -> Mapping[str, Any]:  # type: ignore[override]
+        return getattr(self._given, "facts", {})
 
 
 @contextmanager

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import glob
+import json
 import logging
 import time
 from collections.abc import Callable, Sequence
@@ -12,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from rose2_logs.config.run_options import RunOptions
-from rose2_logs.errors import InvalidMapError
+from rose2_logs.errors import InvalidMapError, OutputError, ParameterError
 from rose2_logs.io import open_log
 from rose2_logs.io.discovery import stem_of
 from rose2_logs.io.log import LogReader
@@ -21,7 +22,7 @@ from rose2_logs.runs.history import RunHistory, RunSummary
 from rose2_logs.runs.journal import JournaledWorkers
 from rose2_logs.runs.output_folder import OutputFolder
 from rose2_logs.runs.provenance import fingerprint, software_versions
-from rose2_logs.runs.sink import RunInfo, Sink, abandoned_on_error
+from rose2_logs.runs.sink import RunInfo, Sink, abandoned_on_error, as_sinks
 from rose2_logs.runs.store import RunStore, table_path
 from rose2_logs.runs.stream import SnapshotWorkers, TrackedStream, start_workers
 from rose2_logs.runs.summary import SUMMARY, write_summary
@@ -105,6 +106,9 @@ def analyze_log(
         If a run is to be resumed that is over.
     """
     options = options or RunOptions()
+    sinks = as_sinks(sinks)
+    if on_snapshot is not None and not callable(on_snapshot):
+        raise ParameterError(f"on_snapshot must be callable, not {on_snapshot!r:.60}")
     with collect_warnings(options.strict) as warnings:
         return _analyze_log(path, folder, options, on_snapshot, sinks, warnings)
 
@@ -155,11 +159,29 @@ def _analyze_log(
                 messages=dataclasses.asdict(reader.counts),
                 files=[file.name for name, file in planned.items() if name != "summary"],
                 warnings=warnings.as_json(),
-                facts={name: value for sink in outputs for name, value in sink.facts.items()},
+                facts=_facts_of(outputs),
                 seconds=seconds,
                 workers=options.workers,
             )
     return RunResult(folder, output.files, summary, seconds, warnings)
+
+
+def _facts_of(sinks: Sequence[Sink]) -> dict[str, Any]:
+    """Facts of all sinks for the summary.
+
+    Raises
+    ------
+    OutputError
+        If those of one are no JSON object.
+    """
+    facts: dict[str, Any] = {}
+    for sink in sinks:
+        try:
+            json.dumps(sink.facts, allow_nan=False)
+            facts |= {str(name): value for name, value in sink.facts.items()}
+        except (TypeError, ValueError, AttributeError) as error:
+            raise OutputError(f"the facts of a sink for {SUMMARY} are no JSON object: {error}") from error
+    return facts
 
 
 def _follow(

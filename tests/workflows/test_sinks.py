@@ -91,7 +91,7 @@ def test_a_sink_needs_no_more_than_write(log: Path):
     sink = Counter()
     rl.analyze(log, sinks=[sink])
     assert sink.count == MAPS
-    with pytest.raises(NotImplementedError):
+    with pytest.raises(rl.ParameterError, match="no method write"):
         rl.analyze(log, sinks=[rl.Sink()])
 
 
