@@ -16,6 +16,7 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack, contextmanager, suppress
 from functools import lru_cache
 from multiprocessing.context import BaseContext
+from multiprocessing.reduction import ForkingPickler
 from types import ModuleType, TracebackType
 from typing import TYPE_CHECKING, Any, Generic, Self, TypeVar
 
@@ -30,6 +31,8 @@ Result = TypeVar("Result")
 
 LOOK_AHEAD_PER_WORKER = 2
 """Items submitted ahead for each worker: one being processed and one waiting."""
+PROCESSES_PER_CPU = 2
+"""More do not work faster: while one waits for its next map, the other keeps the processor busy."""
 MOST_ON_WINDOWS = 61
 """Processes that Windows can wait for at once: 64 objects, minus those of the pool itself."""
 START_METHOD = "forkserver" if sys.platform == "linux" else "spawn"
@@ -67,25 +70,41 @@ class Workers(Generic[Item, Result]):
         self._count = usable_processes(count)
         self._stack = ExitStack()
         self._pool: ProcessPoolExecutor | None = None
+        self._processes: list[WorkerProcess] = []
         self._folders: tuple[str, ...] = ()
 
     def __enter__(self) -> Self:
-        if self._count > 1:
-            self._folders = self._stack.enter_context(shared_memory_folders())
-            context = _context(self._function)
-            self._pool = ProcessPoolExecutor(
-                self._count, context, initializer=_begin, initargs=(self._function, self._folders)
-            )
-            self._stack.callback(self._pool.shutdown, wait=True, cancel_futures=True)
-            # Submitting a task starts a process: workers import modules while this process opens files.
-            for _ in range(self._count):
-                self._pool.submit(_nothing)
+        try:
+            if self._count > 1:
+                self._start()
+        except BaseException as error:
+            self.__exit__(type(error), error, None)
+            raise
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
+        if error is not None:
+            # Nobody takes what they are still at; one that is just starting would have to be waited for.
+            for process in self._processes:
+                if process.pid is not None:
+                    process.kill()
         self._stack.close()
+
+    def _start(self) -> None:
+        self._folders = self._stack.enter_context(shared_memory_folders())
+        self._pool = ProcessPoolExecutor(
+            self._count,
+            _context(self._function, self._processes),
+            initializer=_begin,
+            initargs=(self._function, self._folders),
+        )
+        self._stack.callback(self._pool.shutdown, wait=True, cancel_futures=True)
+        # Submitting a task starts a process if none is idle: the first workers import modules while this
+        # process opens files, the others start as there is work.
+        for _ in range(min(self._count, usable_cpus())):
+            self._pool.submit(_nothing)
 
     def map(
         self,
@@ -153,9 +172,27 @@ class Workers(Generic[Item, Result]):
             yield before
 
 
-def usable_processes(count: int, platform: str = sys.platform) -> int:
-    """Return the number of worker processes, reduced to what the operating system supports."""
-    return min(count, MOST_ON_WINDOWS) if platform == "win32" else count
+def usable_cpus() -> int:
+    """Return the number of processors that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def usable_processes(count: int, platform: str = sys.platform, cpus: int | None = None) -> int:
+    """Reduce a number of worker processes to what is of use and what the operating system supports.
+
+    Parameters
+    ----------
+    count : int
+        As many as were asked for.
+    platform : str
+        Name of the operating system, as in `sys.platform`.
+    cpus : int, optional
+        Number of processors; by default those that this process may use.
+    """
+    useful = PROCESSES_PER_CPU * (cpus or usable_cpus())
+    return min(count, useful, MOST_ON_WINDOWS) if platform == "win32" else min(count, useful)
 
 
 def ordered_map(
@@ -180,6 +217,14 @@ class WorkerProcess(_CONTEXT.Process):  # type: ignore[misc]
     would start all its work again.
     """
 
+    def start(self) -> None:
+        """Start the process; Ctrl-C comes after it, when it can be ended, not while it is half started."""
+        with _interrupts_held_back():
+            super().start()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _awakened, (bytes(ForkingPickler.dumps(self.__dict__)),)
+
     @staticmethod
     def _Popen(process: Any) -> Any:  # noqa: N802 (the name that multiprocessing calls)
         with _STARTING:
@@ -191,12 +236,63 @@ class WorkerProcess(_CONTEXT.Process):  # type: ignore[misc]
                 sys.modules["__main__"] = script
 
 
-def _context(function: Callable[..., Any]) -> BaseContext:
-    """Choose how processes start: never by forking this one, whose threads (Rerun, Arrow) could deadlock."""
+def _awakened(state: bytes) -> WorkerProcess:
+    """Unpack, in a process that starts, what it is to do; if its parent is gone by now, end it silently."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        known = ForkingPickler.loads(state)
+    except (OSError, EOFError):
+        # The parent's locks went with it.
+        parent = multiprocessing.parent_process()
+        if parent is None or not parent.is_alive():
+            os._exit(1)
+        raise
+    process = WorkerProcess.__new__(WorkerProcess)
+    process.__dict__.update(known)
+    return process
+
+
+@contextmanager
+def _interrupts_held_back() -> Iterator[None]:
+    """Let a Ctrl-C that comes while the context lasts take effect after it."""
+    before = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or not callable(before):
+        yield
+        return
+    came = False
+
+    def remember(*_: object) -> None:
+        nonlocal came
+        came = True
+
+    signal.signal(signal.SIGINT, remember)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+        if came:
+            signal.raise_signal(signal.SIGINT)
+
+
+def _context(function: Callable[..., Any], started: list[WorkerProcess]) -> BaseContext:
+    """Choose how processes start: never by forking this one, whose threads (Rerun, Arrow) could deadlock.
+
+    Parameters
+    ----------
+    function : callable
+        What they are going to call.
+    started : list of WorkerProcess
+        Receives every process before it starts.
+    """
+
+    def process(*arguments: Any, **named: Any) -> WorkerProcess:
+        started.append(WorkerProcess(*arguments, **named))
+        return started[-1]
+
     context = copy.copy(_CONTEXT)
     if START_METHOD == "forkserver":
         context.set_forkserver_preload([getattr(function, "func", function).__module__])
-    context.Process = WorkerProcess
+    context.Process = process
     chosen: BaseContext = context
     return chosen
 

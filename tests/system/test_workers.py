@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from types import SimpleNamespace
 
 import numpy as np
@@ -20,6 +22,7 @@ from rose2_logs.system.workers import (
     WorkerProcess,
     Workers,
     ordered_map,
+    usable_cpus,
     usable_processes,
 )
 
@@ -158,7 +161,66 @@ def test_a_process_is_held_to_one_thread_also_by_libraries_loaded_later():
     assert done.stdout == "{1}\n"
 
 
-def test_more_processes_than_windows_can_wait_for_are_not_started():
-    """A machine of 64 cores would otherwise fail before its first map."""
-    assert [usable_processes(count, "win32") for count in (1, 61, 62, 128)] == [1, 61, 61, 61]
-    assert usable_processes(128, "linux") == 128
+def test_no_more_processes_are_started_than_are_of_use():
+    """Nor than Windows can wait for: a machine of 64 cores would otherwise fail before its first map."""
+    assert [usable_processes(count, "linux", cpus=4) for count in (1, 8, 9, 1000)] == [1, 8, 8, 8]
+    assert [usable_processes(count, "win32", cpus=64) for count in (1, 61, 62, 128)] == [1, 61, 61, 61]
+    assert usable_processes(128, "linux", cpus=64) == 128
+    assert usable_processes(2) == 2
+
+
+def test_processes_start_as_there_is_work():
+    """A thousand that were asked for, for one item: no more than there are processors."""
+    with Workers(slow_square, 1000) as processes:
+        assert list(processes.map([3])) == [(3, 9)]
+        assert len(processes._processes) <= usable_cpus() + 1
+
+
+MANY_WORKERS = """
+import time
+from rose2_logs.system import workers
+workers.usable_cpus = lambda: 12
+if __name__ == "__main__":
+    with workers.Workers(time.sleep, 24) as processes:
+        print("started", flush=True)
+        for _ in processes.map([30] * 100):
+            pass
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+@pytest.mark.parametrize("delay_s", [0.0, 0.5, 2.0])
+@pytest.mark.parametrize("send", [os.kill, os.killpg], ids=["process", "terminal"])
+def test_an_interrupt_ends_workers_that_are_still_starting(tmp_path, send, delay_s: float):
+    """At once, and all that is on stderr is the interrupt itself."""
+    (tmp_path / "many.py").write_text(MANY_WORKERS)
+    command = [sys.executable, tmp_path / "many.py"]
+    pipe = subprocess.PIPE
+    with subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True, start_new_session=True) as running:
+        try:
+            running.stdout.readline()
+            time.sleep(delay_s)
+            send(running.pid, signal.SIGINT)
+            _, told = running.communicate(timeout=15)
+        finally:
+            with suppress(ProcessLookupError):
+                os.killpg(running.pid, signal.SIGKILL)
+    assert running.returncode == -signal.SIGINT
+    assert told.strip().endswith("KeyboardInterrupt")
+    assert told.count("Traceback") == 1
+
+
+def test_an_interrupt_waits_for_a_process_to_be_started(monkeypatch):
+    """So that there is no half started one that nobody could end."""
+    started = []
+
+    def start(_: object) -> None:
+        signal.raise_signal(signal.SIGINT)
+        started.append(True)
+
+    monkeypatch.setattr("rose2_logs.system.workers._CONTEXT.Process.start", start)
+    before = signal.getsignal(signal.SIGINT)
+    with pytest.raises(KeyboardInterrupt):
+        WorkerProcess().start()
+    assert started
+    assert signal.getsignal(signal.SIGINT) is before
