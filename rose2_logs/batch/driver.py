@@ -27,6 +27,7 @@ from rose2_logs.io.discovery import BAG_DESCRIPTION
 from rose2_logs.runs.summary import SUMMARY
 from rose2_logs.runs.tables import BACK_PROJECTED, TABLES
 from rose2_logs.system.files import require_utf8
+from rose2_logs.system.workers import usable_cpus
 
 logger = logging.getLogger(__name__)
 
@@ -276,7 +277,7 @@ class _Batch:
 
     def _workers(self) -> Workers:
         if self._options.scheduler is None:
-            return LocalWorkers(self._options.workers or os.cpu_count() or 1)
+            return LocalWorkers(self._options.workers or usable_cpus())
         from rose2_logs.batch.dask_workers import DaskWorkers
 
         return DaskWorkers(self._options.scheduler)

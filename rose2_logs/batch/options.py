@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from rose2_logs.config.run_options import OUTPUTS, RunOptions, check_options, explained, option
+from rose2_logs.config.run_options import MOST_WORKERS, OUTPUTS, RunOptions, check_options, explained, option
 from rose2_logs.errors import ParameterError
 
 MACHINES = "Where and how often"
@@ -28,11 +28,13 @@ class BatchOptions:
     run: RunOptions = field(default_factory=RunOptions)
     workers: int | None = option(
         None,
-        "Number of logs analyzed at the same time on this machine. By default one for each processor.",
+        "Number of logs analyzed at the same time on this machine: by default one for each processor, and at "
+        "most two.",
         panel=MACHINES,
         commands=BATCH,
         metavar="N",
         low=1,
+        high=MOST_WORKERS,
     )
     scheduler: str | None = option(
         None,

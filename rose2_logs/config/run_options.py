@@ -32,6 +32,8 @@ RECORDING_LAYERS = (
     "voronoi",
 )
 """Layers of a recording that can be left out; map, rooms and doorways are always there."""
+MOST_WORKERS = 1024
+"""Far more than there are processors in one machine; slips of the keyboard are not."""
 LONGEST_LOG_S = 2.0**63 / 1e9
 """Log times are 64 bit integers that count nanoseconds."""
 Type = TypeVar("Type", bound=type)
@@ -272,11 +274,13 @@ class RunOptions:
     )
     workers: int = option(
         1,
-        "Number of processes that analyze maps at the same time. Results do not depend on it.",
+        "Number of processes that analyze maps at the same time, at most two for each processor. Results do "
+        "not depend on it.",
         panel=METHOD,
         commands=("analyze",),
         metavar="N",
         low=1,
+        high=MOST_WORKERS,
     )
     recording: bool = option(
         True, "Write the Rerun recording.", panel=OUTPUTS, commands=BOTH, flag="--no-rrd"

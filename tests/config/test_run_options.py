@@ -26,7 +26,8 @@ from rose2_logs.segmentation.baselines.stage import BASELINES
         ({"min_change_m2": "much"}, "min_change_m2='much': it must be a number"),
         ({"max_snapshots": 0}, "max_snapshots=0: it must be a whole number, 1 or more"),
         ({"max_snapshots": 2.5}, "max_snapshots=2.5: it must be a whole number"),
-        ({"workers": 0}, "workers=0: it must be a whole number, 1 or more"),
+        ({"workers": 0}, "workers=0: it must be a whole number, 1 to 1024"),
+        ({"workers": 10**6}, "workers=1000000: it must be a whole number, 1 to 1024"),
         ({"workers": None}, "workers=None"),
         ({"workers": True}, "workers=True"),
         ({"method": "magic"}, "method='magic': it must be one of rose2, morphological"),
@@ -42,7 +43,14 @@ def test_a_value_that_cannot_be_used_is_refused_by_name(wrong: dict[str, object]
 
 
 @pytest.mark.parametrize(
-    "wrong", [{"workers": 0}, {"retries": -1}, {"scheduler": "head:8786", "workers": 2}, {"retries": 0.5}]
+    "wrong",
+    [
+        {"workers": 0},
+        {"workers": 1025},
+        {"retries": -1},
+        {"scheduler": "head:8786", "workers": 2},
+        {"retries": 0.5},
+    ],
 )
 def test_so_is_one_of_a_batch(wrong: dict[str, object]):
     with pytest.raises(ParameterError, match=min(wrong) if len(wrong) == 1 else "workers=2 is for this"):
