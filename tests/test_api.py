@@ -143,6 +143,8 @@ def test_maps_with_known_rooms_are_evaluated(tmp_path: Path):
     case = {"name": "one", "group": "drawn", "map": "map.png", "rooms": "rooms.png", "resolution_m": 0.05}
     (tmp_path / "cases.json").write_text(json.dumps({"cases": [case]}))
     found = rl.evaluate(tmp_path / "cases.json")
+    assert repr(found) == "Evaluation(method='rose2', 1 map, 1 group)"
+    assert repr(found.maps[0]) == "CaseResult('drawn/one', 2 rooms, iou_sym=100.0)"
     assert [each.case.name for each in found.maps] == ["one"]
     assert found.groups["drawn"].iou_sym == pytest.approx(100)
     assert found.method == "rose2"

@@ -10,6 +10,7 @@ from shapely.geometry.base import BaseGeometry
 from rose2_logs.comparison.placement import PlacedMap
 from rose2_logs.model.analysis import Walls
 from rose2_logs.model.occupancy import FloatArray
+from rose2_logs.system.text import counted
 from rose2_logs.tracking.registration import RigidMotion
 
 
@@ -39,6 +40,10 @@ class FinalLayout:
     shapes: tuple[BaseGeometry, ...]
     areas_m2: FloatArray
     walls: Walls | None
+
+    def __repr__(self) -> str:
+        size = self.map.snapshot.geometry.size_text
+        return f"FinalLayout({self.name!r}, {counted(len(self.tracks), 'room')}, {size})"
 
     def shapes_moved(self, motion: RigidMotion) -> tuple[BaseGeometry, ...]:
         """Return the rooms' shapes where a motion brings them."""

@@ -48,6 +48,11 @@ class LayoutComparison:
     walls: WallComparison | None
     scale: float | None = None
 
+    def __repr__(self) -> str:
+        rooms = ", ".join(f"{count} {status}" for status, count in self.room_counts.items())
+        doubt = "" if self.same_building else "; not the same building"
+        return f"LayoutComparison({self.a.name!r}, {self.b.name!r}, rooms: {rooms or 'none'}{doubt})"
+
     @property
     def same_building(self) -> bool:
         """Whether the two seem to show the same building."""

@@ -22,6 +22,7 @@ from rose2_logs.model.labels import known_window
 from rose2_logs.model.occupancy import UNKNOWN, BoolArray, FloatArray, OccupancySnapshot, classify
 from rose2_logs.segmentation.circular_peaks import circular_peaks
 from rose2_logs.segmentation.rose.spectrum import angular_energy, compute_spectrum
+from rose2_logs.system.text import counted
 from rose2_logs.tracking.registration import RigidMotion, WallFit, evenly, wall_faces
 
 
@@ -81,6 +82,10 @@ class PlacedMap:
         faces_m = wall_faces(self.free, self.occupied, snapshot.geometry)
         least = max(self.parameters.tracking.fit_min_points, comparison.faces_min_share * len(occupied_m))
         self.walls = faces_m if len(faces_m) >= least else occupied_m
+
+    def __repr__(self) -> str:
+        points = counted(len(self.walls), "wall point")
+        return f"PlacedMap({self.snapshot.geometry.size_text}, {points})"
 
     def scaled(self, scale: float) -> PlacedMap:
         """Return the same map with cells so many times larger."""

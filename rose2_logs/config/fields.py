@@ -50,6 +50,24 @@ def choice(default: str, choices: tuple[str, ...], why: str) -> Any:
     return field(default=default, metadata={"unit": "name", "why": why, "choices": choices})
 
 
+def changed(block: Any) -> dict[str, Any]:
+    """Values of a dataclass that differ from the defaults, by name."""
+    found = {}
+    for declared in dataclasses.fields(block):
+        factory: Any = declared.default_factory
+        default = declared.default if factory is dataclasses.MISSING else factory()
+        if (value := getattr(block, declared.name)) != default:
+            found[declared.name] = value
+    return found
+
+
+def changed_text(block: Any) -> str:
+    """Show a dataclass by what differs from the defaults."""
+    return (
+        f"{type(block).__name__}({', '.join(f'{name}={value!r}' for name, value in changed(block).items())})"
+    )
+
+
 class ParameterBlock:
     """Base of the blocks of parameters: a block checks itself when it is built.
 
@@ -84,16 +102,11 @@ class ParameterBlock:
                     )
 
     def __repr__(self) -> str:
-        shown = (f"{name}={value!r}" for name, value in self.changed().items())
-        return f"{type(self).__name__}({', '.join(shown)})"
+        return changed_text(self)
 
     def changed(self) -> dict[str, float | int | str]:
         """Values that differ from the defaults, by name."""
-        values = {
-            declared.name: (getattr(self, declared.name), declared.default)
-            for declared in dataclasses.fields(self)  # type: ignore[arg-type]
-        }
-        return {name: value for name, (value, default) in values.items() if value != default}
+        return changed(self)
 
 
 def _checked(name: str, declared: dataclasses.Field[Any], value: Any) -> float | int | str:

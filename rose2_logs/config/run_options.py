@@ -14,6 +14,7 @@ from numbers import Integral, Real
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from rose2_logs.config.baselines import METHODS
+from rose2_logs.config.fields import changed_text
 from rose2_logs.config.parameters import Parameters
 from rose2_logs.errors import ParameterError
 
@@ -338,6 +339,9 @@ class RunOptions:
     origin: str | None = option(
         None, "What the summary names as the log, for a log that was copied to be read; by default its path."
     )
+
+    def __repr__(self) -> str:
+        return changed_text(self)
 
     def __post_init__(self) -> None:
         check_options(self)

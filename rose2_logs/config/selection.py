@@ -10,6 +10,7 @@ from numbers import Integral, Real
 import numpy as np
 from numpy.typing import NDArray
 
+from rose2_logs.config.fields import changed_text
 from rose2_logs.errors import ParameterError
 
 Times = NDArray[np.int64]
@@ -58,6 +59,9 @@ class Selection:
     max_snapshots: int | None = None
     start_s: float | None = None
     end_s: float | None = None
+
+    def __repr__(self) -> str:
+        return changed_text(self)
 
     def __post_init__(self) -> None:
         if self.start_ns is not None and self.end_ns is not None and self.start_ns > self.end_ns:

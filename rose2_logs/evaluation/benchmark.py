@@ -17,6 +17,7 @@ from rose2_logs.config.parameters import Parameters
 from rose2_logs.errors import CasesError
 from rose2_logs.evaluation.cases import Case
 from rose2_logs.evaluation.scores import Scores, mean_scores, score
+from rose2_logs.system.text import counted
 from rose2_logs.system.workers import ordered_map
 
 
@@ -43,6 +44,10 @@ class CaseResult:
     scores: Scores
     free_area_m2: float
     seconds: float
+
+    def __repr__(self) -> str:
+        rooms = counted(round(self.scores.rooms_seg), "room")
+        return f"CaseResult('{self.case.group}/{self.case.name}', {rooms}, iou_sym={self.scores.iou_sym:.1f})"
 
     def without_labels(self) -> CaseResult:
         """Return the same with an empty label image, to be kept for a table of many."""

@@ -68,6 +68,9 @@ class LogReader:
             if item.name == self.topic + PATCH_SUFFIX and is_patch_type(item.message_type)
         ]
 
+    def __repr__(self) -> str:
+        return f"LogReader({self.info.path.name!r}, {self.info.format}, topic={self.topic!r})"
+
     def __enter__(self) -> Self:
         return self
 

@@ -12,6 +12,7 @@ from shapely.geometry.base import BaseGeometry
 from rose2_logs.model.occupancy import BoolArray, CellValues, FloatArray, GridGeometry, OccupancySnapshot
 from rose2_logs.model.room_quality import RoomQuality
 from rose2_logs.model.rooms import Doorway, RoomMap
+from rose2_logs.system.text import counted
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +99,7 @@ class Walls:
     line_weight: FloatArray
 
     def __repr__(self) -> str:
-        return f"Walls({len(self.segments_m)} segments, {len(self.lines_m)} lines)"
+        return f"Walls({counted(len(self.segments_m), 'segment')}, {counted(len(self.lines_m), 'line')})"
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,7 +138,7 @@ class FloorPlan:
     room_of_face: NDArray[np.int32]
 
     def __repr__(self) -> str:
-        return f"FloorPlan({len(self.faces)} faces, {len(self.edges_m)} edges)"
+        return f"FloorPlan({counted(len(self.faces), 'face')}, {counted(len(self.edges_m), 'edge')})"
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,9 +193,9 @@ class SnapshotAnalysis:
     def __repr__(self) -> str:
         parts = [f"index={self.index}", repr(self.rooms)]
         if self.walls is not None:
-            parts.append(f"{len(self.walls.segments_m)} wall segments")
+            parts.append(counted(len(self.walls.segments_m), "wall segment"))
         if self.floor_plan is not None:
-            parts.append(f"{len(self.floor_plan.faces)} faces")
+            parts.append(counted(len(self.floor_plan.faces), "face"))
         return f"{type(self).__name__}({', '.join(parts)})"
 
     @property

@@ -9,6 +9,7 @@ from statistics import median
 
 from rose2_logs.config.parameters import Parameters
 from rose2_logs.model.occupancy import OccupancySnapshot
+from rose2_logs.system.text import counted
 from rose2_logs.tracking.back_projection import BackProjectedSnapshot, RunBackProjection
 from rose2_logs.tracking.convergence import Convergence, RoomRows, measure_convergence
 from rose2_logs.tracking.registration import RigidMotion
@@ -133,6 +134,11 @@ class RunSummary:
     totals: RunTotals
     histories: TrackHistories
     convergence: Convergence
+
+    def __repr__(self) -> str:
+        maps, rooms = counted(self.totals.snapshots, "map"), counted(self.totals.rooms_last, "room")
+        tracks, events = counted(self.totals.tracks, "track"), counted(self.totals.events.total(), "event")
+        return f"RunSummary({maps}, {rooms} at the end, {tracks}, {events})"
 
     @property
     def layout_final(self) -> SnapshotRef | None:

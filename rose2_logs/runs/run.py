@@ -17,7 +17,7 @@ from rose2_logs.model.room_plan import RoomPlan
 from rose2_logs.runs.stored_run import StoredRun
 from rose2_logs.runs.table import Table
 from rose2_logs.runs.tables import BACK_PROJECTED, Row
-from rose2_logs.system.text import percent
+from rose2_logs.system.text import counted, percent
 
 if TYPE_CHECKING:
     from rose2_logs.drawing.drawing import Drawing
@@ -165,7 +165,8 @@ class Run(StoredRun, Sequence["RunSnapshot"]):
 
     def __repr__(self) -> str:
         found = self.summary["results"]
-        return f"<Run {self.name}: {found['snapshots']} maps, {found['rooms_last']} rooms at the end>"
+        maps, rooms = counted(found["snapshots"], "map"), counted(found["rooms_last"], "room")
+        return f"<Run {self.name}: {maps}, {rooms} at the end>"
 
     def _repr_html_(self) -> str:
         from html import escape
@@ -322,7 +323,7 @@ class RunSnapshot:
         return plot_plan(self.plan(back_projected=back_projected), ax)
 
     def __repr__(self) -> str:
-        about = f"coverage {percent(self.coverage)}, {self._row['rooms']} rooms"
+        about = f"coverage {percent(self.coverage)}, {counted(int(self._row['rooms']), 'room')}"
         return f"<RunSnapshot {self.number} of {self.run.name}: {about}>"
 
     def _repr_svg_(self) -> str:

@@ -59,6 +59,9 @@ class RunInfo:
     provenance: dict[str, Any]
     origin: str | None = None
 
+    def __repr__(self) -> str:
+        return f"RunInfo({self.log_path.name!r}, topic={self.topic!r}, method={self.method!r})"
+
 
 class Sink:
     """An output of a run. Derive from it and override what is needed; `write` is the least.

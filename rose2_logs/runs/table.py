@@ -8,6 +8,7 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 from rose2_logs.errors import MissingPackageError
+from rose2_logs.system.text import counted
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -86,7 +87,8 @@ class Table:
         yield from self.arrow.to_pylist()
 
     def __repr__(self) -> str:
-        return f"<Table {self.name}: {self.arrow.num_rows} rows, {self.arrow.num_columns} columns>"
+        rows, columns = counted(len(self), "row"), counted(self.arrow.num_columns, "column")
+        return f"<Table {self.name}: {rows}, {columns}>"
 
     def _repr_html_(self) -> str:
         if find_spec("pandas") is not None:

@@ -17,6 +17,7 @@ from rose2_logs.evaluation.benchmark import CaseResult, evaluate_cases, figures,
 from rose2_logs.evaluation.cases import load_cases
 from rose2_logs.evaluation.run_tracks import RunTracks, RunTrackScores, run_tracks_as_json
 from rose2_logs.evaluation.scores import Scores
+from rose2_logs.system.text import counted
 
 OnCase = Callable[[CaseResult, int, int], None]
 """Told of each result, with its labels, how many cases are done and how many there are."""
@@ -54,6 +55,10 @@ class Evaluation:
     groups: Mapping[str, Scores]
     runs: Mapping[str, tuple[RunPoint, ...]] = field(default_factory=dict)
     tracks: Mapping[str, RunTrackScores] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        maps, groups = counted(len(self.maps), "map"), counted(len(self.groups), "group")
+        return f"Evaluation(method={self.method!r}, {maps}, {groups})"
 
     def as_json(self) -> dict[str, Any]:
         """Return everything as JSON values."""

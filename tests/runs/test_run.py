@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import re
 import subprocess
 import sys
 import tempfile
@@ -20,6 +21,7 @@ import rose2_logs as rl
 from rose2_logs.errors import LogError, MissingPackageError, ParameterError
 from rose2_logs.model.occupancy import classify
 from rose2_logs.runs.table_schemas import SCHEMAS
+from rose2_logs.system.text import counted
 
 INTEL = Path(__file__).parents[3] / "shared" / "bags" / "intel.ros2_mcap"
 
@@ -118,7 +120,7 @@ def test_tables_are_arrow_and_dataframes(run: rl.Run, name: str):
     assert table.query("snapshot == 4" if "snapshot" in table.columns else "track == 1").equals(
         table.pandas.query("snapshot == 4" if "snapshot" in table.columns else "track == 1")
     )
-    assert repr(table) == f"<Table {name}: {len(table)} rows, {len(table.columns)} columns>"
+    assert repr(table) == f"<Table {name}: {counted(len(table), 'row')}, {len(table.columns)} columns>"
     assert getattr(run, name).arrow is table.arrow
 
 
@@ -158,6 +160,56 @@ def test_a_map_is_found_by_number_coverage_and_as_the_last(run: rl.Run):
     for wrong in ({"snapshot": 9}, {"coverage": 50}, {"coverage": -0.1}):
         with pytest.raises(ParameterError):
             run.at(**wrong)
+
+
+def test_what_there_is_one_of_is_shown_so():
+    """A run of one map, with the one room that it shows."""
+    grid = np.full((60, 60), 100, np.int8)
+    grid[2:-2, 2:-2] = 0
+    found = rl.segment(grid, resolution_m=0.1)
+    assert "(1 room, 0 doorways, " in repr(found)
+    one = np.zeros((1, 4))
+    walls = rl.Walls(one, np.zeros(1, int), np.zeros(1, int), one, np.zeros(1, int), np.ones(1))
+    assert repr(walls) == "Walls(1 segment, 1 line)"
+    assert repr(rl.analyze(SAMPLE_LOGS / "office.mcap", max_snapshots=1)).startswith("<Run office: 1 map, 1")
+
+
+class KeptFacts(rl.Sink):
+    """Holds what a run tells of itself."""
+
+    def begin(self, info: rl.RunInfo) -> None:
+        self.info = info
+
+    def write(self, step: rl.TrackedSnapshot) -> None:
+        pass
+
+    def finish(self, summary: rl.RunSummary) -> None:
+        self.summary = summary
+
+
+def test_what_is_known_of_runs_is_shown_in_a_line():
+    """By what tells one from another."""
+    kept = KeptFacts()
+    run = rl.analyze(SAMPLE_LOGS / "office.mcap", max_snapshots=3, sinks=[kept])
+    found, size = rl.compare(run, run), r"\d+ x \d+ cells of 0\.05 m"
+    assert repr(kept.info) == "RunInfo('office.mcap', topic='/map', method='rose2')"
+    assert re.fullmatch(
+        r"RunSummary\(3 maps, 19 rooms at the end, \d+ tracks, \d+ events\)", repr(kept.summary)
+    )
+    assert repr(found) == "LayoutComparison('office', 'office', rooms: 19 same)"
+    assert re.fullmatch(rf"FinalLayout\('office', 19 rooms, {size}\)", repr(found.a))
+    assert re.fullmatch(rf"PlacedMap\({size}, \d+ wall points\)", repr(found.a.map))
+    with rl.open_log(SAMPLE_LOGS / "office.mcap") as reader:
+        assert repr(reader) == "LogReader('office.mcap', MCAP, topic='/map')"
+
+
+def test_options_are_shown_by_what_differs_from_the_defaults():
+    assert (repr(rl.RunOptions()), repr(rl.Selection())) == ("RunOptions()", "Selection()")
+    assert repr(rl.Selection(every_s=2.0)) == "Selection(every_s=2.0)"
+    parameters = rl.Parameters.from_any({"walls.extension_m": 6})
+    assert repr(rl.RunOptions(method="voronoi", layers="all", parameters=parameters)) == (
+        "RunOptions(method='voronoi', parameters=Parameters(walls=WallParameters(extension_m=6.0)))"
+    )
 
 
 def test_runs_and_their_parts_are_shown_small(run: rl.Run):
