@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 import weakref
 from collections.abc import Iterator, Sequence
 from functools import cached_property
@@ -122,7 +123,7 @@ class Run(StoredRun, Sequence["RunSnapshot"]):
         Raises
         ------
         ParameterError
-            If there is no such map, or the coverage is no share.
+            If there is no such map, the coverage is no share, or both are given.
         """
         return RunSnapshot(self, self.choose(snapshot, coverage))
 
@@ -155,10 +156,19 @@ class Run(StoredRun, Sequence["RunSnapshot"]):
     @overload
     def __getitem__(self, index: slice) -> list[RunSnapshot]: ...
     def __getitem__(self, index: int | slice) -> RunSnapshot | list[RunSnapshot]:
-        numbers = self.columns["snapshot"][index]
+        numbers = self.columns["snapshot"]
         if isinstance(index, slice):
-            return [RunSnapshot(self, int(number)) for number in numbers]
-        return RunSnapshot(self, int(numbers))
+            return [RunSnapshot(self, int(number)) for number in numbers[index]]
+        try:
+            place = operator.index(index)
+        except TypeError:
+            place = None
+        if place is None or isinstance(index, bool):
+            kind = type(index).__name__
+            raise TypeError(f"the maps of a run have whole numbers and slices as indices, not {kind}")
+        if not -len(numbers) <= place < len(numbers):
+            raise IndexError(f"run {self.name} has {counted(len(numbers), 'map')}; none has index {place}")
+        return RunSnapshot(self, int(numbers[place]))
 
     def __iter__(self) -> Iterator[RunSnapshot]:
         return (RunSnapshot(self, int(number)) for number in self.columns["snapshot"])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from functools import cached_property
+from numbers import Integral, Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -69,26 +70,7 @@ def find_results(folder: Path) -> list[Path]:
 
 
 class StoredRun:
-    """What a run has stored, as reports, exports and comparisons need it.
-
-    Parameters
-    ----------
-    folder : path
-        The folder with ``summary.json``.
-
-    Attributes
-    ----------
-    folder : path
-    summary : dict
-        The content of ``summary.json``.
-
-    Raises
-    ------
-    ResultsError
-        If the folder is not one of results, its summary cannot be read, or it is of another version.
-    OutputError
-        If its name is not UTF-8.
-    """
+    """What a run has stored, as reports, exports and comparisons need it; see `Run`."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -178,15 +160,21 @@ class StoredRun:
 
     def choose(self, snapshot: int | None = None, coverage: float | None = None) -> int:
         """Return the number of a map; see `at`."""
+        if snapshot is not None and coverage is not None:
+            raise ParameterError("a map is chosen by its snapshot or by its coverage; give only one of them")
         numbers = self.columns["snapshot"]
         if snapshot is not None:
+            if not _is_number(snapshot, Integral):
+                raise ParameterError(f"the snapshot is a whole number, not {snapshot!r}")
             if snapshot not in numbers:
                 raise ParameterError(
                     f"{self.folder}: no snapshot {snapshot}; they go from {numbers[0]} to {numbers[-1]}"
                 )
-            return snapshot
+            return int(snapshot)
         if coverage is None:
             return int(numbers[-1])
+        if not _is_number(coverage, Real):
+            raise ParameterError(f"the coverage is a number from 0 to 1, not {coverage!r}")
         if not 0 <= coverage <= 1:
             raise ParameterError(f"the coverage is a share from 0 to 1, not {coverage:g}; half is 0.5")
         covered = np.flatnonzero(self.columns["coverage"] >= coverage)
@@ -313,6 +301,10 @@ class StoredRun:
             None if walls is None else walls.segments_m.reshape(-1, 2, 2),
             self.map(snapshot)[0] if with_map else None,
         )
+
+
+def _is_number(value: object, kind: type) -> bool:
+    return isinstance(value, kind) and not isinstance(value, bool)
 
 
 def _read_summary(folder: Path) -> dict[str, Any]:

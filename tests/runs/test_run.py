@@ -145,9 +145,18 @@ def test_a_run_is_a_sequence_of_its_maps(run: rl.Run):
     assert (run[0].number, run[-1].number, run[-5].number) == (0, 4, 0)
     assert [each.number for each in run[1:4:2]] == [1, 3]
     assert [each.number for each in reversed(run)] == [4, 3, 2, 1, 0]
+    assert run[np.int64(2)].number == 2
     for index in (5, -6):
-        with pytest.raises(IndexError):
+        with pytest.raises(IndexError, match=f"^run office has 5 maps; none has index {index}$"):
             run[index]
+
+
+@pytest.mark.parametrize("index", [True, None, "x", 1.0, [0, 1], (0, 1), np.array([True] * 5)], ids=repr)
+def test_what_is_no_index_of_a_map_is_refused_in_a_line(run: rl.Run, index: object):
+    with pytest.raises(TypeError) as refused:
+        run[index]
+    assert "whole numbers" in str(refused.value)
+    assert "\n" not in str(refused.value)
 
 
 def test_a_map_is_found_by_number_coverage_and_as_the_last(run: rl.Run):
@@ -157,9 +166,29 @@ def test_a_map_is_found_by_number_coverage_and_as_the_last(run: rl.Run):
     assert half.number == run.at(coverage=0.5).number
     assert half.coverage >= 0.5 > run[half.number - 1].coverage
     assert half.time_s == run.snapshots["time_s"][half.number]
-    for wrong in ({"snapshot": 9}, {"coverage": 50}, {"coverage": -0.1}):
-        with pytest.raises(ParameterError):
-            run.at(**wrong)
+    assert run.figure(snapshot=None, coverage=None).svg() == run.figure().svg()
+
+
+@pytest.mark.parametrize(
+    ("wrong", "told"),
+    [
+        ({"snapshot": 9}, "no snapshot 9; they go from 0 to 4"),
+        ({"snapshot": True}, "the snapshot is a whole number, not True"),
+        ({"snapshot": "x"}, "the snapshot is a whole number, not 'x'"),
+        ({"coverage": 50}, "half is 0.5"),
+        ({"coverage": -0.1}, "half is 0.5"),
+        ({"coverage": float("nan")}, "half is 0.5"),
+        ({"coverage": "x"}, "the coverage is a number from 0 to 1, not 'x'"),
+        ({"coverage": True}, "the coverage is a number from 0 to 1, not True"),
+        ({"snapshot": 1, "coverage": 0.5}, "give only one of them"),
+    ],
+)
+def test_a_map_that_cannot_be_chosen_is_told(run: rl.Run, wrong: dict[str, object], told: str):
+    """By whatever asks for it."""
+    for ask in (run.at, run.figure, run.plot):
+        with pytest.raises(ParameterError) as refused:
+            ask(**wrong)
+        assert told in str(refused.value)
 
 
 def test_what_there_is_one_of_is_shown_so():
