@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property
 from numbers import Integral, Real
 from pathlib import Path
+from types import NoneType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -30,6 +32,9 @@ from rose2_logs.tracking.registration import RigidMotion
 if TYPE_CHECKING:
     import pyarrow as pa
 
+MISSING = object()
+"""The value of a key that is not there."""
+NUMBER = (int, float)
 SUMMARY_KEYS: dict[str, type | tuple[type, ...]] = {
     "log": str,
     "topic": str,
@@ -39,11 +44,26 @@ SUMMARY_KEYS: dict[str, type | tuple[type, ...]] = {
     "parameters": dict,
     "messages": dict,
     "warnings": dict,
+    "parameters.occupancy": dict,
+    "parameters.reading": dict,
     "results": dict,
+    "results.snapshots": int,
+    "results.rooms_last": int,
+    "results.tracks": int,
+    "results.coverage_first": NUMBER,
+    "results.coverage_last": NUMBER,
+    "results.events": dict,
     "layout": dict,
+    "layout.final_since": (dict, NoneType),
     "files": list,
 }
-"""What every summary holds."""
+"""What every summary holds, and is read from it."""
+FINAL_KEYS: dict[str, type | tuple[type, ...]] = {
+    "layout.final_since.snapshot": int,
+    "layout.final_since.time_s": NUMBER,
+    "layout.final_since.coverage": NUMBER,
+}
+"""And that of a run whose layout became final."""
 MAKE_AGAIN = "analyze the log again"
 """The remedy for results that cannot be used."""
 
@@ -328,10 +348,20 @@ def _read_summary(folder: Path) -> dict[str, Any]:
             f"{MAKE_AGAIN} ({summary['log']}) to another folder, or overwrite this one",
             file=path,
         )
-    for key, kind in SUMMARY_KEYS.items():
-        if not isinstance(summary.get(key), kind):
-            raise ResultsError(f"{path}: its {key} is missing or damaged; {MAKE_AGAIN}", file=path)
+    _require_keys(path, summary, SUMMARY_KEYS)
+    if summary["layout"]["final_since"] is not None:
+        _require_keys(path, summary, FINAL_KEYS)
     return summary
+
+
+def _require_keys(path: Path, summary: dict[str, Any], keys: Mapping[str, type | tuple[type, ...]]) -> None:
+    """Refuse a summary in which a dotted key is missing or has a value of another type."""
+    for key, kind in keys.items():
+        value: Any = summary
+        for name in key.split("."):
+            value = value.get(name, MISSING)
+        if not isinstance(value, kind):
+            raise ResultsError(f"{path}: its {key} is missing or damaged; {MAKE_AGAIN}", file=path)
 
 
 def _ends(table: pa.Table) -> NDArray[np.float64]:

@@ -15,7 +15,7 @@ from finished_runs import SAMPLE_LOGS, run_of
 from saved_maps import save_run
 
 from rose2_logs.errors import ParameterError, ResultsError
-from rose2_logs.runs.stored_run import StoredRun, find_results
+from rose2_logs.runs.stored_run import FINAL_KEYS, SUMMARY_KEYS, StoredRun, find_results
 from rose2_logs.runs.table_schemas import SCHEMAS
 from rose2_logs.runs.tables import TABLES, pack_image
 from rose2_logs.workflows.figure import export_plan
@@ -115,6 +115,38 @@ def test_a_damaged_summary_is_named(copied: Path, damage: Callable[[Path], objec
     assert said in told(lambda: StoredRun(copied), copied / "summary.json")
 
 
+def whole_summary(folder: Path) -> dict:
+    return json.loads((folder / "summary.json").read_text())
+
+
+@pytest.mark.parametrize("wrong", [None, "damaged"], ids=["missing", "of another type"])
+@pytest.mark.parametrize("key", [key for key in (*SUMMARY_KEYS, *FINAL_KEYS) if "." in key])
+def test_what_is_read_from_a_summary_is_required_when_it_is_opened(copied: Path, key: str, wrong: object):
+    """Not only when a run is shown, or its report is written."""
+    summary = whole_summary(copied)
+    *above, name = key.split(".")
+    block = summary
+    for each in above:
+        block = block[each]
+    if wrong is None:
+        del block[name]
+    else:
+        block[name] = wrong
+    (copied / "summary.json").write_text(json.dumps(summary))
+    assert f"its {key} is missing or damaged" in told(lambda: StoredRun(copied), copied / "summary.json")
+
+
+@pytest.mark.parametrize("key", ["results", "parameters"])
+def test_an_empty_part_of_a_summary_is_named(copied: Path, key: str):
+    change_summary(copied, **{key: {}})
+    assert f"its {key}." in told(lambda: StoredRun(copied), copied / "summary.json")
+
+
+def test_a_layout_that_was_never_final_is_no_damage(copied: Path):
+    change_summary(copied, layout=whole_summary(copied)["layout"] | {"final_since": None})
+    assert StoredRun(copied).summary["layout"]["final_since"] is None
+
+
 def test_a_folder_without_a_summary_is_named(copied: Path):
     """And the folder below it that has one."""
     assert f"did you mean {copied}?" in told(lambda: StoredRun(copied.parent), copied.parent)
@@ -138,7 +170,8 @@ def test_results_of_version_0_1_are_refused_with_the_remedy(copied: Path, versio
 
 
 def test_parameters_of_another_version_are_named(copied: Path):
-    change_summary(copied, parameters={"walls": {"of_old": 1}})
+    parameters = whole_summary(copied)["parameters"] | {"walls": {"of_old": 1}}
+    change_summary(copied, parameters=parameters)
     assert "is of another version" in told(lambda: StoredRun(copied).parameters, copied / "summary.json")
 
 
