@@ -402,7 +402,8 @@ def compare(
     ResultsError
         If results cannot be read, or a last map has too few walls to tell how it lies.
     OutputError
-        If there is a comparison already and it may not be replaced, or a file cannot be written.
+        If the folder is that of a run, there is a comparison already and it may not be replaced, or a file
+        cannot be written.
 
     Examples
     --------

@@ -11,9 +11,10 @@ from rose2_logs.comparison.final_layout import FinalLayout
 from rose2_logs.comparison.layouts import LayoutComparison, compare_layouts
 from rose2_logs.comparison.placement import PlacedMap
 from rose2_logs.config.parameters import Parameters
-from rose2_logs.errors import ResultsError
+from rose2_logs.errors import OutputError, ResultsError
 from rose2_logs.model.occupancy import OccupancySnapshot
 from rose2_logs.runs.run import Run
+from rose2_logs.runs.summary import SUMMARY
 from rose2_logs.system.files import refuse_existing, writing
 
 FILES = (
@@ -63,11 +64,14 @@ def compare_runs(
     ResultsError
         If a folder holds no results, or the last map of a run has too few walls to tell how it lies.
     OutputError
-        If there is a comparison already and it may not be replaced, or a file cannot be written.
+        If the folder is that of a run, there is a comparison already and it may not be replaced, or a file
+        cannot be written.
     """
     from rose2_logs.drawing.comparison_picture import draw_comparison
     from rose2_logs.outputs.comparison_tables import write_comparison_summary, write_comparison_tables
 
+    if (folder / SUMMARY).is_file():
+        raise OutputError(f"{folder}: holds the results of a run; write the comparison to another folder")
     files = tuple(folder / name for name in FILES)
     refuse_existing(files, overwrite=overwrite)
     name_a, name_b = _names(folder_a, folder_b)

@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 from PIL import Image
 from saved_maps import FREE, UNKNOWN, WALL, save_map
 
+import rose2_logs as rl
+from rose2_logs.errors import OutputError
 from rose2_logs.workflows.compare import FILES
 
 BIN = Path(sys.executable).parent
@@ -115,3 +117,16 @@ def test_a_comparison_that_replaces_one_leaves_nothing_of_it(cli, results, tmp_p
     code, said, _ = cli("compare", *results[::-1], "-o", out, "--no-rrd", "--overwrite")
     assert (code, "comparison.rrd" in said) == (0, False)
     assert sorted(file.name for file in out.iterdir()) == sorted(FILES[:-1])
+
+
+def test_a_comparison_is_not_mixed_into_the_results_of_a_run(cli, results):
+    """Whichever run it is, and even if an earlier comparison may be replaced."""
+    before, after = results
+    files = sorted(after.iterdir())
+    code, out, err = cli("compare", before, after, "-o", after, "--overwrite")
+    assert (code != 0, out) == (True, "")
+    told = "holds the results of a run; write the comparison to another folder"
+    assert told in " ".join(err.split())
+    with pytest.raises(OutputError, match=told):
+        rl.compare(before, after, out=after, overwrite=True)
+    assert sorted(after.iterdir()) == files
