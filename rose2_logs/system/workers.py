@@ -291,10 +291,25 @@ def _context(function: Callable[..., Any], started: list[WorkerProcess]) -> Base
 
     context = copy.copy(_CONTEXT)
     if START_METHOD == "forkserver":
-        context.set_forkserver_preload([getattr(function, "func", function).__module__])
+        work = getattr(function, "func", function).__module__
+        context.set_forkserver_preload([work, "rose2_logs.system.fork_server"])
+        _start_fork_server()
     context.Process = process
     chosen: BaseContext = context
     return chosen
+
+
+def _start_fork_server() -> None:
+    """Start the process that workers are forked from, unless it runs; Ctrl-C is blocked while it imports."""
+    from multiprocessing import forkserver, resource_tracker
+
+    resource_tracker.ensure_running()  # it would unblock the signal itself
+    with _interrupts_held_back():
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+        try:
+            forkserver.ensure_running()
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 class _Task:

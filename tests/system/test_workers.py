@@ -7,8 +7,10 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -188,15 +190,27 @@ if __name__ == "__main__":
 """
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
-@pytest.mark.parametrize("delay_s", [0.0, 0.5, 2.0])
-@pytest.mark.parametrize("send", [os.kill, os.killpg], ids=["process", "terminal"])
-def test_an_interrupt_ends_workers_that_are_still_starting(tmp_path, send, delay_s: float):
-    """At once, and all that is on stderr is the interrupt itself."""
-    (tmp_path / "many.py").write_text(MANY_WORKERS)
-    command = [sys.executable, tmp_path / "many.py"]
-    pipe = subprocess.PIPE
-    with subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True, start_new_session=True) as running:
+SLOW_IMPORT = """
+from rose2_logs.system import workers
+if __name__ == "__main__":
+    import slow
+    print("started", flush=True)
+    with workers.Workers(slow.work, 2) as processes:
+        print(list(processes.map([1, 2])))
+"""
+
+
+def interrupted(script: Path, send: Callable[[int, int], None], delay_s: float) -> str:
+    """Return what a script that is interrupted some time after its first line tells on stderr."""
+    pipe, path = subprocess.PIPE, os.pathsep.join([str(script.parent), *sys.path])
+    with subprocess.Popen(
+        [sys.executable, script],
+        stdout=pipe,
+        stderr=pipe,
+        text=True,
+        start_new_session=True,
+        env=os.environ | {"PYTHONPATH": path},
+    ) as running:
         try:
             running.stdout.readline()
             time.sleep(delay_s)
@@ -207,7 +221,24 @@ def test_an_interrupt_ends_workers_that_are_still_starting(tmp_path, send, delay
                 os.killpg(running.pid, signal.SIGKILL)
     assert running.returncode == -signal.SIGINT
     assert told.strip().endswith("KeyboardInterrupt")
-    assert told.count("Traceback") == 1
+    return told
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+@pytest.mark.parametrize("delay_s", [0.0, 0.5, 2.0])
+@pytest.mark.parametrize("send", [os.kill, os.killpg], ids=["process", "terminal"])
+def test_an_interrupt_ends_workers_that_are_still_starting(tmp_path, send, delay_s: float):
+    """At once, and all that is on stderr is the interrupt itself."""
+    (tmp_path / "many.py").write_text(MANY_WORKERS)
+    assert interrupted(tmp_path / "many.py", send, delay_s).count("Traceback") == 1
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+def test_an_interrupt_while_modules_are_imported_for_workers_is_told_once(tmp_path):
+    """A terminal sends it to all processes."""
+    (tmp_path / "slow.py").write_text("import time\ntime.sleep(1.5)\ndef work(x): return x\n")
+    (tmp_path / "script.py").write_text(SLOW_IMPORT)
+    assert interrupted(tmp_path / "script.py", os.killpg, 0.7).count("Traceback") == 1
 
 
 def test_an_interrupt_waits_for_a_process_to_be_started(monkeypatch):
