@@ -99,7 +99,7 @@ def compare_layouts(a: FinalLayout, b: FinalLayout) -> LayoutComparison | None:
     Returns
     -------
     LayoutComparison or None
-        None where one of the maps has too few walls to tell how it lies.
+        None where one of the maps has too few walls to be aligned.
     """
     placement = place(b.map, a.map)
     if placement is None:

@@ -102,7 +102,7 @@ class PlacedMap:
 
     @property
     def can_be_placed(self) -> bool:
-        """Whether there are walls enough to tell how the map lies."""
+        """Whether there are enough walls to align the map."""
         return len(self.walls) >= self.parameters.tracking.fit_min_points
 
     def on_wall(self, points_m: FloatArray, reach_m: float) -> BoolArray:

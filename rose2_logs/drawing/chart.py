@@ -21,17 +21,17 @@ from rose2_logs.model.occupancy import FloatArray, IntArray
 TICK_GAP_MIN = 34.0
 """Marks of the horizontal axis that would stand closer are thinned."""
 POINTS_MAX = 800
-"""Of longer curves so many points are drawn, evenly taken: more than a screen shows."""
+"""A longer curve is drawn with this many of its points, evenly spaced: more than a screen shows."""
 DOTS_MAX = 60
 """Curves of more points are drawn without dots."""
 LANE, LANE_FONT = 9.0, 8.0
 """Height of a room's lane, and size of its name."""
 LANE_MIN_WIDTH = 1.5
-"""A room that was there for a moment is drawn so wide."""
+"""Width of the lane of a room that only one map shows."""
 SHARE_LANE = 15.0
 """Height of a lane in which a share rises."""
 LAST_WIDTH = 4.0
-"""The last share, which nothing follows, is drawn so wide."""
+"""Width of the last share, which nothing follows."""
 TINT_OPACITY = 0.18
 """How strongly the rest of such a lane is tinted: what is still to come."""
 INK, GRID_COLOR, MARK_COLOR = (60, 68, 76), (217, 222, 228), (91, 101, 112)

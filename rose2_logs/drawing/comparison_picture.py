@@ -111,7 +111,7 @@ def _layout(
         for track, shape, area in sorted(zip(layout.tracks, shapes, areas_m2, strict=True), key=_first)
     )
     snapshot = layout.map.snapshot
-    # No cell is told to be a room's: whole shapes are filled.
+    # No cell is labeled, so the whole shapes of the rooms are filled.
     labels = np.zeros(snapshot.cells.shape, np.int32)
     below = PlanMap(motion.grid(snapshot.geometry), snapshot.cells, labels)
     plan = RoomPlan(layout.name, "", rooms, (), None, below)

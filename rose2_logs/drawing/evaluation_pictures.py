@@ -57,24 +57,20 @@ MARK_WORDS: dict[Mark, str] = {
 }
 
 
-def draw_case(cells: NDArray[np.int8], comparison: Comparison, scores: Scores, title: str) -> Drawing:
-    """Draw map, truth, found and errors, with a title and a legend; a unit of the page is a pixel.
+def case_sheet(panels: Sequence[Drawing], comparison: Comparison, scores: Scores, title: str) -> Drawing:
+    """Arrange the panels of `draw_panels` with a title, captions and a legend; one unit of the page is a pixel.
 
     Parameters
     ----------
-    cells : (H, W) int8
-        -1 unknown, 0..100 occupancy in percent.
+    panels : sequence of Drawing
+        Map, truth, found and errors.
     comparison : Comparison
-        Labels and marks of the same shape. Row 0 of all three becomes the top of the picture.
+        What they show.
     scores : Scores
         Figures for the title line.
     title : str
         What the map is called.
     """
-    return _sheet(draw_panels(cells, comparison), comparison, scores, title)
-
-
-def _sheet(panels: Sequence[Drawing], comparison: Comparison, scores: Scores, title: str) -> Drawing:
     captions = (
         "map",
         f"truth: {scores.rooms_gt:.0f} rooms",
@@ -247,7 +243,7 @@ class CasePictures:
         cells = np.flipud(case.snapshot().cells)
         comparison = compare(case.truth(), result.labels)
         panels = draw_panels(cells, comparison)
-        picture = _sheet(panels, comparison, result.scores, f"{case.group}/{case.name}")
+        picture = case_sheet(panels, comparison, result.scores, f"{case.group}/{case.name}")
         picture.save(self._folder / case.group / f"{case.name}.png", width_px=None)
         self._tiles.setdefault(case.group, []).append(_tile(panels[1:], result))
 

@@ -247,7 +247,9 @@ def choose_topic(info: LogInfo, asked: str | None = None) -> str:
             if name.lstrip("/") == asked.lstrip("/"):
                 return name
         has = f"its map topics are {listed}" if maps else "it has no map topics"
-        raise NoMapTopicError(f"{info.path}: {asked} is not a topic with occupancy grids; {has}")
+        raise NoMapTopicError(
+            f"{info.path}: {asked or repr(asked)} is not a topic with occupancy grids; {has}"
+        )
     if not maps:
         others = ", ".join(sorted({topic.message_type for topic in info.topics})[:MOST_LISTED])
         found = f", only {others}" if others else ""

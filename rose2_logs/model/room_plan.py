@@ -18,9 +18,9 @@ from rose2_logs.model.room_quality import RoomQuality, is_unsure
 from rose2_logs.model.rooms import Doorway
 
 PREDICTED_MIN_WIDTH_M = 0.3
-"""Unseen parts of rooms are told from this width on: narrower ones are walls, whose inside is never seen."""
+"""Narrower unseen parts of rooms are not drawn or exported: they are walls, whose inside is never seen."""
 RAY_WIDTH_M = 0.5
-"""What is known and narrower is a ray that left through a gap: a robot would not fit in."""
+"""Display only: known parts that are narrower, rays that left through a gap, do not enlarge a picture."""
 ROUNDING_CELLS = 0.25
 """Half of what a corner may lie from the cell that it is rounded to."""
 

@@ -11,7 +11,7 @@ from typing import Any
 from rose2_logs.errors import OutputError
 from rose2_logs.runs.history import RunSummary, median_of
 from rose2_logs.runs.sink import RunInfo
-from rose2_logs.system.files import replacing
+from rose2_logs.system.files import reason_of, replacing
 
 SUMMARY = "summary.json"
 """Its name in the folder of a run."""
@@ -129,6 +129,6 @@ def write_json(path: Path, value: Any) -> None:
     try:
         text = json.dumps(value, indent=2, ensure_ascii=False)
     except (TypeError, ValueError) as error:
-        raise OutputError(f"{path}: cannot be written: {error}") from error
+        raise OutputError(f"{path}: cannot be written: {reason_of(error)}") from error
     with replacing(path) as part:
         part.write_text(f"{text}\n", encoding="utf-8")

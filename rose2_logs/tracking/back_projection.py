@@ -1,7 +1,7 @@
-"""The rooms of every map of a run by the layout of its last one: smoothing, where tracking filters.
+"""Back projection: how much of each room of a run's last map every earlier map shows.
 
-What a map alone shows of a half seen building is often wrong. Once the run is over, its last map tells
-which rooms there are; an earlier map shows how much of each was seen.
+What a single map shows of a half seen building is often wrong. Once the run is over, its last map says
+which rooms there are, and an earlier map how much of each had been seen.
 """
 
 from __future__ import annotations

@@ -48,7 +48,7 @@ class TrackHistory:
     wall_support, frontier_m : float or None
         Evidence there, None where it was not measured.
     splits, merges, losses : int
-        How often it was split, took in others, and was lost.
+        How often it was split, had another room merged into it, and was lost.
     """
 
     first: SnapshotRef

@@ -61,7 +61,7 @@ def compare_runs(
     Raises
     ------
     ResultsError
-        If a folder holds no results, or the last map of a run has too few walls to tell how it lies.
+        If a folder holds no results, or the last map of a run has too few walls to be aligned.
     OutputError
         If there is a comparison already and it may not be replaced, or a file cannot be written.
     """
@@ -106,7 +106,7 @@ def compare_stored(
     Raises
     ------
     ResultsError
-        If results cannot be read, or a last map has too few walls to tell how it lies.
+        If results cannot be read, or a last map has too few walls to be aligned.
     """
     a = read_final_layout(run_a, name_a, parameters)
     b = read_final_layout(run_b, name_b, parameters)

@@ -181,12 +181,12 @@ def read_static_map(
         If it cannot be read, is a log, or its resolution is neither given nor written beside it.
     """
     if not map_file.is_file():
-        what = "is a folder: name the map in it" if map_file.is_dir() else "there is no such file"
+        what = "is a folder, not a file; name the map in it" if map_file.is_dir() else "there is no such file"
         raise LogError(f"{map_file}: {what}")
     is_bare = map_file.suffix.lower() in IMAGE_ENDINGS and not map_file.with_suffix(".yaml").exists()
     if is_bare and resolution_m is None:
         raise ParameterError(
-            f"{map_file}: no .yaml lies beside it; give the side of a cell in meters (resolution_m=0.05)"
+            f"{map_file}: there is no .yaml next to it; give the side of a cell in meters (resolution_m=0.05)"
         )
     if not is_bare and resolution_m is not None:
         raise ParameterError(
@@ -195,7 +195,7 @@ def read_static_map(
     with _described(map_file, resolution_m) as log, open_log(log, limits=limits) as reader:
         if not isinstance(reader.source, MapFilesSource):
             raise LogError(
-                f"{map_file}: is a log, no saved map: rose2-logs analyze finds the rooms of its maps"
+                f"{map_file}: is a log, not a saved map; analyze it as a log to find the rooms of its maps"
             )
         return reader.first()
 

@@ -35,9 +35,9 @@ PICTURES_MOST = 100
 PICTURE_PX = 320
 PICTURE = dataclasses.replace(PANEL, font=0.0)
 BATCH_FOLDER = "logs/"
-"""Where a batch has the results of its logs; their names are told without it."""
+"""Where a batch keeps the results of its logs; the names on the page leave it out."""
 BATCH_SUMMARY = "summary.csv"
-"""Where a batch tells what became of each log."""
+"""Where a batch writes how each log ended."""
 
 
 @dataclass(frozen=True)

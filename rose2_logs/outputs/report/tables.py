@@ -28,7 +28,7 @@ ROWS_MOST = 300
 EVENT_WORDS = {
     "shifted": "the whole map shifted",
     "split": "split",
-    "merged": "took in",
+    "merged": "merged with",
     "returned": "came back",
     "lost": "was lost",
     "born": "was first seen",
@@ -78,7 +78,7 @@ def room_table(results: Run, plan: RoomPlan) -> Table:
         Column("area settled", "coverage from which on its area stayed within 10 % of the last"),
         Column("maps", "number of maps that show it"),
         Column("splits", "how often it was split"),
-        Column("merges", "how often it took in others"),
+        Column("merges", "how often another room merged into it"),
         Column("losses", "how often it was lost"),
     )
     return Table("Rooms", columns, tuple(rows), _cut(len(tracks), len(shown), "tracks.parquet"))

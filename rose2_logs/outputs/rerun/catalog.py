@@ -89,7 +89,7 @@ def find_recordings(folder: Path) -> list[Path]:
             continue
         found |= dict.fromkeys(ids, path)
     if not found:
-        raise LogError(f"{folder}: holds no recording (.rrd); rose2-logs batch and analyze write them")
+        raise LogError(f"{folder}: holds no recording (.rrd); an analysis writes one for each log")
     return sorted(set(found.values()))
 
 

@@ -80,14 +80,14 @@ def find_recording(named: Path | str) -> str:
     if path.is_file():
         return str(path)
     if not path.is_dir():
-        raise LogError(f"{path}: there is no such file; rose2-logs analyze writes recordings")
+        raise LogError(f"{path}: there is no such file; an analysis writes a recording (.rrd)")
     found = sorted(path.glob("*.rrd"))
     if not found:
         below = min(path.rglob("*.rrd"), default=None)
-        hint = f"; did you mean {below.parent}? rose2-logs serve shows all" if below else ""
+        hint = f"; did you mean {below.parent}?" if below else ""
         raise LogError(f"{path}: holds no recording{hint}")
     if len(found) > 1:
-        raise LogError(f"{path}: holds several recordings: name one, or show all with rose2-logs serve")
+        raise LogError(f"{path}: holds several recordings; name one, or serve the folder to show all")
     return str(found[0])
 
 

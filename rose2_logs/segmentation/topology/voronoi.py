@@ -68,19 +68,6 @@ def _is_one_part(inside: BoolArray, clear: NDArray[np.float32], parameters: Topo
     return True
 
 
-def voronoi_graph(
-    labels: NDArray[np.int32],
-    walls: BoolArray,
-    resolution_m: float,
-    min_clearance_m: float,
-    parameters: TopologyParameters,
-) -> NDArray[np.int32]:
-    """Row and column (K, 2) of the cells of the Voronoi graph: the skeleton of the clear free space."""
-    clearance = clearance_m(walls, resolution_m, parameters.clearance_blur_cells)
-    skeleton = skeletonize((labels > 0) & (clearance >= min_clearance_m))  # type: ignore[no-untyped-call]
-    return np.argwhere(skeleton).astype(np.int32)
-
-
 def voronoi_lines(
     inside: BoolArray, walls: BoolArray, resolution_m: float, parameters: TopologyParameters
 ) -> FloatArray:
