@@ -58,7 +58,7 @@ MARK_WORDS: dict[Mark, str] = {
 
 
 def case_sheet(panels: Sequence[Drawing], comparison: Comparison, scores: Scores, title: str) -> Drawing:
-    """Arrange the panels of `draw_panels` with a title, captions and a legend; one unit of the page is a pixel.
+    """Arrange the panels of `draw_panels` with a title, captions and a legend; a unit of the page is a pixel.
 
     Parameters
     ----------

@@ -93,7 +93,7 @@ def test_numbers_beyond_their_bounds_are_refused():
 def test_a_block_refuses_what_cannot_be_used_when_it_is_built(make, message: str):
     with pytest.raises(ParameterError) as raised:
         make()
-    assert str(raised.value) == message
+    assert str(raised.value).startswith(message)
     assert "\n" not in str(raised.value)
 
 

@@ -183,7 +183,7 @@ def _read_lines(
     resolution_m: float,
     parameters: FloorPlanParameters,
 ) -> tuple[NDArray[np.intp], FloatArray, BoolArray, BoolArray, BoolArray]:
-    """Sample each line in steps of one cell; a sample is wall where a wall cell is within the tolerance across.
+    """Sample each line in steps of one cell; a sample is wall if a wall cell is within the tolerance across.
 
     A wall is blind where no free cell lies within `blind_look_m` on one of its sides, unless another wall
     runs there: what is behind was not seen, or is a piece of furniture.
