@@ -33,7 +33,7 @@ logger = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class LogState:
-    """What became of one log of a batch.
+    """How one log of a batch ended.
 
     Attributes
     ----------
@@ -55,7 +55,7 @@ class LogState:
 
 @dataclass(frozen=True)
 class BatchResult:
-    """The outcome of a batch: what became of its logs, sorted by name, and the files of the summary."""
+    """The outcome of a batch: how each log ended, sorted by name, and the files of the summary."""
 
     out: Path
     states: tuple[LogState, ...]
@@ -83,7 +83,7 @@ class Listener(Protocol):
         ...
 
     def finished(self, state: LogState) -> None:
-        """Show what became of a log."""
+        """Show how a log ended."""
         ...
 
 
@@ -100,7 +100,7 @@ class Workers(AbstractContextManager["Workers"], Protocol):
 
 
 def run_batch(arguments: Sequence[str], out: Path, options: BatchOptions, listener: Listener) -> BatchResult:
-    """Analyze many logs, each to a folder of its own, with one data set and one summary of all.
+    """Analyze many logs, each into its own folder, with one data set and one summary of all.
 
     Each log's results go to ``out/logs/NAME``, as `analyze_log` writes them; the tables of all logs to
     ``out/tables``, partitioned by log; one row per log to ``out/summary.parquet`` and ``out/summary.csv``.
@@ -112,7 +112,7 @@ def run_batch(arguments: Sequence[str], out: Path, options: BatchOptions, listen
     arguments : sequence of str
         Logs, folders, patterns, URLs; see `find_logs`.
     out : path
-        Where to; it is made. Workers on other machines must see it at the same path.
+        Output folder, created if needed. Workers on other machines must see it at the same path.
     options : BatchOptions
         What to take from each log, how to analyze it, and by which workers.
     listener : Listener
@@ -147,7 +147,7 @@ def run_batch(arguments: Sequence[str], out: Path, options: BatchOptions, listen
 
 
 class _Batch:
-    """A running batch: earlier results, tasks under way, and what became of the logs so far."""
+    """A running batch: earlier results, tasks under way, and how the logs so far ended."""
 
     def __init__(self, out: Path, work: Path, options: BatchOptions, listener: Listener) -> None:
         self.states: list[LogState] = []

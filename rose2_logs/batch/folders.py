@@ -117,7 +117,7 @@ def assign_names(
     Returns
     -------
     dict of Location to str
-        The log's own name, preceded by those of its folders as far as it takes to tell it from the others;
+        The log's own name, preceded by those of its folders as far as needed to make it unique;
         where that is not enough a hash of its address follows. Names differ by more than upper and lower
         case.
     """

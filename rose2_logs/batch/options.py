@@ -1,4 +1,4 @@
-"""How a batch is carried out: its options, beside those of the run of each log."""
+"""Options of a batch, in addition to those of the run of each log."""
 
 from __future__ import annotations
 

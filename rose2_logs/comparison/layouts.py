@@ -94,7 +94,7 @@ class LayoutComparison:
 
 
 def compare_layouts(a: FinalLayout, b: FinalLayout) -> LayoutComparison | None:
-    """Lay one layout over the other and tell what differs.
+    """Align two layouts and find what differs.
 
     Returns
     -------

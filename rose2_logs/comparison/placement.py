@@ -112,11 +112,11 @@ class PlacedMap:
         return near
 
     def is_free(self, points_m: FloatArray) -> BoolArray:
-        """Which points (..., 2) of this map's frame lie in a free cell."""
+        """Which points (..., 2) of this map's frame are in a free cell."""
         return self._looked_up(self.free, points_m)
 
     def is_known(self, points_m: FloatArray) -> BoolArray:
-        """Which points (..., 2) of this map's frame lie in a cell that was seen."""
+        """Which points (..., 2) of this map's frame are in a cell that was seen."""
         return self._looked_up(self.snapshot.cells != UNKNOWN, points_m)
 
     def _looked_up(self, mask: BoolArray, points_m: FloatArray) -> BoolArray:
@@ -150,7 +150,7 @@ def place(moving: PlacedMap, fixed: PlacedMap) -> Placement | None:
     Returns
     -------
     Placement or None
-        None where a map has too few walls to tell.
+        None where a map has too few walls.
     """
     if not (moving.can_be_placed and fixed.can_be_placed):
         return None

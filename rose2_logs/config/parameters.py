@@ -1,6 +1,6 @@
 """Every number that a result depends on: one frozen block per stage, with unit, default and reason.
 
-Lengths are meters (``_m``, ``_m2``), angles radians (``_rad``), times seconds (``_s``); shares lie in [0, 1].
+Lengths are meters (``_m``, ``_m2``), angles radians (``_rad``), times seconds (``_s``); shares are in [0, 1].
 A configuration file is TOML with one table per block; ``resolved`` gives the same shape back.
 """
 
@@ -392,7 +392,7 @@ class Parameters:
         return cls().replaced(value or {})
 
     def resolved(self) -> dict[str, dict[str, float | int | str]]:
-        """Every parameter with its value, block by block, as written beside the results."""
+        """Every parameter with its value, block by block, as written with the results."""
         return dataclasses.asdict(self)
 
     def replaced(self, changes: Mapping[str, Any]) -> Parameters:

@@ -48,7 +48,7 @@ LINE_COLORS: tuple[Color, ...] = (
 
 @dataclass(frozen=True)
 class ChartStyle:
-    """Size of a chart, and what it tells by itself.
+    """Size of a chart, and what is written in it.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class ChartStyle:
     line, dot : float
         Width of curves and radius of their points.
     is_whole : bool
-        Whether title and names of the curves stand in it, on white; otherwise the page around it tells them.
+        Whether title and names of the curves are in the chart, on white, or left to the page around it.
     """
 
     width: float
@@ -118,7 +118,7 @@ class ShareLane:
     Attributes
     ----------
     name, text : str
-        What stands beside it, and what it says when the pointer is over it.
+        Its label, and the text shown when the pointer is over it.
     shares : (N,) float
         In [0, 1].
     color : Color
@@ -358,7 +358,7 @@ class _Chart:
                 self.page.add(Dot(x, y, self._style.dot, color, tooltip))
 
     def names(self, title: str, curves: Sequence[Curve]) -> None:
-        """Write the title above the axes, and the names of the curves beside them."""
+        """Write the title above the axes, and the names of the curves next to them."""
         font = self._style.font
         self.page.add(Text(title, self._left, self._top / 2, 1.2 * font, "start", color=INK))
         for number, curve in enumerate(curves):

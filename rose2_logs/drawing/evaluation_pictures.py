@@ -101,7 +101,7 @@ def _figures(scores: Scores) -> str:
 def draw_panels(cells: NDArray[np.int8], comparison: Comparison) -> tuple[Drawing, Drawing, Drawing, Drawing]:
     """Draw the four panels map, truth, found and errors, all of the same size, cropped to what is known.
 
-    A found room has the color of its partner, and a color of its own, striped, where it has none.
+    A found room has the color of its partner, and a different color, striped, where it has none.
     """
     shown = (cells >= 0) | (comparison.truth > 0) | (comparison.found > 0)
     window = _with_margin(known_window(shown), shown.shape)
@@ -219,7 +219,7 @@ class CasePictures:
     Parameters
     ----------
     folder : path
-        Where to; it is made.
+        Output folder, created if needed.
     """
 
     def __init__(self, folder: Path) -> None:

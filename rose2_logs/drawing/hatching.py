@@ -122,7 +122,7 @@ def hatch_cells(mask: BoolArray, gap: float) -> FloatArray:
 def stretches_of(
     lines: FloatArray, is_inside: Callable[[FloatArray], BoolArray], step: float
 ) -> tuple[FloatArray, NDArray[np.intp]]:
-    """Cut lines to their stretches over what is asked for.
+    """Cut lines to their stretches over the given shape.
 
     Parameters
     ----------

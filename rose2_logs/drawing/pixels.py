@@ -98,7 +98,7 @@ def _area(image: Image.Image, area: Area, scale: float) -> None:
     draw = ImageDraw.Draw(mask)
     level = round(255 * area.opacity)
     parts = [part for part in shapely.get_parts(area.shape) if shapely.get_dimensions(part) == 2]
-    # The largest first: a part may lie in a hole of another, which would be cut out of it.
+    # The largest first: a part may be inside a hole of another, which would be cut out of it.
     for part in sorted(parts, key=lambda part: -part.envelope.area):
         for number, ring in enumerate(shapely.get_rings(part)):
             points = shapely.get_coordinates(ring) * scale - (left, top)

@@ -38,7 +38,7 @@ ROUND_LENGTHS_M = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 SIDE_PX, GAP_PX = 900.0, 12.0
 """Width of the map in the picture of a segmentation, and the gap to the next."""
 WIDE = 1.5
-"""Width over height from which a map is drawn above its rooms and not beside them."""
+"""From this width over height on, a map is drawn above its rooms and not next to them."""
 LEGEND_FONT = 0.85
 """Size of the legend's texts over that of the rooms' names."""
 
@@ -60,7 +60,7 @@ class PlanStyle:
     detail : float
         Outlines lose what is smaller, as the steps of cells.
     has_names : bool
-        Whether rooms are told by name and area where they have room for it, and not by number only.
+        Whether rooms are labeled with name and area where these fit, and not by number only.
     has_legend : bool
         Whether a strip below holds a scale bar and what the signs mean.
     has_walls : bool
@@ -146,7 +146,7 @@ def draw_plan(
 
 
 def draw_segmentation(plan: RoomPlan) -> Drawing:
-    """Draw a map as it was recorded, and below or beside it with its rooms, walls and doorways.
+    """Draw a map as it was recorded, and below or next to it with its rooms, walls and doorways.
 
     Parameters
     ----------

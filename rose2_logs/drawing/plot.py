@@ -149,7 +149,7 @@ def _patch(shape: BaseGeometry) -> PathPatch:
     from matplotlib.patches import PathPatch
     from matplotlib.path import Path
 
-    # Outer rings run one way and holes the other, which tells them apart.
+    # Outer rings run one way and holes the other, which distinguishes them.
     parts = [shapely.orient_polygons(part) for part in shapely.get_parts(shape)]
     rings = [ring for part in parts for ring in shapely.get_rings(part)]
     return PathPatch(Path.make_compound_path(*(Path(ring.coords, closed=True) for ring in rings)))

@@ -2,7 +2,7 @@
 
 The file holds ``{"cases": [{"group", "name", "map", "rooms", "resolution_m"}, ...]}`` with paths relative to
 itself: `map` is an 8-bit gray image in the convention of ROS maps, `rooms` a label image of the same size.
-A case may say ``"origin_xy_m": [x, y]``, where the image's lower left corner lies in the world.
+A case may give ``"origin_xy_m": [x, y]``, the position of the image's lower left corner in the world.
 Images have row 0 at the top, occupancy grids at the origin below; a case converts between the two.
 """
 
@@ -34,7 +34,7 @@ class Case:
     Attributes
     ----------
     group, name : str
-        What the case is called; predictions lie in ``<group>/<name>.png``.
+        Name of the case; predictions are stored as ``<group>/<name>.png``.
     map_path, rooms_path : path
         The two images.
     resolution_m : float

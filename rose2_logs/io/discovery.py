@@ -34,7 +34,7 @@ def logs_among(files: Iterable[str], folder_name: str) -> list[str]:
     """Find the logs in a folder by the names of its files.
 
     A folder is one log if it is a ROS 2 bag, see `is_bag`, or if it contains saved maps and no bags: these
-    are the maps of one run. Every other MCAP file, bag or database is a log of its own. Hidden files and
+    are the maps of one run. Every other MCAP file, bag or database is a separate log. Hidden files and
     annotated logs are ignored.
 
     Parameters

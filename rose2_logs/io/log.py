@@ -232,12 +232,12 @@ class LogReader:
 
 
 def choose_topic(info: LogInfo, asked: str | None = None) -> str:
-    """Choose the map topic: the one asked for, else ``/map``, else the only one with messages.
+    """Choose the map topic: the requested one, else ``/map``, else the only one with messages.
 
     Raises
     ------
     NoMapTopicError
-        If there is none, or there are several and none was asked for; the message lists them.
+        If there is none, or there are several and none was requested; the message lists them.
     """
     where = f"{info.path}:" if info.whole else f"{info.path}: is damaged; in its readable part"
     maps = {topic.name: topic for topic in info.topics if topic.is_map}

@@ -169,7 +169,7 @@ def plan_of_analysis(
     title: str,
     occupancy: OccupancyParameters,
 ) -> RoomPlan:
-    """Make the plan of a map of its own, whose rooms go by their numbers in it."""
+    """Make the plan of a single map, whose rooms are named by their numbers in it."""
     found = analysis.rooms
     rooms = []
     for number, (shape, area, point) in enumerate(

@@ -53,7 +53,7 @@ class RoomMap:
     Attributes
     ----------
     geometry : GridGeometry
-        Where `labels` lies in the world.
+        Position of `labels` in the world.
     labels : (H, W) int32, read-only
         0 = no room, 1..R = the rooms: the segmented map.
     polygons : tuple of R shapely Polygon or MultiPolygon

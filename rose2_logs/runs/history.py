@@ -1,4 +1,4 @@
-"""RunHistory: all that a run comes to, gathered step by step, and known in full once the last map is."""
+"""RunHistory: the facts of a whole run, collected step by step and complete after the last map."""
 
 from __future__ import annotations
 
@@ -193,7 +193,7 @@ class RunHistory:
         return self._snapshot_refs
 
     def back_projected(self, snapshots: Iterable[OccupancySnapshot]) -> Iterator[BackProjectedSnapshot]:
-        """Yield what each map shows of the last map's rooms, if that was asked for.
+        """Yield what each map shows of the last map's rooms, if that was requested.
 
         Parameters
         ----------

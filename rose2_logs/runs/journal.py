@@ -175,7 +175,7 @@ class Journal:
 
 
 class JournaledWorkers:
-    """Workers whose results go through a journal: those that it knows are taken from it, the others added.
+    """Workers whose results go through a journal: known results are read from it, new ones are added.
 
     Parameters
     ----------

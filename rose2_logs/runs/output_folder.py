@@ -1,6 +1,6 @@
 """The folder for the results of a run: they come to stand in it all at once, when the last one is whole.
 
-Until then they are made in a hidden folder beside it, with the journal of the run.
+Until then they are written to a hidden folder next to it, with the journal of the run.
 """
 
 from __future__ import annotations
@@ -79,17 +79,17 @@ class OutputFolder:
     def prepared(
         self, facts: dict[str, Any], *, overwrite: bool, resume: bool
     ) -> Iterator[tuple[Path, Journal]]:
-        """Give a folder to make the results in and the journal; all results are in place if all went well.
+        """Provide a folder for the results, and the journal; on success all results are moved into place.
 
         Parameters
         ----------
         facts : dict
-            What the analysis depends on. Those that stand in the summary too tell whether results that are
-            there are the same.
+            What the analysis depends on. Those that are also in the summary show whether existing results
+            are the same.
         overwrite : bool
-            Whether results that are there may be replaced.
+            Whether existing results may be replaced.
         resume : bool
-            Whether to go on where a run of the same facts was stopped.
+            Whether to continue a stopped run of the same facts.
 
         Raises
         ------

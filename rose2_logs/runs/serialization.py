@@ -1,6 +1,6 @@
 """Results as bytes and back: MessagePack of dataclasses, arrays and geometries.
 
-What is read can do nothing worse than be wrong: values are made of the declared types alone.
+Damaged input can only give wrong values: nothing but the declared types is ever created.
 """
 
 from __future__ import annotations

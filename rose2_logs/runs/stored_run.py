@@ -194,7 +194,7 @@ class StoredRun:
         return int(numbers[covered[0]] if len(covered) else numbers[-1])
 
     def row(self, snapshot: int) -> Row:
-        """Return what the table of snapshots tells of one."""
+        """Return the row of a map in the table of snapshots."""
         (place,) = np.flatnonzero(self.columns["snapshot"] == snapshot)
         return {name: values[place] for name, values in self.columns.items()}
 
@@ -230,7 +230,7 @@ class StoredRun:
         return RigidMotion((0.0, 0.0), (row["drift_x_m"], row["drift_y_m"]), row["drift_yaw_rad"])
 
     def map(self, snapshot: int) -> tuple[PlanMap, tuple[slice, slice]]:
-        """Read a map and the tracks of its cells, as its explored window, and where that lies in the grid.
+        """Read a map and the tracks of its cells, as its explored window, and its place in the grid.
 
         Raises
         ------
@@ -261,7 +261,7 @@ class StoredRun:
 
     @property
     def occupancy(self) -> OccupancyParameters:
-        """The run's parameters for stored maps, whose classes the default thresholds tell apart."""
+        """The run's parameters for stored maps, whose classes the default thresholds distinguish."""
         usual = OccupancyParameters()
         return replace(
             self.parameters.occupancy,

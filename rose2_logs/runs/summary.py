@@ -1,4 +1,4 @@
-"""``summary.json``: what a run was made of and what came out, for people and scripts."""
+"""``summary.json``: input, options and results of a run, for people and scripts."""
 
 from __future__ import annotations
 
@@ -43,9 +43,9 @@ def write_summary(
     summary : RunSummary
         What came out.
     selection, messages : mapping
-        Which maps were asked for, and what became of the log's messages.
+        Which maps were requested, and how many messages were used or left out.
     files : list of str
-        Names of the other results, beside this one.
+        Names of the other files of the results.
     warnings : mapping
         What was odd about the log: how often, by kind, and the first ones.
     facts : mapping
@@ -119,7 +119,7 @@ def _layout(summary: RunSummary) -> dict[str, Any]:
 
 
 def write_json(path: Path, value: Any) -> None:
-    """Write JSON beside its final name and rename it.
+    """Write JSON under a hidden name and rename it.
 
     Raises
     ------

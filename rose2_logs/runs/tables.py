@@ -1,4 +1,4 @@
-"""Rows of a run's tables, made of steps and of what the run came to."""
+"""Rows of a run's tables, made from its steps and its history."""
 
 from __future__ import annotations
 

@@ -44,7 +44,7 @@ class BackProjector:
 
     A map is laid over the last one: first as it moved from map to map, then by its walls. Each of its free
     cells takes the room that lies there in the end; the nearest, where the last map shows no free space.
-    Pieces of a room smaller than `back_projected_min_area_m2` take the room beside them.
+    Pieces of a room smaller than `back_projected_min_area_m2` join the room next to them.
 
     Parameters
     ----------

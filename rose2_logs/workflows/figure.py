@@ -35,7 +35,7 @@ def write_figure(
     snapshot, coverage : int, float, optional
         Which map, see `Run.choose`.
     back_projected : bool
-        Draw the rooms of the last map as far as this one shows them, instead of its own.
+        Draw the rooms of the last map as far as this one shows them, instead of the rooms found in it.
     width_px : int
         Width of a PNG.
     overwrite : bool

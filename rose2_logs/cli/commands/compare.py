@@ -46,7 +46,7 @@ def compare(
 
 
 def print_comparison(result: ComparisonResult) -> None:
-    """Print how the layouts lie, what became of rooms and walls, and where the results are."""
+    """Print how the layouts are aligned, how rooms and walls changed, and where the results are."""
     found = result.comparison
     if not found.same_building:
         warning(

@@ -48,7 +48,7 @@ def make_blueprint(
     *,
     back_projected: bool = False,
 ) -> rrb.Blueprint:
-    """Map from above, a tab for each stage of the method, beside curves, histories of rooms, events, summary.
+    """Map from above and a tab per stage of the method; next to it curves, room lanes, events, summary.
 
     Parameters
     ----------

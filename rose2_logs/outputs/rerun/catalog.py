@@ -23,7 +23,7 @@ logger = logging.getLogger(__name__)
 MARGIN_M = 5.0
 """Around the points where rooms are deepest: half a large room."""
 NO_TABLES_M = 20.0
-"""Half the side of the part of the world that is shown where no tables tell where the rooms are."""
+"""Half the side of the view, used where no tables say where the rooms are."""
 
 
 @contextmanager

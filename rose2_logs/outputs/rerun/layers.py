@@ -154,7 +154,7 @@ def time_columns(instants: Sequence[Instant]) -> list[rr.TimeColumn]:
     return times + [rr.TimeColumn(name, sequence=columns[name]) for name in ("snapshot", "coverage")]
 
 
-# What `dataclasses.fields` would tell of each layer again.
+# Computed once: what `dataclasses.fields` would return for each layer.
 _VALUES = {
     Strips: attrgetter("points_m", "lengths", "colors"),
     Picture: attrgetter("pixels", "cell_m", "corner_m", "yaw_rad", "colormap"),

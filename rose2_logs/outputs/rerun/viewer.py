@@ -25,7 +25,7 @@ PAGE_PORT = 9090
 """Where Rerun serves its web viewer by default."""
 SERVER_MEMORY = "50%"
 SCREENS = ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET")
-"""Variables that tell of a screen."""
+"""Environment variables that are set where there is a screen."""
 RERUN = (sys.executable, "-m", "rerun", "--bind", "127.0.0.1")
 """Rerun's servers answer the whole network by default."""
 
@@ -154,7 +154,7 @@ def _running(command: Sequence[str], said: IO[bytes]) -> Iterator[subprocess.Pop
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:
-    """End a command that began a session of its own, with all that it started."""
+    """End a command that was started in its own session, with all processes that it started."""
     if hasattr(os, "killpg"):
         # Rerun's command is a script that starts the viewer itself.
         with suppress(ProcessLookupError):

@@ -35,7 +35,7 @@ class EdgeEvidence:
         All of the edge.
     passage_share : (E,) float
         Width of the best passage through the edge (a stretch of its line without a wall) over the width of
-        the room beside it: about 1 across a corridor, less in a doorway, 0 where the edge is not open.
+        the room next to it: about 1 across a corridor, less in a doorway, 0 where the edge is not open.
     """
 
     wall_m: FloatArray
@@ -165,7 +165,7 @@ def _between_jambs(
     step_m: FloatArray,
     parameters: FloorPlanParameters,
 ) -> BoolArray:
-    """Tell which stretches (R,) of samples have wall on their line before and after them."""
+    """Find which stretches (R,) of samples have wall on their line before and after them."""
     of_run = line[begins]
     count = np.maximum(1, np.round(parameters.jamb_length_m / step_m[of_run]).astype(np.intp))
     before = np.maximum(begins - count, np.searchsorted(line, of_run))
