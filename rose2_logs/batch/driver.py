@@ -1,4 +1,4 @@
-"""A batch: planned, carried out, its results put in place. A stopped one leaves only whole results."""
+"""A batch: plan it, run it, put its results in place. A stopped one leaves only complete results."""
 
 from __future__ import annotations
 
@@ -186,7 +186,7 @@ class _Batch:
         return [task for _, task in sorted(tasks, key=lambda each: -each[0])]
 
     def carry_out(self, tasks: Sequence[LogTask]) -> None:
-        """Have the tasks carried out, and put their results in place."""
+        """Run the tasks, and put their results in place."""
         if not tasks:
             return
         under_way = {task.name: task for task in tasks}
@@ -219,7 +219,7 @@ class _Batch:
         return dataset.write_summary_tables(self._out, [*rows, *failed.values()])
 
     def _moved(self, looks: dict[Location, Signature | None], known: dict[str, str]) -> dict[Location, str]:
-        """Earlier results of logs that seem to lie elsewhere now, by name and size; the workers make sure."""
+        """Earlier results of logs that seem to have moved, by name and size; the workers make sure."""
         here = {log.address for log in looks}
         gone = {
             (Location(record.address).parts[-1], record.signature.size_bytes): name

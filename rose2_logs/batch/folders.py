@@ -1,4 +1,4 @@
-"""Folders of a batch: names of those of logs; that of all is locked, cleaned, filled with whole results.
+"""Folders of a batch: their names; the output folder is locked, cleaned, and filled with complete results.
 
 The names are safe on every file system, one for each log, and the same when the batch is resumed.
 """

@@ -1,4 +1,4 @@
-"""How one map lies over another that began anywhere: any turn and any shift, from their walls and free space.
+"""Alignment of two maps with any turn and any shift between them, from their walls and free space.
 
 Turns are tried where the spectra's directions fit, shifts by correlation of all places at once, and the best
 starts are fitted wall to wall.
@@ -27,7 +27,7 @@ from rose2_logs.tracking.registration import RigidMotion, WallFit, evenly, wall_
 
 @dataclass(frozen=True)
 class Placement:
-    """How a map lies over another.
+    """Position of a map relative to another.
 
     Attributes
     ----------
@@ -145,7 +145,7 @@ class PlacedMap:
 
 
 def place(moving: PlacedMap, fixed: PlacedMap) -> Placement | None:
-    """Find how a map lies over another, wherever their frames are.
+    """Find the position of a map relative to another, wherever their frames are.
 
     Returns
     -------
@@ -310,7 +310,7 @@ class _ShiftSearch:
 
 
 def fitting_scale(moving: PlacedMap, fixed: PlacedMap) -> float | None:
-    """Find how many times larger a map has to be to lie over another.
+    """Find how many times larger a map has to be to fit another.
 
     The lengths and the widths of the two, along the strongest direction of their walls and across it, give
     the scales that are tried.

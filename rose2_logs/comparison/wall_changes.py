@@ -208,7 +208,7 @@ def _stretches(
 
 
 def _runs(gone: BoolArray, there: BoolArray, parameters: ComparisonParameters) -> list[tuple[int, int]]:
-    """Begin and end of runs; those with a short gap of what cannot be told between them are one."""
+    """Begin and end of runs; runs separated by a short undecided gap count as one."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], gone.astype(np.int8), [0]])))
     runs: list[tuple[int, int]] = []
     for begin, end in edges.reshape(-1, 2).tolist():

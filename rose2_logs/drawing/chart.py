@@ -19,7 +19,7 @@ from rose2_logs.drawing.shapes import Area, Color, Dot, Lines, Shape, Text
 from rose2_logs.model.occupancy import FloatArray, IntArray
 
 TICK_GAP_MIN = 34.0
-"""Marks of the horizontal axis that would stand closer are thinned."""
+"""Marks of the horizontal axis that would be closer are thinned out."""
 POINTS_MAX = 800
 """A longer curve is drawn with this many of its points, evenly spaced: more than a screen shows."""
 DOTS_MAX = 60
@@ -306,7 +306,7 @@ class _Chart:
         self._top, self._bottom = style.top, height - style.bottom
 
     def columns(self, values: FloatArray) -> FloatArray:
-        """Where values of the horizontal axis stand on the page."""
+        """Positions on the page of values of the horizontal axis."""
         return self._left + self._x_axis.share(values) * (self._right - self._left)
 
     def _rows(self, values: FloatArray) -> FloatArray:

@@ -90,7 +90,7 @@ def draw_comparison(comparison: LayoutComparison) -> Drawing:
 def _title(comparison: LayoutComparison) -> str:
     if not comparison.same_building:
         return "These do not seem to be two runs in one building"
-    sure = "   (B may lie wrongly: another way fits about as well)" if comparison.ambiguous else ""
+    sure = "   (B may be misaligned: another position fits about as well)" if comparison.ambiguous else ""
     return f"floor overlaps {comparison.floor_iou:.0%}, rooms {comparison.rooms_iou:.0%}{sure}"
 
 

@@ -21,7 +21,7 @@ BOLD_SHARE = 0.025
 """The default font has no bold face; its strokes are made so much of its size thicker."""
 
 ANCHORS = {"start": 0.0, "middle": 0.5, "end": 1.0}
-"""Share of a text that lies before its anchor."""
+"""Share of a text that is before its anchor."""
 SQUARED = "\N{SUPERSCRIPT TWO}"
 RAISED_SIZE, RAISED_BY = 0.62, 0.22
 """Size and rise of a raised two, in sizes of the font."""

@@ -115,7 +115,7 @@ def draw_plan(
     predicted = {
         number: simpler(painter.on_page(part), style.detail) for number, part in predicted_parts(plan).items()
     }
-    # Names stand on what was seen.
+    # Names are placed on what was seen.
     seen = shapes | {number: shapes[number].difference(part) for number, part in predicted.items()}
     for room in plan.rooms:
         number = room.number
@@ -216,7 +216,7 @@ def _write_name(painter: MapPainter, room: PlanRoom, shape: BaseGeometry, style:
 
 
 def area_text(area_m2: float) -> str:
-    """Tell an area as names of rooms do: with a decimal where it is small."""
+    """Format an area as in the names of rooms: with a decimal where it is small."""
     return f"{area_m2:.0f} m²" if area_m2 >= 10 else f"{area_m2:.1f} m²"
 
 

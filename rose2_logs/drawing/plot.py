@@ -37,14 +37,14 @@ LAYER_MAP, LAYER_AREAS, LAYER_OUTLINES, LAYER_DOORS, LAYER_NAMES = 0, 1, 2, 3, 4
 def plot_plan(plan: RoomPlan, ax: Axes | None = None) -> Axes:
     """Draw a floor plan with matplotlib, in meters of its frame.
 
-    The map lies below, rooms have the colors of their tracks, their unseen parts are hatched; a question mark
+    The map is below, rooms have the colors of their tracks, their unseen parts are hatched; a question mark
     behind a room's number says that little of its outline is supported by walls.
 
     Parameters
     ----------
     plan : RoomPlan
     ax : matplotlib Axes, optional
-        Where to; by default the axes of a new figure.
+        Axes to draw into; by default those of a new figure.
 
     Returns
     -------

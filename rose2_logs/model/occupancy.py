@@ -23,7 +23,7 @@ HIGHEST_PERCENT = 100
 SMALLEST_CELL_M, LARGEST_CELL_M = 1e-4, 100.0
 """Allowed cell sizes in meters: smaller cells are below a laser's noise, larger ones too coarse for rooms."""
 FARTHEST_ORIGIN_M = 1e8
-"""No place on earth lies farther from the origin of its frame, in meters, in no projection."""
+"""No place on earth is farther from the origin of its frame, in meters, in any projection."""
 
 
 def _are_numbers(*values: object) -> bool:
@@ -48,7 +48,7 @@ class GridGeometry:
     frame_id : str
         Name of the world frame.
     shape : (int, int)
-        Rows and columns (H, W); row 0 lies at the origin.
+        Rows and columns (H, W); row 0 is at the origin.
 
     Examples
     --------
@@ -134,7 +134,7 @@ class GridGeometry:
         )
 
     def world_to_cell(self, xy_m: FloatArray) -> NDArray[np.intp]:
-        """Cells (..., 2) as row, column that hold world points; they may lie outside the grid."""
+        """Cells (..., 2) as row, column that hold world points; they may be outside the grid."""
         cells = np.floor(self.world_to_grid(xy_m) / self.resolution_m).astype(np.intp)
         return cells[..., ::-1]
 

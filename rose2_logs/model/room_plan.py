@@ -22,7 +22,7 @@ PREDICTED_MIN_WIDTH_M = 0.3
 RAY_WIDTH_M = 0.5
 """Display only: known parts that are narrower, rays that left through a gap, do not enlarge a picture."""
 ROUNDING_CELLS = 0.25
-"""Half of what a corner may lie from the cell that it is rounded to."""
+"""Half the distance that a corner may have from the cell that it is rounded to."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,14 +220,14 @@ def _unknown_within(shape: BaseGeometry, below: PlanMap) -> BaseGeometry:
     if shape.is_empty:
         return shapely.Polygon()
     in_cells = shapely.transform(shape, lambda xy: geometry.world_to_grid(xy) / geometry.resolution_m)
-    # A little smaller: a cell whose side lies on the outline is in or out by its middle, not by rounding.
+    # A little smaller: a cell whose side is on the outline is in or out by its middle, not by rounding.
     in_cells = in_cells.buffer(-ROUNDING_CELLS, join_style="mitre")
     if in_cells.is_empty:
         return in_cells
     x0, y0, x1, y1 = (int(value) for value in np.round(in_cells.bounds))
     height, width = y1 - y0 + 1, x1 - x0 + 1
     inside = np.zeros((height, width), np.uint8)
-    # Corners lie between cells, fillPoly counts from their middles.
+    # Corners are between cells; fillPoly counts from their centers.
     rings = [
         np.round(shapely.get_coordinates(ring) - (x0 + 0.5, y0 + 0.5)).astype(np.int32)
         for ring in shapely.get_rings(in_cells)

@@ -79,7 +79,7 @@ def _ends(layout: str, ends_m: FloatArray | None) -> Row:
 def write_comparison_summary(
     path: Path, comparison: LayoutComparison, folder_a: Path, folder_b: Path
 ) -> None:
-    """Write how the layouts lie and how much they have in common.
+    """Write how the layouts are aligned and how much they have in common.
 
     Raises
     ------

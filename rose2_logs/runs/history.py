@@ -198,7 +198,7 @@ class RunHistory:
         Parameters
         ----------
         snapshots : iterable of OccupancySnapshot
-            The maps of the run once more.
+            The maps of the run again.
         """
         if self._back_projection is not None:
             yield from self._back_projection.back_projected(snapshots)

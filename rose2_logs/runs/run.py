@@ -304,7 +304,7 @@ class RunSnapshot:
         Parameters
         ----------
         ax : matplotlib Axes, optional
-            Where to; by default new ones.
+            Axes to draw into; by default new ones.
         back_projected : bool
             As for `plan`.
 

@@ -25,7 +25,7 @@ Value = TypeVar("Value")
 class Serializer(Generic[Value]):
     """Turns values of one declared type to bytes and back, equal to the last bit.
 
-    Geometries stand as WKB; of arrays with two axes of integers, as images of labels are, the used window is
+    Geometries are WKB; of arrays with two axes of integers, as images of labels are, the used window is
     kept in as few bytes as its numbers need.
 
     Parameters

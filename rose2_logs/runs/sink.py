@@ -97,7 +97,7 @@ class Sink:
         raise NotImplementedError
 
     def write_back_projected(self, found: BackProjectedSnapshot) -> None:
-        """Take what a map shows of the last map's rooms: all maps in order once more, after the last one."""
+        """Take what a map shows of the last map's rooms: all maps again in order, after the last one."""
 
     def finish(self, summary: RunSummary) -> None:
         """Complete the output: write it under a hidden name first, then rename it."""

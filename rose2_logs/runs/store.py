@@ -35,7 +35,7 @@ class RunStore:
     """Writes a run to a folder: the tables `TABLES`, each ``.parquet``.
 
     The tables hold nothing but what the log and the parameters determine: the same run gives the same bytes.
-    What only the whole run shows is added by `finish`, which reads some tables once more from the disk. A
+    What only the whole run shows is added by `finish`, which reads some tables again from the disk. A
     context manager: leaving it without `finish` removes what was written.
 
     Parameters

@@ -284,7 +284,7 @@ class StoredRun:
         )
 
     def plan(self, snapshot: int, *, with_map: bool = True, with_walls: bool = False) -> RoomPlan:
-        """Return the floor plan of a map, whose rooms go by their tracks.
+        """Return the floor plan of a map, whose rooms are numbered by their tracks.
 
         Parameters
         ----------

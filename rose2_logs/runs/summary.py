@@ -37,11 +37,11 @@ def write_summary(
     Parameters
     ----------
     path : path
-        Where to.
+        The file to write.
     info : RunInfo
         Log, method, resolved parameters, versions, provenance.
     summary : RunSummary
-        What came out.
+        Results of the run.
     selection, messages : mapping
         Which maps were requested, and how many messages were used or left out.
     files : list of str
@@ -51,7 +51,7 @@ def write_summary(
     facts : mapping
         What the sinks add.
     seconds : float
-        Wall-clock time of the run. Times stand under ``seconds``; the rest is the same each time.
+        Wall-clock time of the run. Times are under ``seconds``; the rest is the same each time.
     workers : int
         Processes used.
 
@@ -99,7 +99,7 @@ def write_summary(
 
 
 def _layout(summary: RunSummary) -> dict[str, Any]:
-    """Tell how the layout came to be: since when it was final, how much it changed, how sure it is."""
+    """Describe how the layout developed: since when it was final, how much it changed, how sure it is."""
     totals, histories, convergence = summary.totals, summary.histories, summary.convergence
     final = convergence.layout_final
     rooms = [histories.tracks[track] for track in histories.in_last_map]

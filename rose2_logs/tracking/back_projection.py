@@ -43,7 +43,7 @@ class BackProjector:
     """Carries the rooms of a run's last map over to the maps before it.
 
     A map is laid over the last one: first as it moved from map to map, then by its walls. Each of its free
-    cells takes the room that lies there in the end; the nearest, where the last map shows no free space.
+    cells takes the room that is there in the end; the nearest, where the last map shows no free space.
     Pieces of a room smaller than `back_projected_min_area_m2` join the room next to them.
 
     Parameters
@@ -211,7 +211,7 @@ class RunBackProjection:
         Parameters
         ----------
         snapshots : iterable of OccupancySnapshot
-            The maps of the run once more. Those that were not taken before are left out.
+            The maps of the run again. Those that were not taken before are left out.
         """
         last = self._last
         if last is None:

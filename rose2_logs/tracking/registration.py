@@ -77,7 +77,7 @@ class RigidMotion:
 
 
 class MapAligner:
-    """Tells of successive maps how each lies against the one before, by their walls.
+    """Finds how each of successive maps moved relative to the one before, by their walls.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ class MapAligner:
         -------
         RigidMotion or None
             The motion, in the world frame, of what both maps show; None where it is less than `shift_min_m`
-            on average, or the walls do not tell.
+            on average, or the walls do not determine it.
         """
         points = wall_points(snapshot, self._occupancy)
         before, self._before = self._before, None

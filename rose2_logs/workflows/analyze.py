@@ -221,7 +221,7 @@ def _project_back(reader: LogReader, history: RunHistory, store: RunStore, sinks
     """If requested, read the maps again to measure how much of the last map's rooms each of them shows."""
     if not history.projects_back:
         return
-    logger.info("the maps are read once more, to project the last layout back")
+    logger.info("the maps are read again, to project the last layout back")
     counts = reader.counts
     with muted():  # these warnings came the first time
         for found in history.back_projected(reader.snapshots()):
@@ -254,7 +254,7 @@ def _run_info(path: Path, reader: LogReader, options: RunOptions) -> RunInfo:
 
 
 def _facts(info: RunInfo, options: RunOptions) -> dict[str, Any]:
-    """Tell what the analysis of the maps depends on; what also stands in the summary, as it stands there."""
+    """Return what the analysis of the maps depends on, in the form of the summary where it is part of it."""
     return {
         **options.deciding(),
         "input": info.provenance,

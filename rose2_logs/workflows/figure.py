@@ -85,7 +85,7 @@ def export_plan(
     out : path, optional
         Folder for the files; by default that of the results.
     snapshot, coverage : int, float, optional
-        Which map, see `Run.choose`; its number stands in the files' names if it is not the last.
+        Which map, see `Run.choose`; its number is part of the files' names if it is not the last.
     overwrite : bool
         Whether files may be replaced.
 

@@ -99,7 +99,7 @@ def test_b_lies_where_its_motion_brings_it(comparison: LayoutComparison):
 def test_the_title_warns_where_the_runs_do_not_fit(comparison: LayoutComparison):
     unsure = dataclasses.replace(comparison.placement, runner_up_score=0.95)
     other = dataclasses.replace(comparison.placement, score=0.1, agreement=0.1)
-    assert "B may lie wrongly" in draw_comparison(dataclasses.replace(comparison, placement=unsure)).title
+    assert "B may be misaligned" in draw_comparison(dataclasses.replace(comparison, placement=unsure)).title
     assert (
         "do not seem to be two runs"
         in draw_comparison(dataclasses.replace(comparison, placement=other)).title

@@ -97,7 +97,7 @@ class BatchDisplay:
         self._bar.update(self._running[told.name], completed=told.share)
 
     def retry(self, name: str, reason: str) -> None:
-        """Tell that a log is tried again."""
+        """Show that a log is tried again."""
         warning(f"{name}: {reason}; it is tried again")
         self._remove(name)
 

@@ -63,7 +63,7 @@ def print_comparison(result: ComparisonResult) -> None:
     elif found.ambiguous:
         warning(
             "the building fits about as well in another way, as when it looks the same turned by half a "
-            "circle: B may lie wrongly over A"
+            "circle: B may be misaligned with A"
         )
     _print_overview(found)
     _print_rooms(found)

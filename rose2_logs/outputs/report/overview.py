@@ -69,7 +69,7 @@ def write_reports(
     folder : path
         What `analyze_log` or a batch has written.
     out : path, optional
-        The page of one log; of several the folder for their pages. By default each lies with its results.
+        The page of one log; of several the folder for their pages. By default each goes next to its results.
     panels, overwrite
         As for `write_report`.
 

@@ -24,7 +24,7 @@ from rose2_logs.outputs.report.words import (
 from rose2_logs.runs.run import Run
 
 ROWS_MOST = 300
-"""Rows of a table: more can be read by programs only, and they stand in the Parquet tables."""
+"""Rows of a table: more are useful to programs only, and those are in the Parquet tables."""
 EVENT_WORDS = {
     "shifted": "the whole map shifted",
     "split": "split",

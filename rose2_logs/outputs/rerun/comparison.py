@@ -206,7 +206,7 @@ def _document(comparison: LayoutComparison) -> str:
     if not comparison.same_building:
         verdict = f"**These do not seem to be two runs in one building.** {verdict}"
     elif comparison.ambiguous:
-        verdict = f"**B may lie wrongly: another way fits about as well.** {verdict}"
+        verdict = f"**B may be misaligned: another position fits about as well.** {verdict}"
     return (
         f"A: {comparison.a.name}, B: {comparison.b.name}\n\n{verdict}\n\n"
         f"| rooms | | |\n|---|---|---|\n{counts}\n\n"

@@ -80,7 +80,7 @@ def summary_text(info: RunInfo, summary: RunSummary) -> str:
 
 
 def _worth_a_look(histories: TrackHistories) -> list[str]:
-    """Tell which rooms are unsure, and where the whole map shifted."""
+    """List which rooms are unsure, and where the whole map shifted."""
     lines = []
     shares = [(histories.tracks[track].wall_support, track) for track in histories.in_last_map]
     unsure = sorted((share, track) for share, track in shares if share is not None and is_unsure(share))

@@ -1,4 +1,4 @@
-"""Masks of free cells: erosion, distance, parts, lines. What lies outside a mask or its frame is obstacle."""
+"""Masks of free cells: erosion, distance, parts, lines. All outside a mask or its frame is obstacle."""
 
 from __future__ import annotations
 

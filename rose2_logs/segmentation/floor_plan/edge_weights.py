@@ -66,7 +66,7 @@ def edge_evidence(
     Parameters
     ----------
     edges_m : (E, 4) float
-        Edges in the grid frame, meters; those that lie on no line get zeros.
+        Edges in the grid frame, meters; those that are on no line get zeros.
     lines_m : (L, 4) float
         Representative lines.
     walls, free : (H, W) bool

@@ -54,7 +54,7 @@ def parts_of_room(
 
 
 def _is_one_part(inside: BoolArray, clear: NDArray[np.float32], parameters: TopologyParameters) -> bool:
-    """Tell quickly that a room has one part; most have.
+    """Check quickly whether a room has only one part, as most have.
 
     The summits of two parts lie in its cells that are as clear as a part must be. Where these hang together,
     and those that are clearer than a narrow passage can be do too, some way between the two is no passage.
