@@ -262,7 +262,7 @@ def _snapshot_of_array(array: ArrayLike, resolution_m: float | None) -> Occupanc
     if array is None or isinstance(array, Mapping):
         raise ParameterError(f"a map is an array, a path or an OccupancySnapshot, not {_type(array)}")
     if resolution_m is None:
-        raise ParameterError("an array does not tell how large its cells are; give resolution_m in meters")
+        raise ParameterError("an array does not say how large its cells are; give resolution_m in meters")
     try:
         cells = np.ma.filled(array, UNKNOWN) if isinstance(array, np.ma.MaskedArray) else np.asarray(array)
     except ValueError as error:
