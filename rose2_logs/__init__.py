@@ -42,7 +42,7 @@ _HOMES = {
     "workflows.evaluate": ("Evaluation",),
     "workflows.segment": ("Segmentation",),
 }
-"""Where each public name is defined; ``__init__.pyi`` tells the same to type checkers."""
+"""Where each public name is defined; ``__init__.pyi`` says the same to type checkers."""
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = ["__version__", *sorted(_HOME_OF)]  # noqa: PLE0604 (names, all of them text)

@@ -80,9 +80,9 @@ def analyze(
         Folder for the results, which is created. Without it, nothing stays on the disk: the stored run is
         deleted together with the `Run` object, and there is no recording or annotated MCAP unless asked for.
     parameters : Parameters or mapping, optional
-        Those of all stages; of a mapping as ``{"walls.extension_m": 6}`` the others keep their defaults.
+        Parameters of all stages. A mapping such as ``{"walls.extension_m": 6}`` changes only those it names.
     sinks : sequence of Sink
-        Outputs of your own, which receive each step as it comes.
+        Your own outputs; each receives every step as it is made.
     on_snapshot : callable, optional
         Called with each finished `TrackedSnapshot` and the share of the log's time that is done.
     **options
@@ -214,7 +214,7 @@ def segment(
         Occupancy in percent, -1 for unknown, row 0 at the origin as in ROS messages; or the file of a saved
         map.
     resolution_m : float, optional
-        Side of a cell in meters: of an array, or of an image without a ``.yaml`` beside it.
+        Side of a cell in meters, for an array or an image without a ``.yaml`` next to it.
     method : str
         ``rose2``, or one of the classical methods ``morphological``, ``distance``, ``voronoi``.
     parameters : Parameters or mapping, optional
@@ -262,7 +262,7 @@ def _snapshot_of_array(array: ArrayLike, resolution_m: float | None) -> Occupanc
     if array is None or isinstance(array, Mapping):
         raise ParameterError(f"a map is an array, a path or an OccupancySnapshot, not {_type(array)}")
     if resolution_m is None:
-        raise ParameterError("an array does not tell how large its cells are; give resolution_m in meters")
+        raise ParameterError("an array does not say how large its cells are; give resolution_m in meters")
     try:
         cells = np.ma.filled(array, UNKNOWN) if isinstance(array, np.ma.MaskedArray) else np.asarray(array)
     except ValueError as error:
@@ -324,7 +324,7 @@ def read_map(map_file: str | Path, resolution_m: float | None = None) -> Occupan
     map_file : str or path
         A map_server ``.yaml``, or an image in the gray values of ROS maps.
     resolution_m : float, optional
-        Side of a cell in meters, for an image without a ``.yaml`` beside it.
+        Side of a cell in meters, for an image without a ``.yaml`` next to it.
 
     Raises
     ------
@@ -352,7 +352,7 @@ def load(folder: str | Path) -> Run:
     Parameters
     ----------
     folder : str or path
-        What `analyze`, or ``rose2-logs analyze``, has written for one log.
+        The folder that `analyze` or the command line wrote for one log.
 
     Raises
     ------
@@ -379,7 +379,7 @@ def compare(
     parameters: GivenParameters = None,
     overwrite: bool = False,
 ) -> LayoutComparison:
-    """Lay the last layout of run B over that of run A, wherever they started, and tell what differs.
+    """Align the last layout of run B with that of run A, wherever they started, and find what differs.
 
     Parameters
     ----------
@@ -395,12 +395,12 @@ def compare(
     Returns
     -------
     LayoutComparison
-        How B lies in A's frame, and which rooms and walls are the same, new, missing, moved or not explored.
+        Where B is in A's frame, and which rooms and walls are the same, new, missing, moved or not explored.
 
     Raises
     ------
     ResultsError
-        If results cannot be read, or a last map has too few walls to tell how it lies.
+        If results cannot be read, or a last map has too few walls to be aligned.
     OutputError
         If the folder is that of a run, there is a comparison already and it may not be replaced, or a file
         cannot be written.
@@ -443,8 +443,8 @@ def evaluate(
     group : str, optional
         Evaluate only the cases of this group.
     along : bool
-        Whether the cases of each group are, in their order, the maps of one run: then there are figures over
-        its coverage and of its tracks, too.
+        Whether the cases of each group are, in their order, the maps of one run: this
+        adds figures over its coverage and of its tracks.
     workers : int
         Processes; results do not depend on it.
 

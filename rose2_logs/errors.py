@@ -59,7 +59,7 @@ class ResultsError(LogError):
 
 
 class MissingPackageError(Rose2LogsError):
-    """Something was asked for that needs a package that is not installed."""
+    """A function needs a package that is not installed."""
 
 
 class OutputError(Rose2LogsError):

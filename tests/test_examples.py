@@ -6,6 +6,7 @@ import doctest
 import importlib
 import json
 import re
+import sys
 from pathlib import Path
 
 import matplotlib as mpl
@@ -61,13 +62,34 @@ def test_the_main_functions_and_classes_have_examples():
     )
 
 
+def readme_block() -> str:
+    """The README's only block of Python."""
+    (block,) = re.findall(r"```python\n(.*?)```", (PROJECT / "README.md").read_text("utf-8"), re.DOTALL)
+    return str(block)
+
+
 def test_the_python_in_the_readme_runs_as_it_stands(in_a_folder: Path, office_results: Path):
     """After its first command, which makes the results."""
     (in_a_folder / "results").mkdir()
     (in_a_folder / "results" / "office").symlink_to(office_results)
-    (block,) = re.findall(r"```python\n(.*?)```", (PROJECT / "README.md").read_text("utf-8"), re.DOTALL)
-    exec(block, {})
+    exec(readme_block(), {})
     assert (in_a_folder / "half.svg").stat().st_size > 1000
+
+
+def test_the_python_in_the_readme_needs_pandas_only_where_it_says_so(
+    in_a_folder: Path, office_results: Path, monkeypatch
+):
+    """Up to the comment that names pandas and matplotlib, it runs without them."""
+    (in_a_folder / "results").mkdir()
+    (in_a_folder / "results" / "office").symlink_to(office_results)
+    for package in ("pandas", "matplotlib", "matplotlib.pyplot"):
+        monkeypatch.setitem(sys.modules, package, None)
+    plain, comment, rest = readme_block().partition("# Only what follows needs pandas and matplotlib")
+    names: dict[str, object] = {}
+    exec(plain, names)
+    assert comment
+    with pytest.raises(rl.MissingPackageError):
+        exec(rest.partition("\n")[2], names)
 
 
 def thin_out(log: Path, to: Path) -> None:

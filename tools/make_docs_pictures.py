@@ -21,9 +21,10 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 from PIL import Image as PillowImage
+from skimage.morphology import skeletonize
 
 from rose2_logs.config.parameters import Parameters
-from rose2_logs.drawing.palette import label_colors
+from rose2_logs.drawing.palette import track_color
 from rose2_logs.drawing.pixels import as_pixels
 from rose2_logs.drawing.plan import PANEL, draw_plan
 from rose2_logs.io import open_log
@@ -37,7 +38,7 @@ from rose2_logs.segmentation.pipeline import analyze
 from rose2_logs.segmentation.rose.spectrum import Spectrum, compute_spectrum
 from rose2_logs.segmentation.rose.stage import find_structure, make_clean_map
 from rose2_logs.segmentation.topology.splitting import split_rooms
-from rose2_logs.segmentation.topology.voronoi import voronoi_graph
+from rose2_logs.segmentation.topology.voronoi import clearance_m
 from rose2_logs.segmentation.walls.stage import WallCounter, find_walls
 from rose2_logs.workflows.analyze import RunOptions, analyze_log
 from rose2_logs.workflows.compare import compare_runs
@@ -107,7 +108,7 @@ class Painter:
     def rooms(self, labels: NDArray[np.int32], image: Image) -> Image:
         """Fill the rooms of a label image (H, W) of the canvas with colors of their own."""
         part = self._scaled(labels[self._window])
-        colors = label_colors(int(labels.max(initial=0))).astype(float)
+        colors = _label_colors(int(labels.max(initial=0))).astype(float)
         blended = ROOM_OPACITY * colors[part] + (1 - ROOM_OPACITY) * image
         return np.where((part > 0)[..., None], blended, image).astype(np.uint8)
 
@@ -191,11 +192,9 @@ def _labels_along(
     lines = walls.lines.ends_m
     plan = make_floor_plan(lines, walls.walls, part.free, first, cell_m, parameters.floor_plan)
     split = split_rooms(plan.labels, walls.walls, lines, directions, cell_m, parameters.topology)
-    cells = voronoi_graph(
-        split, walls.walls, cell_m, parameters.topology.split_min_clearance_m / 2, parameters.topology
-    )
-    graph = np.zeros(split.shape, np.int32)
-    graph[cells[:, 0], cells[:, 1]] = 1
+    clearance = clearance_m(walls.walls, cell_m, parameters.topology.clearance_blur_cells)
+    is_clear = clearance >= parameters.topology.split_min_clearance_m / 2
+    graph = skeletonize((split > 0) & is_clear).astype(np.int32)  # type: ignore[no-untyped-call]
     return part.labels(plan.labels), part.labels(split), part.labels(graph) > 0
 
 
@@ -259,9 +258,14 @@ def comparison_picture(log: Path) -> tuple[str, Image]:
             return "compare", np.asarray(picture)
 
 
+def _label_colors(count: int) -> NDArray[np.uint8]:
+    """Colors (count + 1, 3) of labels, RGB: those of tracks; label 0 is black."""
+    return np.array([(0, 0, 0), *(track_color(number) for number in range(1, count + 1))], np.uint8)
+
+
 def _spread_colors(count: int) -> list[Color]:
     colors: list[Color] = [GRAY]
-    colors += [(int(r), int(g), int(b)) for r, g, b in label_colors(count)[1:]]
+    colors += [(int(r), int(g), int(b)) for r, g, b in _label_colors(count)[1:]]
     return colors
 
 

@@ -1,4 +1,4 @@
-"""A batch: planned, carried out, its results put in place. A stopped one leaves only whole results."""
+"""A batch: plan it, run it, put its results in place. A stopped one leaves only complete results."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ logger = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class LogState:
-    """What became of one log of a batch.
+    """How one log of a batch ended.
 
     Attributes
     ----------
@@ -56,7 +56,7 @@ class LogState:
 
 @dataclass(frozen=True)
 class BatchResult:
-    """The outcome of a batch: what became of its logs, sorted by name, and the files of the summary."""
+    """The outcome of a batch: how each log ended, sorted by name, and the files of the summary."""
 
     out: Path
     states: tuple[LogState, ...]
@@ -84,7 +84,7 @@ class Listener(Protocol):
         ...
 
     def finished(self, state: LogState) -> None:
-        """Show what became of a log."""
+        """Show how a log ended."""
         ...
 
 
@@ -101,7 +101,7 @@ class Workers(AbstractContextManager["Workers"], Protocol):
 
 
 def run_batch(arguments: Sequence[str], out: Path, options: BatchOptions, listener: Listener) -> BatchResult:
-    """Analyze many logs, each to a folder of its own, with one data set and one summary of all.
+    """Analyze many logs, each into its own folder, with one data set and one summary of all.
 
     Each log's results go to ``out/logs/NAME``, as `analyze_log` writes them; the tables of all logs to
     ``out/tables``, partitioned by log; one row per log to ``out/summary.parquet`` and ``out/summary.csv``.
@@ -113,7 +113,7 @@ def run_batch(arguments: Sequence[str], out: Path, options: BatchOptions, listen
     arguments : sequence of str
         Logs, folders, patterns, URLs; see `find_logs`.
     out : path
-        Where to; it is made. Workers on other machines must see it at the same path.
+        Output folder, created if needed. Workers on other machines must see it at the same path.
     options : BatchOptions
         What to take from each log, how to analyze it, and by which workers.
     listener : Listener
@@ -148,7 +148,7 @@ def run_batch(arguments: Sequence[str], out: Path, options: BatchOptions, listen
 
 
 class _Batch:
-    """A running batch: earlier results, tasks under way, and what became of the logs so far."""
+    """A running batch: earlier results, tasks under way, and how the logs so far ended."""
 
     def __init__(self, out: Path, work: Path, options: BatchOptions, listener: Listener) -> None:
         self.states: list[LogState] = []
@@ -187,7 +187,7 @@ class _Batch:
         return [task for _, task in sorted(tasks, key=lambda each: -each[0])]
 
     def carry_out(self, tasks: Sequence[LogTask]) -> None:
-        """Have the tasks carried out, and put their results in place."""
+        """Run the tasks, and put their results in place."""
         if not tasks:
             return
         under_way = {task.name: task for task in tasks}
@@ -220,7 +220,7 @@ class _Batch:
         return dataset.write_summary_tables(self._out, [*rows, *failed.values()])
 
     def _moved(self, looks: dict[Location, Signature | None], known: dict[str, str]) -> dict[Location, str]:
-        """Earlier results of logs that seem to lie elsewhere now, by name and size; the workers make sure."""
+        """Earlier results of logs that seem to have moved, by name and size; the workers make sure."""
         here = {log.address for log in looks}
         gone = {
             (Location(record.address).parts[-1], record.signature.size_bytes): name

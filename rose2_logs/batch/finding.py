@@ -35,10 +35,10 @@ def find_logs(arguments: Sequence[str], out: Path) -> list[Location]:
     ------
     LogError
         If a folder or a pattern has no logs, or a URL cannot be listed. A single log that is not there is
-        returned: opening it tells why.
+        returned: opening it reports why.
     """
     found: dict[str, Location] = {}
-    # Many arguments lie in the same folder, which is looked at only once.
+    # Many arguments may be in the same folder, which is listed only once.
     is_bag_at = cache(_is_bag_at)
     for argument in arguments:
         path = _local_path(argument)

@@ -1,4 +1,4 @@
-"""Folders of a batch: names of those of logs; that of all is locked, cleaned, filled with whole results.
+"""Folders of a batch: their names; the output folder is locked, cleaned, and filled with complete results.
 
 The names are safe on every file system, one for each log, and the same when the batch is resumed.
 """
@@ -117,7 +117,7 @@ def assign_names(
     Returns
     -------
     dict of Location to str
-        The log's own name, preceded by those of its folders as far as it takes to tell it from the others;
+        The log's own name, preceded by those of its folders as far as needed to make it unique;
         where that is not enough a hash of its address follows. Names differ by more than upper and lower
         case.
     """

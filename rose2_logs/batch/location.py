@@ -45,7 +45,7 @@ class Location:
 
     @property
     def parts(self) -> tuple[str, ...]:
-        """Names of the folders that it lies in and its own, outermost first."""
+        """Names of its folders and its own name, outermost first."""
         if not self.is_remote:
             return Path(self.target).parts
         inner, _, outer = self.target.partition("::")

@@ -1,4 +1,4 @@
-"""How a batch is carried out: its options, beside those of the run of each log."""
+"""Options of a batch, in addition to those of the run of each log."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ BATCH = ("batch",)
 @explained
 @dataclass(frozen=True)
 class BatchOptions:
-    """What to take from each log, how to analyze it, what to write (`run`), and how the batch is carried out.
+    """What to take from each log, how to analyze it, what to write (`run`), and how to run the batch.
 
-    The options of `run` that `analyze` alone has have no meaning here.
+    Options of `run` that only `analyze` has are ignored here.
 
     Raises
     ------

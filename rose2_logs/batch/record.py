@@ -1,4 +1,4 @@
-"""What is kept beside the results of a log so that a batch can be resumed: log, signature, options."""
+"""What is kept with the results of a log so that a batch can be resumed: log, signature, options."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Signature:
     anyway. It need not be computed again as long as the signature is the same. Of local files the signature
     holds name, size and the times of the last change of content and of metadata, in nanoseconds: to change a
     file and keep all of them takes setting back the clock. Of files behind URLs it holds name, size and
-    whatever the server tells of their version (ETag, checksum, generation, time of change).
+    whatever the server reports about their version (ETag, checksum, generation, time of change).
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class Signature:
         For each file its name, size and version.
     is_sound : bool
         Whether the same signature means the same content: not where a file had changed within `SETTLED_S`
-        before, or its server tells nothing of its version.
+        before, or its server reports nothing about its version.
     """
 
     files: tuple[tuple[str, int | None, tuple[str, ...]], ...]
@@ -89,7 +89,7 @@ def local_signature(log: Path) -> Signature:
 
 @dataclass(frozen=True)
 class Record:
-    """What is kept beside the results of one log.
+    """What is kept with the results of one log.
 
     Attributes
     ----------
@@ -112,7 +112,7 @@ class Record:
     layers: tuple[str, ...] = RECORDING_LAYERS
 
     def write(self, folder: Path) -> None:
-        """Write it beside the results in a folder.
+        """Write it next to the results in a folder.
 
         Raises
         ------
@@ -133,7 +133,7 @@ class Record:
 
 
 def read_record(folder: Path) -> Record | None:
-    """Read the record beside the results of a log; None if there is none that can be used."""
+    """Read the record of the results of a log; None if there is no usable one."""
     try:
         kept = json.loads((folder / RECORD).read_text(encoding="utf-8"))
         files = tuple((name, size, tuple(version)) for name, size, version in kept["signature"]["files"])

@@ -239,7 +239,7 @@ def _local_name(path: str, name: str) -> str:
 
 
 def _images_of(files: Any, path: str) -> list[str]:
-    """Images beside a saved map's ``.yaml``."""
+    """Images next to a saved map's ``.yaml``."""
     if not path.lower().endswith(MAP_ENDINGS):
         return []
     beside = files.ls(str(path).rpartition("/")[0], detail=False)

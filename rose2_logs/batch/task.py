@@ -112,7 +112,7 @@ class Progress:
 
 @dataclass(frozen=True)
 class LogOutcome:
-    """What became of a log.
+    """How a log ended.
 
     Attributes
     ----------

@@ -82,7 +82,7 @@ class _MessageHandler(logging.Handler):
         self._shown: Counter[str] = Counter()
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Show one message; of a kind that came often only that it did."""
+        """Show one message; if its kind came often, only say so."""
         fields = {name: getattr(record, name, None) for name in FIELDS}
         kind = fields["kind"]
         if kind is not None and not style.as_json and style.level >= logging.WARNING:
@@ -112,7 +112,7 @@ def printable(text: str) -> str:
 
 
 def error(message: str, **fields: Any) -> None:
-    """Show one line about an error, after the traceback of the one that is handled if that was asked for."""
+    """Show one line about an error, after the traceback of the one being handled if that was requested."""
     if style.debug and sys.exc_info()[0] is not None:
         if style.as_json:
             fields["traceback"] = traceback.format_exc()

@@ -20,7 +20,7 @@ from rose2_logs.config.run_options import METHOD, Option, RunOptions, options_of
 
 MESSAGES = "Messages on stderr"
 VALUES = {bool: "", int: "N", str: "NAME", Path: "PATH"}
-"""What stands in a command's help for the value of an option of this type that has no name of its own."""
+"""Placeholder in a command's help for the value of an option of this type, where it declares none."""
 EXIT_FAULT, EXIT_KNOWN, EXIT_INTERRUPTED = 1, 2, 130
 EXIT_CODES = (
     "[bold]Exit codes:[/bold] 0 done, also with warnings, which summary.json counts; 1 internal error of "
@@ -100,7 +100,7 @@ class App(typer.Typer):
     """A Typer application whose commands all have the options about messages.
 
     A parameter of a command that is annotated with one of `MADE_FROM` stands for all the options of that
-    class; the command is called with an object that was made of what was given.
+    class; the command is called with an object made from the given values.
     """
 
     def command(self, *arguments: Any, **options: Any) -> Callable[[Any], Any]:

@@ -24,7 +24,7 @@ _out = Console(highlight=False, width=None if sys.stdout.isatty() else PIPE_WIDT
 
 
 def print_line(markup: str, to_error: bool = False) -> None:
-    """Print a line with markup, beside the progress bar if it goes to stderr."""
+    """Print a line with markup to stdout, or to stderr above a progress bar."""
     if to_error:
         progress_line(markup)
     else:

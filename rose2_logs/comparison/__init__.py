@@ -1,1 +1,1 @@
-"""Two final layouts, as of two runs in one building: how one lies over the other, and what differs."""
+"""Two final layouts, as of two runs in one building: how one is aligned with the other, and what differs."""

@@ -99,12 +99,12 @@ class LayoutComparison:
 
 
 def compare_layouts(a: FinalLayout, b: FinalLayout) -> LayoutComparison | None:
-    """Lay one layout over the other and tell what differs.
+    """Align two layouts and find what differs.
 
     Returns
     -------
     LayoutComparison or None
-        None where one of the maps has too few walls to tell how it lies.
+        None where one of the maps has too few walls to be aligned.
     """
     placement = place(b.map, a.map)
     if placement is None:

@@ -1,4 +1,4 @@
-"""How one map lies over another that began anywhere: any turn and any shift, from their walls and free space.
+"""Alignment of two maps with any turn and any shift between them, from their walls and free space.
 
 Turns are tried where the spectra's directions fit, shifts by correlation of all places at once, and the best
 starts are fitted wall to wall.
@@ -28,7 +28,7 @@ from rose2_logs.tracking.registration import RigidMotion, WallFit, evenly, wall_
 
 @dataclass(frozen=True)
 class Placement:
-    """How a map lies over another.
+    """Position of a map relative to another.
 
     Attributes
     ----------
@@ -107,7 +107,7 @@ class PlacedMap:
 
     @property
     def can_be_placed(self) -> bool:
-        """Whether there are walls enough to tell how the map lies."""
+        """Whether there are enough walls to align the map."""
         return len(self.walls) >= self.parameters.tracking.fit_min_points
 
     def on_wall(self, points_m: FloatArray, reach_m: float) -> BoolArray:
@@ -117,11 +117,11 @@ class PlacedMap:
         return near
 
     def is_free(self, points_m: FloatArray) -> BoolArray:
-        """Which points (..., 2) of this map's frame lie in a free cell."""
+        """Which points (..., 2) of this map's frame are in a free cell."""
         return self._looked_up(self.free, points_m)
 
     def is_known(self, points_m: FloatArray) -> BoolArray:
-        """Which points (..., 2) of this map's frame lie in a cell that was seen."""
+        """Which points (..., 2) of this map's frame are in a cell that was seen."""
         return self._looked_up(self.snapshot.cells != UNKNOWN, points_m)
 
     def _looked_up(self, mask: BoolArray, points_m: FloatArray) -> BoolArray:
@@ -150,12 +150,12 @@ class PlacedMap:
 
 
 def place(moving: PlacedMap, fixed: PlacedMap) -> Placement | None:
-    """Find how a map lies over another, wherever their frames are.
+    """Find the position of a map relative to another, wherever their frames are.
 
     Returns
     -------
     Placement or None
-        None where a map has too few walls to tell.
+        None where a map has too few walls.
     """
     if not (moving.can_be_placed and fixed.can_be_placed):
         return None
@@ -315,7 +315,7 @@ class _ShiftSearch:
 
 
 def fitting_scale(moving: PlacedMap, fixed: PlacedMap) -> float | None:
-    """Find how many times larger a map has to be to lie over another.
+    """Find how many times larger a map has to be to fit another.
 
     The lengths and the widths of the two, along the strongest direction of their walls and across it, give
     the scales that are tried.

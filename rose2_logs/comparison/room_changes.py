@@ -1,4 +1,4 @@
-"""Which rooms of two layouts are the same, and what became of the others."""
+"""Which rooms of two layouts are the same, and how the others changed."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ ROOM_STATUSES: dict[RoomStatus, str] = {
     "new": "a room of B whose place A has explored without finding a room",
     "unseen": "a room whose place the other run has not explored",
 }
-"""What became of rooms, and what each of these means; the order of the tables."""
+"""How rooms may have changed, and what each status means; in the order of the tables."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +40,7 @@ class RoomChange:
     Attributes
     ----------
     status : RoomStatus
-        What became of them.
+        How they changed.
     tracks_a, tracks_b : tuple of int
         Their numbers in each run; empty where there is none.
     iou : float

@@ -1,6 +1,6 @@
 """Which walls of two layouts are missing, new or moved.
 
-A wall is told to be gone only where the other map shows free space in its place and on both its sides: not
+A wall counts as gone only where the other map shows free space in its place and on both its sides: not
 where it was never seen, nor where the view ended before it.
 """
 
@@ -25,7 +25,7 @@ WALL_STATUSES: dict[WallStatus, str] = {
     "new": "a wall of B where A shows free space",
     "moved": "a missing wall and a new one along it, side by side",
 }
-"""What became of walls, and what each of these means; the order of the tables."""
+"""How walls may have changed, and what each status means; in the order of the tables."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +35,7 @@ class WallChange:
     Attributes
     ----------
     status : WallStatus
-        What became of it.
+        How it changed.
     ends_a_m, ends_b_m : (4,) float or None
         Ends x0, y0, x1, y1 of the stretch in each layout, meters.
     shift_m : float or None
@@ -158,7 +158,7 @@ def _along(
 
 
 def _clusters(walls: Walls) -> NDArray[np.int64]:
-    """Cluster of each segment; one of its own for a segment without."""
+    """Cluster of each segment; a segment without one gets a new cluster."""
     own = len(walls.lines_m) + np.arange(len(walls.segments_m))
     return np.where(walls.segment_cluster >= 0, walls.segment_cluster, own)
 
@@ -208,7 +208,7 @@ def _stretches(
 
 
 def _runs(gone: BoolArray, there: BoolArray, parameters: ComparisonParameters) -> list[tuple[int, int]]:
-    """Begin and end of runs; those with a short gap of what cannot be told between them are one."""
+    """Begin and end of runs; runs separated by a short undecided gap count as one."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], gone.astype(np.int8), [0]])))
     runs: list[tuple[int, int]] = []
     for begin, end in edges.reshape(-1, 2).tolist():

@@ -1,6 +1,6 @@
 """Every number that a result depends on: one frozen block per stage, with unit, default and reason.
 
-Lengths are meters (``_m``, ``_m2``), angles radians (``_rad``), times seconds (``_s``); shares lie in [0, 1].
+Lengths are meters (``_m``, ``_m2``), angles radians (``_rad``), times seconds (``_s``); shares are in [0, 1].
 A configuration file is TOML with one table per block; ``resolved`` gives the same shape back.
 """
 
@@ -25,6 +25,7 @@ from rose2_logs.config.comparison import ComparisonParameters
 from rose2_logs.config.fields import ParameterBlock, choice, number
 from rose2_logs.config.tracking import QualityParameters, TrackingParameters
 from rose2_logs.errors import ParameterError
+from rose2_logs.system.files import reason_of
 
 
 @dataclass(frozen=True, repr=False)
@@ -391,7 +392,7 @@ class Parameters:
         return cls().replaced(value or {})
 
     def resolved(self) -> dict[str, dict[str, float | int | str]]:
-        """Every parameter with its value, block by block, as written beside the results."""
+        """Every parameter with its value, block by block, as written with the results."""
         return dataclasses.asdict(self)
 
     def replaced(self, changes: Mapping[str, Any]) -> Parameters:
@@ -421,7 +422,8 @@ def _by_block(changes: Mapping[str, Any], blocks: Iterable[str]) -> dict[str, di
         values = {parameter: given} if dot else given
         if name not in blocks:
             meant = _meant(f"{name}.{next(iter(values), '')}" if isinstance(values, Mapping) else name)
-            raise ParameterError(f"no parameter block {name!r}{meant}; there are: {', '.join(blocks)}")
+            hint = meant or f"there are: {', '.join(blocks)}"
+            raise ParameterError(f"no parameter block {name!r}; {hint}")
         if not isinstance(values, Mapping):
             raise ParameterError(f"{name!r} must be a table of parameters, not {values!r}")
         nested.setdefault(name, {}).update(values)
@@ -433,9 +435,8 @@ def _replaced_block(block_name: str, block: Any, values: Mapping[str, Any]) -> A
     for name in values:
         if name not in names:
             full_name = f"{block_name}.{name}"
-            raise ParameterError(
-                f"no parameter {full_name}{_meant(full_name)}; there are: {', '.join(names)}"
-            )
+            hint = _meant(full_name) or f"there are: {', '.join(names)}"
+            raise ParameterError(f"no parameter {full_name}; {hint}")
     return dataclasses.replace(block, **values)
 
 
@@ -446,7 +447,7 @@ def _meant(name: str) -> str:
     for among in ([row for row in rows if row["block"] == block], rows):
         if near := difflib.get_close_matches(own, [row["name"] for row in among], 1):
             closest = next(row for row in among if row["name"] == near[0])
-            return f"; did you mean {closest['block']}.{closest['name']}?"
+            return f"did you mean {closest['block']}.{closest['name']}?"
     return ""
 
 
@@ -471,7 +472,7 @@ def load_parameters(config: Path | None = None, settings: Iterable[str] = ()) ->
         try:
             parameters = parameters.replaced(tomllib.loads(config.read_text(encoding="utf-8")))
         except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-            raise ParameterError(f"{config}: cannot be read as TOML: {error}") from error
+            raise ParameterError(f"{config}: cannot be read as TOML: {reason_of(error)}") from error
     for setting in settings:
         try:
             parsed = _parsed_setting(setting)
@@ -479,7 +480,8 @@ def load_parameters(config: Path | None = None, settings: Iterable[str] = ()) ->
             raise ParameterError(f"setting {setting!r}: write it as block.name=value") from error
         if not all(isinstance(values, Mapping) for values in parsed.values()):
             meant = _meant(next(iter(parsed)))
-            raise ParameterError(f"setting {setting!r}: write it as block.name=value{meant}")
+            hint = f"; {meant}" if meant else ""
+            raise ParameterError(f"setting {setting!r}: write it as block.name=value{hint}")
         parameters = parameters.replaced(parsed)
     return parameters
 

@@ -49,12 +49,12 @@ KINDS: dict[str, tuple[type, str]] = {"bool": (bool, "True or False"), "str": (s
 
 @dataclass(frozen=True)
 class Option:
-    """What is to be known of an option beside its name, type and default.
+    """What is known of an option besides its name, type and default.
 
     Attributes
     ----------
     help : str
-        What it does, in plain English; with its unit, and when one wants it.
+        What it does and when it is useful, in plain English and with its unit.
     panel : str
         Group in the help.
     commands : tuple of str
@@ -63,7 +63,7 @@ class Option:
         On the command line; by default the name with dashes. The flag of an option that is on by default
         turns it off, and begins with ``--no-``.
     metavar : str
-        What stands for the value in the help.
+        Placeholder of the value in the help.
     low, high : float
         Bounds of a number, both allowed.
     choices : tuple of str
@@ -98,7 +98,7 @@ def option(default: Any, help: str, **about: Any) -> Any:
 
 
 def options_of(kind: Any) -> dict[str, Option]:
-    """List what is known of the options of a dataclass, by their names."""
+    """List the options of a dataclass by name."""
     return {each.name: each.metadata["option"] for each in dataclasses.fields(kind) if each.metadata}
 
 
@@ -114,7 +114,7 @@ def explained(kind: Type) -> Type:
 
 
 def check_options(given: Any) -> None:
-    """Check numbers against their bounds and names against their choices.
+    """Check numbers against their bounds and names against the choices.
 
     Parameters
     ----------
@@ -288,7 +288,7 @@ class RunOptions:
     )
     layers: tuple[str, ...] = option(
         RECORDING_LAYERS,
-        "What the recording shows beside map, rooms and doorways: all, none, or names with commas between "
+        "What the recording shows besides map, rooms and doorways: all, none, or names with commas between "
         f"them, of {', '.join(RECORDING_LAYERS)}.",
         panel=OUTPUTS,
         commands=BOTH,
@@ -308,7 +308,7 @@ class RunOptions:
     )
     back_project: bool = option(
         False,
-        "Read the maps a second time and tell how much of each room of the last map every earlier map shows: "
+        "Read the maps again and measure how much of each room of the last map every earlier map shows: "
         "in back_projected.parquet, a tab of the recording, a section of the report.",
         panel=OUTPUTS,
         commands=BOTH,

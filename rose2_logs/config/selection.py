@@ -86,7 +86,7 @@ class Selection:
         return dataclasses.replace(self, start_ns=start_ns, end_ns=end_ns, start_s=None, end_s=None)
 
     def in_range(self, times: Times) -> Times:
-        """Keep those of the sorted `times` that lie in the time range."""
+        """Keep those of the sorted `times` that are within the time range."""
         first = 0 if self.start_ns is None else int(np.searchsorted(times, self.start_ns, "left"))
         stop = len(times) if self.end_ns is None else int(np.searchsorted(times, self.end_ns, "right"))
         return times[first:stop]

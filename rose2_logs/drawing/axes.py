@@ -14,7 +14,7 @@ ROUND_STEPS = (1.0, 2.0, 5.0, 10.0)
 
 @dataclass(frozen=True)
 class Axis:
-    """The range of an axis; a logarithmic one lies above 0."""
+    """The range of an axis; a logarithmic one is above 0."""
 
     low: float
     high: float

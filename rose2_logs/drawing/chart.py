@@ -19,19 +19,19 @@ from rose2_logs.drawing.shapes import Area, Color, Dot, Lines, Shape, Text
 from rose2_logs.model.occupancy import FloatArray, IntArray
 
 TICK_GAP_MIN = 34.0
-"""Marks of the horizontal axis that would stand closer are thinned."""
+"""Marks of the horizontal axis that would be closer are thinned out."""
 POINTS_MAX = 800
-"""Of longer curves so many points are drawn, evenly taken: more than a screen shows."""
+"""A longer curve is drawn with this many of its points, evenly spaced: more than a screen shows."""
 DOTS_MAX = 60
 """Curves of more points are drawn without dots."""
 LANE, LANE_FONT = 9.0, 8.0
 """Height of a room's lane, and size of its name."""
 LANE_MIN_WIDTH = 1.5
-"""A room that was there for a moment is drawn so wide."""
+"""Width of the lane of a room that only one map shows."""
 SHARE_LANE = 15.0
 """Height of a lane in which a share rises."""
 LAST_WIDTH = 4.0
-"""The last share, which nothing follows, is drawn so wide."""
+"""Width of the last share, which nothing follows."""
 TINT_OPACITY = 0.18
 """How strongly the rest of such a lane is tinted: what is still to come."""
 INK, GRID_COLOR, MARK_COLOR = (60, 68, 76), (217, 222, 228), (91, 101, 112)
@@ -48,7 +48,7 @@ LINE_COLORS: tuple[Color, ...] = (
 
 @dataclass(frozen=True)
 class ChartStyle:
-    """Size of a chart, and what it tells by itself.
+    """Size of a chart, and what is written in it.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class ChartStyle:
     line, dot : float
         Width of curves and radius of their points.
     is_whole : bool
-        Whether title and names of the curves stand in it, on white; otherwise the page around it tells them.
+        Whether title and names of the curves are in the chart, on white, or left to the page around it.
     """
 
     width: float
@@ -118,7 +118,7 @@ class ShareLane:
     Attributes
     ----------
     name, text : str
-        What stands beside it, and what it says when the pointer is over it.
+        Its label, and the text shown when the pointer is over it.
     shares : (N,) float
         In [0, 1].
     color : Color
@@ -306,7 +306,7 @@ class _Chart:
         self._top, self._bottom = style.top, height - style.bottom
 
     def columns(self, values: FloatArray) -> FloatArray:
-        """Where values of the horizontal axis stand on the page."""
+        """Positions on the page of values of the horizontal axis."""
         return self._left + self._x_axis.share(values) * (self._right - self._left)
 
     def _rows(self, values: FloatArray) -> FloatArray:
@@ -358,7 +358,7 @@ class _Chart:
                 self.page.add(Dot(x, y, self._style.dot, color, tooltip))
 
     def names(self, title: str, curves: Sequence[Curve]) -> None:
-        """Write the title above the axes, and the names of the curves beside them."""
+        """Write the title above the axes, and the names of the curves next to them."""
         font = self._style.font
         self.page.add(Text(title, self._left, self._top / 2, 1.2 * font, "start", color=INK))
         for number, curve in enumerate(curves):

@@ -29,20 +29,20 @@ if TYPE_CHECKING:
     from rose2_logs.comparison.layouts import LayoutComparison
 
 WIDE_PX, NARROW_PX, GAP_PX = 1000.0, 493.0, 14.0
-"""Width of the panel of what differs, and of the layouts beside or above it."""
+"""Width of the panel of what differs, and of the layouts next to or above it."""
 TEXT_PX, TITLE_PX, NUMBER_PX = 18.0, 22.0, 16.0
 MARGIN_M = 0.5
 WIDE = 1.6
-"""Width over height from which the layouts stand above what differs and not beside it."""
+"""From this width over height on, the layouts are above what differs and not next to it."""
 ROOM_OPACITY = 0.6
 STRIPE_GAP, STRIPE_WIDTH, OUTLINE_WIDTH, WALL_WIDTH, THIN_WALL_WIDTH = 8.0, 1.5, 1.2, 5.0, 2.0
 DETAIL = 0.8
-"""Outlines lose what is smaller, as the steps of cells."""
+"""Outlines lose smaller details, such as the steps of cells."""
 OUTLINE, FAINT = (70, 70, 70), (150, 150, 150)
 NOTED: frozenset[RoomStatus] = frozenset(
     {"changed", "split", "merged", "regrouped", "missing", "new", "unseen"}
 )
-"""Rooms whose numbers stand in the panel of what differs."""
+"""Rooms whose numbers are written in the panel of what differs."""
 LAYOUT_STYLE = dataclasses.replace(PANEL, width=NARROW_PX, font=NUMBER_PX, picture_most_px=1000)
 ROOM_COLORS: dict[RoomStatus, Color] = {
     "same": (200, 228, 200),
@@ -71,7 +71,7 @@ def draw_comparison(comparison: LayoutComparison) -> Drawing:
     a, b = comparison.a, comparison.b
     corners = np.concatenate([_known_corners(a), b_to_a.points(_known_corners(b))])
     bounds: Bounds = (*corners.min(axis=0).tolist(), *corners.max(axis=0).tolist())
-    differing = captioned(_differences(comparison, bounds), "what differs", TEXT_PX)
+    differing = captioned(_differences(comparison, bounds), _differing_caption(comparison), TEXT_PX)
     is_wide = differing.width > WIDE * differing.height
     groups_a, groups_b = ([getattr(each, of) for each in comparison.rooms] for of in ("tracks_a", "tracks_b"))
     layouts = [
@@ -90,8 +90,14 @@ def draw_comparison(comparison: LayoutComparison) -> Drawing:
 def _title(comparison: LayoutComparison) -> str:
     if not comparison.same_building:
         return "These do not seem to be two runs in one building"
-    sure = "   (B may lie wrongly: another way fits about as well)" if comparison.ambiguous else ""
+    sure = "   (B may be misaligned: another position fits about as well)" if comparison.ambiguous else ""
     return f"floor overlaps {comparison.floor_iou:.0%}, rooms {comparison.rooms_iou:.0%}{sure}"
+
+
+def _differing_caption(comparison: LayoutComparison) -> str:
+    """Say what is drawn, and what two numbers of a room mean where there are any."""
+    has_pairs = any(each.status in NOTED and each.tracks_a and each.tracks_b for each in comparison.rooms)
+    return "what differs" + (" (A > B: a room's number in A and in B)" if has_pairs else "")
 
 
 def _known_corners(layout: FinalLayout) -> FloatArray:
@@ -111,7 +117,7 @@ def _layout(
         for track, shape, area in sorted(zip(layout.tracks, shapes, areas_m2, strict=True), key=_first)
     )
     snapshot = layout.map.snapshot
-    # No cell is told to be a room's: whole shapes are filled.
+    # No cell is labeled, so the whole shapes of the rooms are filled.
     labels = np.zeros(snapshot.cells.shape, np.int32)
     below = PlanMap(motion.grid(snapshot.geometry), snapshot.cells, labels)
     plan = RoomPlan(layout.name, "", rooms, (), None, below)
@@ -125,7 +131,7 @@ def _first(row: tuple[int, object, float]) -> int:
 
 
 def _differences(comparison: LayoutComparison, bounds: Bounds) -> Drawing:
-    """Draw what became of rooms and walls."""
+    """Draw how rooms and walls changed."""
     x0, y0, x1, y1 = bounds
     painter = MapPainter((x0 - MARGIN_M, y0 - MARGIN_M, x1 + MARGIN_M, y1 + MARGIN_M), WIDE_PX)
     for layout, motion in (
@@ -178,7 +184,7 @@ def _pair_name(tracks_a: tuple[int, ...], tracks_b: tuple[int, ...]) -> str:
 
 
 def _keys(comparison: LayoutComparison) -> list[Key]:
-    """Tell what the colors mean, of the statuses that occur."""
+    """Explain the colors of the statuses that occur."""
     counts = comparison.room_counts
     keys = [
         Key(f"{status}: {counts[status]}", color, "hatched" if status == "unseen" else "area")

@@ -57,24 +57,20 @@ MARK_WORDS: dict[Mark, str] = {
 }
 
 
-def draw_case(cells: NDArray[np.int8], comparison: Comparison, scores: Scores, title: str) -> Drawing:
-    """Draw map, truth, found and errors, with a title and a legend; a unit of the page is a pixel.
+def case_sheet(panels: Sequence[Drawing], comparison: Comparison, scores: Scores, title: str) -> Drawing:
+    """Arrange the panels of `draw_panels` with a title, captions and a legend; a unit of the page is a pixel.
 
     Parameters
     ----------
-    cells : (H, W) int8
-        -1 unknown, 0..100 occupancy in percent.
+    panels : sequence of Drawing
+        Map, truth, found and errors.
     comparison : Comparison
-        Labels and marks of the same shape. Row 0 of all three becomes the top of the picture.
+        What they show.
     scores : Scores
         Figures for the title line.
     title : str
         What the map is called.
     """
-    return _sheet(draw_panels(cells, comparison), comparison, scores, title)
-
-
-def _sheet(panels: Sequence[Drawing], comparison: Comparison, scores: Scores, title: str) -> Drawing:
     captions = (
         "map",
         f"truth: {scores.rooms_gt:.0f} rooms",
@@ -105,7 +101,7 @@ def _figures(scores: Scores) -> str:
 def draw_panels(cells: NDArray[np.int8], comparison: Comparison) -> tuple[Drawing, Drawing, Drawing, Drawing]:
     """Draw the four panels map, truth, found and errors, all of the same size, cropped to what is known.
 
-    A found room has the color of its partner, and a color of its own, striped, where it has none.
+    A found room has the color of its partner, and a different color, striped, where it has none.
     """
     shown = (cells >= 0) | (comparison.truth > 0) | (comparison.found > 0)
     window = _with_margin(known_window(shown), shown.shape)
@@ -223,7 +219,7 @@ class CasePictures:
     Parameters
     ----------
     folder : path
-        Where to; it is made.
+        Output folder, created if needed.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -247,7 +243,7 @@ class CasePictures:
         cells = np.flipud(case.snapshot().cells)
         comparison = compare(case.truth(), result.labels)
         panels = draw_panels(cells, comparison)
-        picture = _sheet(panels, comparison, result.scores, f"{case.group}/{case.name}")
+        picture = case_sheet(panels, comparison, result.scores, f"{case.group}/{case.name}")
         picture.save(self._folder / case.group / f"{case.name}.png", width_px=None)
         self._tiles.setdefault(case.group, []).append(_tile(panels[1:], result))
 

@@ -13,7 +13,7 @@ from rose2_logs.model.occupancy import UNKNOWN, BoolArray, FloatArray
 from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot
 
 HATCH_GAP_M = 0.28
-"""Distance of the lines in a recording: told from a fill, and a niche of a meter gets some."""
+"""Distance of the lines in a recording: clearly no fill, and still some lines in a niche of a meter."""
 HATCH_MIN_M = 0.3
 """Shorter lines are left out: gaps between rays and the inside of walls and chairs."""
 
@@ -21,7 +21,7 @@ HATCH_MIN_M = 0.3
 def hatching(shape: BaseGeometry, gap: float) -> BaseGeometry:
     """Lines through a shape on a page, a gap apart, which rise at 45 degrees there.
 
-    They lie at multiples of the gap, so those of shapes side by side go on in one another.
+    They are at multiples of the gap, so that they continue across neighboring shapes.
     """
     lines, _ = hatch_lines([shape], gap, (1.0, 1.0))
     return shapely.multilinestrings(shapely.linestrings(lines))
@@ -122,7 +122,7 @@ def hatch_cells(mask: BoolArray, gap: float) -> FloatArray:
 def stretches_of(
     lines: FloatArray, is_inside: Callable[[FloatArray], BoolArray], step: float
 ) -> tuple[FloatArray, NDArray[np.intp]]:
-    """Cut lines to their stretches over what is asked for.
+    """Cut lines to their stretches over the given shape.
 
     Parameters
     ----------

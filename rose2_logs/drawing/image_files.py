@@ -19,7 +19,7 @@ def write_label_image(path: Path, labels: NDArray[np.integer]) -> None:
     Parameters
     ----------
     path : path
-        Where to; its folder is made.
+        The file to write; its folder is created if needed.
     labels : (H, W) int
         0 = none; row 0 becomes the top of the picture.
 
@@ -36,7 +36,7 @@ def write_label_image(path: Path, labels: NDArray[np.integer]) -> None:
 
 
 def write_image(path: Path, pixels: NDArray[np.uint8] | NDArray[np.uint16]) -> None:
-    """Write gray (H, W) or RGB (H, W, 3) pixels as a PNG, beside its final name and then renamed.
+    """Write gray (H, W) or RGB (H, W, 3) pixels as a PNG, under a hidden name that is then renamed.
 
     Raises
     ------

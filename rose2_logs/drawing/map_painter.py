@@ -1,4 +1,4 @@
-"""The painter of maps with rooms: every drawing of a part of the world is made with it."""
+"""The painter of maps with rooms: it draws every part of the world."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ Bounds = tuple[float, float, float, float]
 
 
 class MapPainter:
-    """Draws what lies in a part of the world; x goes right and y up.
+    """Draws a part of the world; x goes right and y up.
 
     Parameters
     ----------

@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import colorsys
 
-import numpy as np
-from numpy.typing import NDArray
-
 from rose2_logs.drawing.shapes import Color
 
 GOLDEN_RATIO = 0.618033988749895
@@ -39,11 +36,6 @@ def track_color(track: int) -> Color:
     kind = (track // 5) % len(SATURATIONS)
     red, green, blue = colorsys.hsv_to_rgb(hue, SATURATIONS[kind], VALUES[kind])
     return round(red * 255), round(green * 255), round(blue * 255)
-
-
-def label_colors(count: int) -> NDArray[np.uint8]:
-    """Colors (count + 1, 3) of the labels of an image, RGB: those of tracks; label 0 has none, black."""
-    return np.array([(0, 0, 0), *(track_color(number) for number in range(1, count + 1))], np.uint8)
 
 
 def shaded(color: Color, share: float) -> Color:

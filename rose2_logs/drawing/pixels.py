@@ -21,7 +21,7 @@ BOLD_SHARE = 0.025
 """The default font has no bold face; its strokes are made so much of its size thicker."""
 
 ANCHORS = {"start": 0.0, "middle": 0.5, "end": 1.0}
-"""Share of a text that lies before its anchor."""
+"""Share of a text that is before its anchor."""
 SQUARED = "\N{SUPERSCRIPT TWO}"
 RAISED_SIZE, RAISED_BY = 0.62, 0.22
 """Size and rise of a raised two, in sizes of the font."""
@@ -98,7 +98,7 @@ def _area(image: Image.Image, area: Area, scale: float) -> None:
     draw = ImageDraw.Draw(mask)
     level = round(255 * area.opacity)
     parts = [part for part in shapely.get_parts(area.shape) if shapely.get_dimensions(part) == 2]
-    # The largest first: a part may lie in a hole of another, which would be cut out of it.
+    # The largest first: a part may be inside a hole of another, which would be cut out of it.
     for part in sorted(parts, key=lambda part: -part.envelope.area):
         for number, ring in enumerate(shapely.get_rings(part)):
             points = shapely.get_coordinates(ring) * scale - (left, top)

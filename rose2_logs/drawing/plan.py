@@ -38,7 +38,7 @@ ROUND_LENGTHS_M = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 SIDE_PX, GAP_PX = 900.0, 12.0
 """Width of the map in the picture of a segmentation, and the gap to the next."""
 WIDE = 1.5
-"""Width over height from which a map is drawn above its rooms and not beside them."""
+"""From this width over height on, a map is drawn above its rooms and not next to them."""
 LEGEND_FONT = 0.85
 """Size of the legend's texts over that of the rooms' names."""
 
@@ -60,7 +60,7 @@ class PlanStyle:
     detail : float
         Outlines lose what is smaller, as the steps of cells.
     has_names : bool
-        Whether rooms are told by name and area where they have room for it, and not by number only.
+        Whether rooms are labeled with name and area where these fit, and not by number only.
     has_legend : bool
         Whether a strip below holds a scale bar and what the signs mean.
     has_walls : bool
@@ -115,7 +115,7 @@ def draw_plan(
     predicted = {
         number: simpler(painter.on_page(part), style.detail) for number, part in predicted_parts(plan).items()
     }
-    # Names stand on what was seen.
+    # Names are placed on what was seen.
     seen = shapes | {number: shapes[number].difference(part) for number, part in predicted.items()}
     for room in plan.rooms:
         number = room.number
@@ -146,7 +146,7 @@ def draw_plan(
 
 
 def draw_segmentation(plan: RoomPlan) -> Drawing:
-    """Draw a map as it was recorded, and below or beside it with its rooms, walls and doorways.
+    """Draw a map as it was recorded, and below or next to it with its rooms, walls and doorways.
 
     Parameters
     ----------
@@ -216,7 +216,7 @@ def _write_name(painter: MapPainter, room: PlanRoom, shape: BaseGeometry, style:
 
 
 def area_text(area_m2: float) -> str:
-    """Tell an area as names of rooms do: with a decimal where it is small."""
+    """Format an area as in the names of rooms: with a decimal where it is small."""
     return f"{area_m2:.0f} m²" if area_m2 >= 10 else f"{area_m2:.1f} m²"
 
 

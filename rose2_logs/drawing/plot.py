@@ -37,14 +37,14 @@ LAYER_MAP, LAYER_AREAS, LAYER_OUTLINES, LAYER_DOORS, LAYER_NAMES = 0, 1, 2, 3, 4
 def plot_plan(plan: RoomPlan, ax: Axes | None = None) -> Axes:
     """Draw a floor plan with matplotlib, in meters of its frame.
 
-    The map lies below, rooms have the colors of their tracks, their unseen parts are hatched; a question mark
+    The map is below, rooms have the colors of their tracks, their unseen parts are hatched; a question mark
     behind a room's number says that little of its outline is supported by walls.
 
     Parameters
     ----------
     plan : RoomPlan
     ax : matplotlib Axes, optional
-        Where to; by default the axes of a new figure.
+        Axes to draw into; by default those of a new figure.
 
     Returns
     -------
@@ -149,7 +149,7 @@ def _patch(shape: BaseGeometry) -> PathPatch:
     from matplotlib.patches import PathPatch
     from matplotlib.path import Path
 
-    # Outer rings run one way and holes the other, which tells them apart.
+    # Outer rings run one way and holes the other, which distinguishes them.
     parts = [shapely.orient_polygons(part) for part in shapely.get_parts(shape)]
     rings = [ring for part in parts for ring in shapely.get_rings(part)]
     return PathPatch(Path.make_compound_path(*(Path(ring.coords, closed=True) for ring in rings)))

@@ -1,4 +1,4 @@
-"""What a drawing is made of, whatever it is written as: areas, lines, dots, texts and pictures on a page."""
+"""The parts of a drawing, whatever its file format: areas, lines, dots, texts and pictures on a page."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ class Text:
     size : float
         Height of the font.
     anchor : {"start", "middle", "end"}
-        Which part of the text lies at x.
+        Which part of the text is at x.
     is_bold : bool
     color : Color
     rim : float
@@ -126,7 +126,7 @@ Shape = Picture | Area | Lines | Dot | Text
 
 @dataclass(eq=False, repr=False)
 class Page:
-    """A page and what lies on it, the lowest first.
+    """A page and the shapes on it, the lowest first.
 
     Attributes
     ----------

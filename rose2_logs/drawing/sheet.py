@@ -1,4 +1,4 @@
-"""Sheets of several drawings: captions, legends, and panels below and beside each other."""
+"""Sheets of several drawings: captions, legends, and panels below and next to each other."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ class Key:
 
 
 def legend(keys: Sequence[Key], width: float, font: float, *, indent: float = 0.0) -> Drawing:
-    """Draw what colors and signs mean, in as many rows as the width asks for.
+    """Draw what colors and signs mean, in as many rows as the width requires.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def legend(keys: Sequence[Key], width: float, font: float, *, indent: float = 0.
 
 
 def text_line(text: str, width: float, font: float) -> Drawing:
-    """Draw one line of text as wide as asked for; a longer text is set smaller until it fits."""
+    """Draw one line of text in a given width; a longer text is set smaller until it fits."""
     page = Drawing(width, ROW_HEIGHT * font)
     fitting = font * min(1.0, (width - font) / max(text_width(text, font), 1.0))
     page.add(Text(text, 0.5 * font, page.height / 2, fitting, "start"))
@@ -120,7 +120,7 @@ def stacked(parts: Sequence[Drawing], gap: float = 0.0, title: str = "") -> Draw
 
 
 def side_by_side(parts: Sequence[Drawing], gap: float = 0.0) -> Drawing:
-    """Put drawings beside each other, their upper sides aligned."""
+    """Put drawings next to each other, aligned at the top."""
     page = Drawing(
         sum(part.width for part in parts) + gap * (len(parts) - 1), max(part.height for part in parts)
     )

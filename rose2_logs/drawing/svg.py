@@ -18,7 +18,7 @@ FONTS = "Helvetica, Arial, 'Liberation Sans', 'DejaVu Sans', sans-serif"
 DECIMALS = 2
 FEW_COLORS = 128
 MIDDLE_EM = 0.36
-"""A text's baseline lies so far below the middle of its capitals: half their height in usual fonts."""
+"""A text's baseline is this far below the middle of its capitals: half their height in usual fonts."""
 
 _NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 """Characters that no XML may hold, not even escaped; names in a log may."""

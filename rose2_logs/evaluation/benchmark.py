@@ -23,7 +23,7 @@ from rose2_logs.system.workers import ordered_map
 
 @dataclass(frozen=True, eq=False)
 class CaseResult:
-    """What a method made of one case.
+    """Result of a method on one case.
 
     Attributes
     ----------

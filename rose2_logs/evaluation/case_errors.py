@@ -12,7 +12,7 @@ from rose2_logs.tracking.overlap import overlap_of
 
 
 class Mark(IntEnum):
-    """What a cell shows about the room it lies in.
+    """What a cell shows about its room.
 
     The partner of a found room is the true room that it overlaps most, and the other way round, as in the
     figures; two rooms are partners of each other only where both choose the other.

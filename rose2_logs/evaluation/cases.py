@@ -2,7 +2,7 @@
 
 The file holds ``{"cases": [{"group", "name", "map", "rooms", "resolution_m"}, ...]}`` with paths relative to
 itself: `map` is an 8-bit gray image in the convention of ROS maps, `rooms` a label image of the same size.
-A case may say ``"origin_xy_m": [x, y]``, where the image's lower left corner lies in the world.
+A case may give ``"origin_xy_m": [x, y]``, the position of the image's lower left corner in the world.
 Images have row 0 at the top, occupancy grids at the origin below; a case converts between the two.
 """
 
@@ -19,6 +19,7 @@ from PIL import Image, UnidentifiedImageError
 
 from rose2_logs.errors import CasesError
 from rose2_logs.model.occupancy import UNKNOWN, GridGeometry, OccupancySnapshot
+from rose2_logs.system.files import reason_of
 
 OCCUPIED_MAX_GRAY = 89
 """Darker is occupied: (255 - gray) / 255 above map_server's default occupied_thresh of 0.65."""
@@ -33,7 +34,7 @@ class Case:
     Attributes
     ----------
     group, name : str
-        What the case is called; predictions lie in ``<group>/<name>.png``.
+        Name of the case; predictions are stored as ``<group>/<name>.png``.
     map_path, rooms_path : path
         The two images.
     resolution_m : float
@@ -100,7 +101,7 @@ def load_cases(path: Path, group: str | None = None) -> tuple[Case, ...]:
     try:
         listed = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
-        raise CasesError(f"{path}: cannot be read as JSON: {error}") from error
+        raise CasesError(f"{path}: cannot be read as JSON: {reason_of(error)}") from error
     if not isinstance(listed, dict) or not isinstance(listed.get("cases"), list):
         raise CasesError(f'{path}: must hold an object with a list "cases"')
     cases = tuple(_case(path, number, entry) for number, entry in enumerate(listed["cases"]))
@@ -140,4 +141,4 @@ def _read_image(path: Path) -> NDArray[Any]:
         with Image.open(path) as image:
             return np.asarray(image)
     except (OSError, UnidentifiedImageError, Image.DecompressionBombError) as error:
-        raise CasesError(f"{path}: cannot be read as an image: {error}") from error
+        raise CasesError(f"{path}: cannot be read as an image: {reason_of(error)}") from error

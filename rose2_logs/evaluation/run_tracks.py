@@ -82,7 +82,7 @@ class RunTracks:
 
 @dataclass(frozen=True)
 class _Past:
-    """What has to be known of a map until the run is over; the map itself is read again then."""
+    """What is kept of a map until the run is over; the map itself is read again then."""
 
     case: Case
     geometry: GridGeometry
@@ -196,14 +196,14 @@ def _walls(snapshot: OccupancySnapshot, parameters: OccupancyParameters) -> Floa
 
 
 def _offset(first: FloatArray, second: FloatArray) -> tuple[int, int]:
-    """Rows and columns that the first image is moved by to lie best over the second: their correlation."""
+    """Rows and columns by which to move the first image so that it correlates best with the second."""
     from scipy import fft
 
     shape = [fft.next_fast_len(a + b, real=True) for a, b in zip(first.shape, second.shape, strict=True)]
     product = np.conj(fft.rfft2(first, shape)) * fft.rfft2(second, shape)
     correlation = fft.irfft2(product, shape)
     rows, columns = (int(at) for at in np.unravel_index(correlation.argmax(), correlation.shape))
-    # Moves up and left stand at the far ends.
+    # Moves up and left are at the far ends.
     return (
         rows - shape[0] if rows >= second.shape[0] else rows,
         columns - shape[1] if columns >= second.shape[1] else columns,

@@ -8,6 +8,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from rose2_logs.errors import InvalidMapError, LogError
+from rose2_logs.system.files import reason_of
 
 MAP_ENDINGS = (".yaml", ".yml")
 IMAGE_ENDINGS = (".pgm", ".png", ".bmp")
@@ -33,7 +34,7 @@ def logs_among(files: Iterable[str], folder_name: str) -> list[str]:
     """Find the logs in a folder by the names of its files.
 
     A folder is one log if it is a ROS 2 bag, see `is_bag`, or if it contains saved maps and no bags: these
-    are the maps of one run. Every other MCAP file, bag or database is a log of its own. Hidden files and
+    are the maps of one run. Every other MCAP file, bag or database is a separate log. Hidden files and
     annotated logs are ignored.
 
     Parameters
@@ -119,7 +120,7 @@ def load_yaml(path: Path) -> dict[str, Any]:
         loader = yaml.CSafeLoader if yaml.__with_libyaml__ else yaml.SafeLoader
         described = yaml.load(path.read_text(encoding="utf-8"), loader)  # noqa: S506 (both are safe)
     except (OSError, UnicodeDecodeError) as error:
-        raise LogError(f"{path}: cannot be read: {error}", file=path) from error
+        raise LogError(f"{path}: cannot be read: {reason_of(error)}", file=path) from error
     # RecursionError: endless nesting. ValueError: numbers and dates that Python does not accept.
     except (yaml.YAMLError, ValueError, RecursionError) as error:
         raise InvalidMapError(f"{path}: is not YAML: {' '.join(str(error).split())}", file=path) from error

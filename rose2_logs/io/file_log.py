@@ -68,7 +68,7 @@ class FileLog(MessageSource):
         self._on_close = on_close
         self._limits = limits
         self._decoders: dict[tuple[int, int], Decoder] = {}
-        # By topic: sorted places with the number of their file; filled when a topic is first asked for.
+        # By topic: sorted places with the number of their file; filled when a topic is first read.
         self._places: dict[str, list[tuple[Place, int]]] = {}
         try:
             self._open(files, open_file)

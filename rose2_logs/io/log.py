@@ -235,12 +235,12 @@ class LogReader:
 
 
 def choose_topic(info: LogInfo, asked: str | None = None) -> str:
-    """Choose the map topic: the one asked for, else ``/map``, else the only one with messages.
+    """Choose the map topic: the requested one, else ``/map``, else the only one with messages.
 
     Raises
     ------
     NoMapTopicError
-        If there is none, or there are several and none was asked for; the message lists them.
+        If there is none, or there are several and none was requested; the message lists them.
     """
     where = f"{info.path}:" if info.whole else f"{info.path}: is damaged; in its readable part"
     maps = {topic.name: topic for topic in info.topics if topic.is_map}
@@ -250,7 +250,9 @@ def choose_topic(info: LogInfo, asked: str | None = None) -> str:
             if name.lstrip("/") == asked.lstrip("/"):
                 return name
         has = f"its map topics are {listed}" if maps else "it has no map topics"
-        raise NoMapTopicError(f"{info.path}: {asked} is not a topic with occupancy grids; {has}")
+        raise NoMapTopicError(
+            f"{info.path}: {asked or repr(asked)} is not a topic with occupancy grids; {has}"
+        )
     if not maps:
         others = ", ".join(sorted({topic.message_type for topic in info.topics})[:MOST_LISTED])
         found = f", only {others}" if others else ""

@@ -150,7 +150,8 @@ def _open_files(
 ) -> MessageSource:
     """Open files of one kind as one log."""
     if missing := [file for file in files if not file.is_file()]:
-        what = "is not a file; only files can be read together as one log"
+        what = "is a folder, not a file" if missing[0].is_dir() else "there is no such file"
+        what += "; only files can be read together as one log"
         raise LogError(f"{missing[0]}: {what}", file=missing[0])
     kinds = _kinds(files)
     if len(kinds) > 1:
@@ -293,7 +294,7 @@ def _open_directory(log: Path, limits: ReadingParameters) -> MessageSource:
         return _open_files(log, _in_natural_order(maps), limits)
     raise LogError(
         f"{log}: contains neither a bag ({BAG_DESCRIPTION}) nor saved maps; give {_FORMATS}; "
-        "for a folder of many logs use rose2-logs batch",
+        "analyze a folder of many logs as a batch",
         file=log,
     )
 

@@ -150,7 +150,7 @@ class SnapshotAnalysis:
     index, log_time_ns, stamp_ns : int
         Those of the snapshot.
     geometry : GridGeometry
-        Where the map lies in the world.
+        Position of the map in the world.
     free_area_m2 : float
         Area of the known free cells.
     resolution_m : float
@@ -165,7 +165,7 @@ class SnapshotAnalysis:
     seconds : dict
         Time per stage.
     voronoi_m : (V, 4) float or None
-        Lines x0, y0, x1, y1 of the free space's Voronoi graph, world meters, where it was asked for.
+        Lines x0, y0, x1, y1 of the free space's Voronoi graph, world meters, if it was requested.
 
     Examples
     --------

@@ -62,7 +62,7 @@ class ExploredPart:
         return cls(geometry, window, factor, mostly_free & ~any_occupied, any_occupied, free, occupied)
 
     def in_cells(self) -> ExploredPart:
-        """Return the same part with every cell a block of its own."""
+        """Return the same part with one block per cell."""
         return replace(self, factor=1, free=self.known_free, occupied=self.known_occupied)
 
     @property
@@ -103,7 +103,7 @@ class ExploredPart:
     def labels(self, labels: NDArray[np.int32]) -> NDArray[np.int32]:
         """Labels of blocks as labels of the canvas's free cells.
 
-        A free cell in a block without a label, beside a wall that is thinner than a block, takes that of a
+        A free cell in a block without a label, next to a wall that is thinner than a block, takes that of a
         neighboring block.
         """
         full = np.zeros(self.geometry.shape, np.int32)

@@ -21,9 +21,9 @@ Scalar = TypeVar("Scalar", bound=np.generic)
 UNKNOWN = -1
 HIGHEST_PERCENT = 100
 SMALLEST_CELL_M, LARGEST_CELL_M = 1e-4, 100.0
-"""Sides of cells that maps are made of, in meters: a laser's noise is above, a building below."""
+"""Allowed cell sizes in meters: smaller cells are below a laser's noise, larger ones too coarse for rooms."""
 FARTHEST_ORIGIN_M = 1e8
-"""No place on earth lies farther from the origin of its frame, in meters, in no projection."""
+"""No place on earth is farther from the origin of its frame, in meters, in any projection."""
 
 
 def _are_numbers(*values: object) -> bool:
@@ -32,7 +32,7 @@ def _are_numbers(*values: object) -> bool:
 
 @dataclass(frozen=True)
 class GridGeometry:
-    """Where a grid lies in the world.
+    """The position of a grid in the world.
 
     The *grid frame* has its origin at the outer corner of cell (0, 0), x along the columns and y along the
     rows, in meters. The *world* is the frame ``frame_id`` of the map message (REP 105).
@@ -48,7 +48,7 @@ class GridGeometry:
     frame_id : str
         Name of the world frame.
     shape : (int, int)
-        Rows and columns (H, W); row 0 lies at the origin.
+        Rows and columns (H, W); row 0 is at the origin.
 
     Examples
     --------
@@ -134,7 +134,7 @@ class GridGeometry:
         )
 
     def world_to_cell(self, xy_m: FloatArray) -> NDArray[np.intp]:
-        """Cells (..., 2) as row, column that hold world points; they may lie outside the grid."""
+        """Cells (..., 2) as row, column that hold world points; they may be outside the grid."""
         cells = np.floor(self.world_to_grid(xy_m) / self.resolution_m).astype(np.intp)
         return cells[..., ::-1]
 
@@ -162,14 +162,14 @@ class OccupancySnapshot:
         -1 unknown, 0..100 occupancy in percent; row 0 at the origin, as in the message. Other integers are
         converted.
     geometry : GridGeometry
-        Where the grid lies in the world.
+        Position of the grid in the world.
     repeats_before : int
         Identical maps that were received, and dropped, since the snapshot before.
 
     Raises
     ------
     InvalidMapError
-        If `cells` has not the geometry's shape, or is not made of integers from -1 to 100.
+        If `cells` does not have the geometry's shape, or holds anything but integers from -1 to 100.
 
     Examples
     --------

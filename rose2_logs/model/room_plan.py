@@ -18,11 +18,11 @@ from rose2_logs.model.room_quality import RoomQuality, is_unsure
 from rose2_logs.model.rooms import Doorway
 
 PREDICTED_MIN_WIDTH_M = 0.3
-"""Unseen parts of rooms are told from this width on: narrower ones are walls, whose inside is never seen."""
+"""Narrower unseen parts of rooms are not drawn or exported: they are walls, whose inside is never seen."""
 RAY_WIDTH_M = 0.5
-"""What is known and narrower is a ray that left through a gap: a robot would not fit in."""
+"""Display only: known parts that are narrower, rays that left through a gap, do not enlarge a picture."""
 ROUNDING_CELLS = 0.25
-"""Half of what a corner may lie from the cell that it is rounded to."""
+"""Half the distance that a corner may have from the cell that it is rounded to."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,7 +169,7 @@ def plan_of_analysis(
     title: str,
     occupancy: OccupancyParameters,
 ) -> RoomPlan:
-    """Make the plan of a map of its own, whose rooms go by their numbers in it."""
+    """Make the plan of a single map, whose rooms are named by their numbers in it."""
     found = analysis.rooms
     rooms = []
     for number, (shape, area, point) in enumerate(
@@ -220,14 +220,14 @@ def _unknown_within(shape: BaseGeometry, below: PlanMap) -> BaseGeometry:
     if shape.is_empty:
         return shapely.Polygon()
     in_cells = shapely.transform(shape, lambda xy: geometry.world_to_grid(xy) / geometry.resolution_m)
-    # A little smaller: a cell whose side lies on the outline is in or out by its middle, not by rounding.
+    # A little smaller: a cell whose side is on the outline is in or out by its middle, not by rounding.
     in_cells = in_cells.buffer(-ROUNDING_CELLS, join_style="mitre")
     if in_cells.is_empty:
         return in_cells
     x0, y0, x1, y1 = (int(value) for value in np.round(in_cells.bounds))
     height, width = y1 - y0 + 1, x1 - x0 + 1
     inside = np.zeros((height, width), np.uint8)
-    # Corners lie between cells, fillPoly counts from their middles.
+    # Corners are between cells; fillPoly counts from their centers.
     rings = [
         np.round(shapely.get_coordinates(ring) - (x0 + 0.5, y0 + 0.5)).astype(np.int32)
         for ring in shapely.get_rings(in_cells)

@@ -27,7 +27,7 @@ def is_unsure(wall_support: float | None) -> bool:
 
 
 def unsure_sign(wall_support: float | None) -> str:
-    """Return what stands behind the number of a room: the sign where it is unsure."""
+    """Return what follows the number of a room: a sign where the room is unsure."""
     return UNSURE_SIGN if is_unsure(wall_support) else ""
 
 
@@ -110,7 +110,7 @@ def _within(mask: BoolArray, reach_cells: float) -> BoolArray:
 def _frontiers(snapshot: OccupancySnapshot, rooms: RoomMap) -> FloatArray:
     """Length (R,) in meters of the sides that cells of each room share with unknown ones."""
     known = known_window(rooms.labels > 0)
-    # What lies beyond the canvas is not known to be unknown, so only neighbors on it count.
+    # What is beyond the canvas is not known to be unknown, so only neighbors on it count.
     window = tuple(slice(max(part.start - 1, 0), part.stop + 1) for part in known)
     labels, unknown = rooms.labels[window], snapshot.cells[window] == UNKNOWN
     meet = contacts(np.where(unknown, UNKNOWN, labels))

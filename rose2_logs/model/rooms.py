@@ -15,7 +15,8 @@ from rose2_logs.model.occupancy import FloatArray, GridGeometry
 from rose2_logs.system.text import counted
 
 LABEL_DEPTH_SHARE = 0.8
-"""A label stands at most this much less deep than its room is at most: along a corridor in the middle."""
+"""Where a room's name stands: the point nearest to the middle of those that are at least this share of its
+greatest depth from the border, so halfway along a corridor."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +53,7 @@ class RoomMap:
     Attributes
     ----------
     geometry : GridGeometry
-        Where `labels` lies in the world.
+        Position of `labels` in the world.
     labels : (H, W) int32, read-only
         0 = no room, 1..R = the rooms: the segmented map.
     polygons : tuple of R shapely Polygon or MultiPolygon

@@ -1,1 +1,1 @@
-"""What a run becomes for people and programs; no output knows another."""
+"""The output formats for people and programs; no output depends on another."""

@@ -18,7 +18,7 @@ ENDS = ("x0_m", "y0_m", "x1_m", "y1_m")
 
 
 def write_comparison_tables(rooms_path: Path, walls_path: Path, comparison: LayoutComparison) -> None:
-    """Write what became of the rooms, one row per group of them, and the walls that differ.
+    """Write how the rooms changed, one row per group of rooms, and the walls that differ.
 
     Raises
     ------
@@ -79,7 +79,7 @@ def _ends(layout: str, ends_m: FloatArray | None) -> Row:
 def write_comparison_summary(
     path: Path, comparison: LayoutComparison, folder_a: Path, folder_b: Path
 ) -> None:
-    """Write how the layouts lie and how much they have in common.
+    """Write how the layouts are aligned and how much they have in common.
 
     Raises
     ------

@@ -33,7 +33,7 @@ def back_projected_plan(run: StoredRun, snapshot: int) -> RoomPlan:
     last, then = run.plan(last_number), run.plan(snapshot)
     assert last.map is not None and then.map is not None  # noqa: PT018 (plans come with their maps)
     tracks = np.array([room.number for room in last.rooms], np.int32)
-    # Rooms of the plan go by their tracks, ascending; the projector counts them.
+    # Rooms of the plan are numbered by their tracks, ascending; the projector counts them.
     counted = np.where(last.map.labels > 0, np.searchsorted(tracks, last.map.labels) + 1, 0).astype(np.int32)
     rooms = RoomMap(
         last.map.geometry,

@@ -1,4 +1,4 @@
-"""RunHistory: all that a run comes to, gathered step by step, and known in full once the last map is."""
+"""RunHistory: the facts of a whole run, collected step by step and complete after the last map."""
 
 from __future__ import annotations
 
@@ -199,12 +199,12 @@ class RunHistory:
         return self._snapshot_refs
 
     def back_projected(self, snapshots: Iterable[OccupancySnapshot]) -> Iterator[BackProjectedSnapshot]:
-        """Yield what each map shows of the last map's rooms, if that was asked for.
+        """Yield what each map shows of the last map's rooms, if that was requested.
 
         Parameters
         ----------
         snapshots : iterable of OccupancySnapshot
-            The maps of the run once more.
+            The maps of the run again.
         """
         if self._back_projection is not None:
             yield from self._back_projection.back_projected(snapshots)

@@ -61,7 +61,7 @@ class KeptMaps:
 
 
 def kept_maps(path: Path) -> KeptMaps | None:
-    """Look what a journal holds as far as it is whole; None if there is none that can be used.
+    """Read a journal as far as it is complete; None if there is no usable one.
 
     It is read once through, one map at a time.
     """
@@ -131,7 +131,7 @@ class Journal:
         Raises
         ------
         OutputError
-            If it is not the map that stands next in the journal, or what stands there cannot be read.
+            If it is not the next map in the journal, or the entry cannot be read.
         """
         if self._file is None or self._place >= self._end:
             return None
@@ -175,7 +175,7 @@ class Journal:
 
 
 class JournaledWorkers:
-    """Workers whose results go through a journal: those that it knows are taken from it, the others added.
+    """Workers whose results go through a journal: known results are read from it, new ones are added.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
-"""The folder for the results of a run: they come to stand in it all at once, when the last one is whole.
+"""The folder for the results of a run: they appear in it all at once, when the last one is complete.
 
-Until then they are made in a hidden folder beside it, with the journal of the run.
+Until then they are written to a hidden folder next to it, with the journal of the run.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ class OutputFolder:
         Raises
         ------
         OutputError
-            If a result is one of the log's files, also by another name, or would stand among them.
+            If a result is one of the log's files, also by another name, or would be among them.
         """
         self._sources = log_files(log)
         for file in self.files:
@@ -79,25 +79,25 @@ class OutputFolder:
     def prepared(
         self, facts: dict[str, Any], *, overwrite: bool, resume: bool
     ) -> Iterator[tuple[Path, Journal]]:
-        """Give a folder to make the results in and the journal; all results are in place if all went well.
+        """Provide a folder for the results, and the journal; on success all results are moved into place.
 
         Parameters
         ----------
         facts : dict
-            What the analysis depends on. Those that stand in the summary too tell whether results that are
-            there are the same.
+            What the analysis depends on. Those that are also in the summary show whether existing results
+            are the same.
         overwrite : bool
-            Whether results that are there may be replaced.
+            Whether existing results may be replaced.
         resume : bool
-            Whether to go on where a run of the same facts was stopped.
+            Whether to continue a stopped run of the same facts.
 
         Raises
         ------
         OutputError
-            If there are results already and they may not be replaced, another run is at work here, the
+            If there are results already and they may not be replaced, another run is writing here, the
             journal is that of another run, or something cannot be written.
         AlreadyWholeError
-            If results are to be completed that are whole already.
+            If the results to continue are already complete.
         """
         facts = json.loads(json.dumps(facts))
         with writing(self._folder):
@@ -216,7 +216,7 @@ class OutputFolder:
 
 
 def difference(before: dict[str, Any], now: dict[str, Any], prefix: str = "") -> str:
-    """Tell the first difference between two trees of values, or nothing."""
+    """Name the first difference between two trees of values, or nothing."""
     for name in (*before, *(each for each in now if each not in before)):
         one, other = before.get(name), now.get(name)
         if isinstance(one, dict) and isinstance(other, dict):

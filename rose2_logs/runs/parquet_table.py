@@ -38,7 +38,7 @@ class ParquetTable:
     Attributes
     ----------
     part : path
-        Where it is written until then: hidden beside its name.
+        Where it is written until then: a hidden name in the same folder.
     """
 
     def __init__(self, path: Path, schema: pa.Schema) -> None:

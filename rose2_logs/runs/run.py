@@ -32,7 +32,7 @@ class Run(StoredRun, Sequence["RunSnapshot"]):
     folder : str or path
         The folder with ``summary.json``.
     temporary : TemporaryDirectory, optional
-        What holds the folder, if it is to go with this object.
+        Holds the folder, which is deleted together with this object.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class Run(StoredRun, Sequence["RunSnapshot"]):
     def __init__(self, folder: str | Path, temporary: TemporaryDirectory[str] | None = None) -> None:
         super().__init__(Path(folder))
         if temporary is not None:
-            # Left to itself, it warns of being removed only when nothing refers to it any more.
+            # Without this, Python warns that the folder is removed implicitly.
             weakref.finalize(self, temporary.cleanup)
 
     @property
@@ -70,7 +70,7 @@ class Run(StoredRun, Sequence["RunSnapshot"]):
 
     @cached_property
     def rooms(self) -> Table:
-        """One row per room and map; `in_last_map` tells whether the last map shows the room's track."""
+        """One row per room and map; `in_last_map` says whether the last map shows the room's track."""
         import pyarrow as pa
 
         rows, tracks = self.table("rooms"), self.table("tracks", ["track", "in_last_map"])
@@ -107,7 +107,7 @@ class Run(StoredRun, Sequence["RunSnapshot"]):
 
     @property
     def back_projected(self) -> Table | None:
-        """One row per room of the last map and map that shows some of it; None if it was not asked for."""
+        """One row per room of the last map and map that shows some of it; None if it was not requested."""
         return self._public(BACK_PROJECTED) if self.is_back_projected else None
 
     def at(self, snapshot: int | None = None, coverage: float | None = None) -> RunSnapshot:
@@ -289,7 +289,7 @@ class RunSnapshot:
         Parameters
         ----------
         back_projected : bool
-            Take the rooms of the last map as far as this one shows them, instead of its own.
+            Take the rooms of the last map as far as this one shows them, instead of those found in it.
         """
         if back_projected:
             from rose2_logs.runs.back_projected_plan import back_projected_plan
@@ -315,7 +315,7 @@ class RunSnapshot:
         Parameters
         ----------
         ax : matplotlib Axes, optional
-            Where to; by default new ones.
+            Axes to draw into; by default new ones.
         back_projected : bool
             As for `plan`.
 

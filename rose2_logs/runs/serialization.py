@@ -1,6 +1,6 @@
 """Results as bytes and back: MessagePack of dataclasses, arrays and geometries.
 
-What is read can do nothing worse than be wrong: values are made of the declared types alone.
+Damaged input can only give wrong values: nothing but the declared types is ever created.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ Value = TypeVar("Value")
 class Serializer(Generic[Value]):
     """Turns values of one declared type to bytes and back, equal to the last bit.
 
-    Geometries stand as WKB; of arrays with two axes of integers, as images of labels are, the used window is
+    Geometries are WKB; of arrays with two axes of integers, as images of labels are, the used window is
     kept in as few bytes as its numbers need.
 
     Parameters

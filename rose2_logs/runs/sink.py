@@ -73,7 +73,7 @@ class Sink:
     Attributes
     ----------
     facts : mapping
-        JSON values that ``summary.json`` is to hold, under names of their own; read after `finish`.
+        JSON values to add to ``summary.json``, under names no other sink uses; read after `finish`.
 
     Examples
     --------
@@ -100,10 +100,10 @@ class Sink:
         raise NotImplementedError
 
     def write_back_projected(self, found: BackProjectedSnapshot) -> None:
-        """Take what a map shows of the last map's rooms: all maps in order once more, after the last one."""
+        """Take what a map shows of the last map's rooms: all maps again in order, after the last one."""
 
     def finish(self, summary: RunSummary) -> None:
-        """Make the output whole: write it beside its final name first, then rename it."""
+        """Complete the output: write it under a hidden name first, then rename it."""
 
     def abandon(self) -> None:
         """Remove what was begun, if anything: the run has failed. Called once at most."""

@@ -21,7 +21,7 @@ from rose2_logs.tracking.convergence import RoomRows
 from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot
 
 ROWS_AT_ONCE = 2000
-"""Rows that are read back together, by one thread, as each keeps some megabytes of its own."""
+"""Rows that are read back together, by one thread, as each thread keeps some megabytes."""
 ALONG = "snapshots_along"
 """Snapshots as far as they are known along the run; they get two columns more in the end, written anew."""
 
@@ -35,13 +35,13 @@ class RunStore:
     """Writes a run to a folder: the tables `TABLES`, each ``.parquet``.
 
     The tables hold nothing but what the log and the parameters determine: the same run gives the same bytes.
-    What only the last map tells is added by `finish`, which reads some tables once more from the disk. A
+    What only the whole run shows is added by `finish`, which reads some tables again from the disk. A
     context manager: leaving it without `finish` removes what was written.
 
     Parameters
     ----------
     folder : path
-        Where to; it is made.
+        Output folder, created if needed.
     parameters : OccupancyParameters
         Which cells are free and which occupied.
     back_project : bool
@@ -98,7 +98,7 @@ class RunStore:
         self._tables[BACK_PROJECTED].add([key | row for row in tables.back_projected_rows(found)])
 
     def finish(self, history: RunHistory) -> RunSummary:
-        """Add what the last map tells of the ones before, and give the tables their names.
+        """Add what the last map says about earlier ones, and give the tables their names.
 
         Returns
         -------

@@ -25,7 +25,7 @@ from rose2_logs.model.room_plan import PlanMap, PlanRoom, RoomPlan
 from rose2_logs.model.rooms import Doorway
 from rose2_logs.runs.summary import RESULTS_FORMAT, SUMMARY
 from rose2_logs.runs.tables import BACK_PROJECTED, TABLES, Row, unpack_image
-from rose2_logs.system.files import require_utf8
+from rose2_logs.system.files import reason_of, require_utf8
 from rose2_logs.system.text import percent
 from rose2_logs.tracking.registration import RigidMotion
 
@@ -79,7 +79,8 @@ def find_results(folder: Path) -> list[Path]:
     if (folder / SUMMARY).is_file():
         return [folder]
     if not folder.is_dir():
-        raise ResultsError(f"{folder}: there is no such folder; give one that an analysis has written")
+        what = "is a file, not a folder" if folder.is_file() else "there is no such folder"
+        raise ResultsError(f"{folder}: {what}; give one that an analysis has written")
     found = (path.parent for path in folder.rglob(SUMMARY))
     shown = [
         path for path in found if not any(part.startswith(".") for part in path.relative_to(folder).parts)
@@ -201,7 +202,7 @@ class StoredRun:
         return int(numbers[covered[0]] if len(covered) else numbers[-1])
 
     def row(self, snapshot: int) -> Row:
-        """Return what the table of snapshots tells of one."""
+        """Return the row of a map in the table of snapshots."""
         (place,) = np.flatnonzero(self.columns["snapshot"] == snapshot)
         return {name: values[place] for name, values in self.columns.items()}
 
@@ -237,7 +238,7 @@ class StoredRun:
         return RigidMotion((0.0, 0.0), (row["drift_x_m"], row["drift_y_m"]), row["drift_yaw_rad"])
 
     def map(self, snapshot: int) -> tuple[PlanMap, tuple[slice, slice]]:
-        """Read a map and the tracks of its cells, as its explored window, and where that lies in the grid.
+        """Read a map and the tracks of its cells, as its explored window, and its place in the grid.
 
         Raises
         ------
@@ -262,13 +263,13 @@ class StoredRun:
             cells = unpack_image(stored["cells_zstd"], shape, "i1")
             labels = unpack_image(stored["labels_zstd"], shape, "<i4")
         except ValueError as error:
-            text = f"{path}: map {snapshot} cannot be read: {error}; {MAKE_AGAIN}"
+            text = f"{path}: map {snapshot} cannot be read: {reason_of(error)}; {MAKE_AGAIN}"
             raise ResultsError(text, file=path) from error
         return PlanMap(geometry.part(window), cells, labels.astype(np.int32), self.occupancy), window
 
     @property
     def occupancy(self) -> OccupancyParameters:
-        """The run's parameters for stored maps, whose classes the default thresholds tell apart."""
+        """The run's parameters for stored maps, whose classes the default thresholds distinguish."""
         usual = OccupancyParameters()
         return replace(
             self.parameters.occupancy,
@@ -291,7 +292,7 @@ class StoredRun:
         )
 
     def plan(self, snapshot: int, *, with_map: bool = True, with_walls: bool = False) -> RoomPlan:
-        """Return the floor plan of a map, whose rooms go by their tracks.
+        """Return the floor plan of a map, whose rooms are numbered by their tracks.
 
         Parameters
         ----------
@@ -330,13 +331,15 @@ def _is_number(value: object, kind: type) -> bool:
 def _read_summary(folder: Path) -> dict[str, Any]:
     path = folder / SUMMARY
     if not path.is_file():
+        if folder.is_file():
+            raise ResultsError(f"{folder}: is a file, not a folder of results", file=folder)
         below = min((found.parent for found in folder.rglob(SUMMARY)), default=None)
         hint = f"did you mean {below}?" if below else "an analysis writes such a folder for each log"
         raise ResultsError(f"{folder}: holds no {SUMMARY}; {hint}", file=folder)
     try:
         summary = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
-        raise ResultsError(f"{path}: cannot be read: {error}; {MAKE_AGAIN}", file=path) from error
+        raise ResultsError(f"{path}: cannot be read: {reason_of(error)}; {MAKE_AGAIN}", file=path) from error
     if not isinstance(summary, dict) or not {"log", "topic", "results", "files"} <= summary.keys():
         raise ResultsError(f"{path}: is not the summary of a run; give a folder of results", file=path)
     if summary.get("results_format") != RESULTS_FORMAT:

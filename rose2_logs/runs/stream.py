@@ -116,7 +116,7 @@ class TrackedStream:
         workers, parameters
             As for the class.
         with_path : bool
-            Whether to tell where the robot was.
+            Whether to read where the robot was.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""``summary.json``: what a run was made of and what came out, for people and scripts."""
+"""``summary.json``: input, options and results of a run, for people and scripts."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 from rose2_logs.errors import OutputError
 from rose2_logs.runs.history import RunSummary, median_of
 from rose2_logs.runs.sink import RunInfo
-from rose2_logs.system.files import replacing
+from rose2_logs.system.files import reason_of, replacing
 
 SUMMARY = "summary.json"
 """Its name in the folder of a run."""
@@ -37,21 +37,21 @@ def write_summary(
     Parameters
     ----------
     path : path
-        Where to.
+        The file to write.
     info : RunInfo
         Log, method, resolved parameters, versions, provenance.
     summary : RunSummary
-        What came out.
+        Results of the run.
     selection, messages : mapping
-        Which maps were asked for, and what became of the log's messages.
+        Which maps were requested, and how many messages were used or left out.
     files : list of str
-        Names of the other results, beside this one.
+        Names of the other files of the results.
     warnings : mapping
         What was odd about the log: how often, by kind, and the first ones.
     facts : mapping
         What the sinks add.
     seconds : float
-        Wall-clock time of the run. Times stand under ``seconds``; the rest is the same each time.
+        Wall-clock time of the run. Times are under ``seconds``; the rest is the same each time.
     workers : int
         Processes used.
 
@@ -99,7 +99,7 @@ def write_summary(
 
 
 def _layout(summary: RunSummary) -> dict[str, Any]:
-    """Tell how the layout came to be: since when it was final, how much it changed, how sure it is."""
+    """Describe how the layout developed: since when it was final, how much it changed, how sure it is."""
     totals, histories, convergence = summary.totals, summary.histories, summary.convergence
     final = convergence.layout_final
     rooms = [histories.tracks[track] for track in histories.in_last_map]
@@ -119,7 +119,7 @@ def _layout(summary: RunSummary) -> dict[str, Any]:
 
 
 def write_json(path: Path, value: Any) -> None:
-    """Write JSON beside its final name and rename it.
+    """Write JSON under a hidden name and rename it.
 
     Raises
     ------
@@ -129,6 +129,6 @@ def write_json(path: Path, value: Any) -> None:
     try:
         text = json.dumps(value, indent=2, ensure_ascii=False)
     except (TypeError, ValueError) as error:
-        raise OutputError(f"{path}: cannot be written: {error}") from error
+        raise OutputError(f"{path}: cannot be written: {reason_of(error)}") from error
     with replacing(path) as part:
         part.write_text(f"{text}\n", encoding="utf-8")

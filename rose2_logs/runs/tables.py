@@ -1,4 +1,4 @@
-"""Rows of a run's tables, made of steps and of what the run came to."""
+"""Rows of a run's tables, made from its steps and its history."""
 
 from __future__ import annotations
 
@@ -233,13 +233,13 @@ def track_row(track: int, history: TrackHistory, convergence: Convergence, *, in
     """Give the row of a track."""
     return {
         "track": track,
-        **_moment("first", history.first),
-        **_moment("last", history.last),
+        **_snapshot_ref_columns("first", history.first),
+        **_snapshot_ref_columns("last", history.last),
         "maps": history.maps,
         "area_m2": history.area_m2,
         "predicted_area_m2": history.polygon.area,
-        **_moment("area_settled", convergence.area_settled[track]),
-        **_moment("shape_right", convergence.shape_right.get(track)),
+        **_snapshot_ref_columns("area_settled", convergence.area_settled[track]),
+        **_snapshot_ref_columns("shape_right", convergence.shape_right.get(track)),
         "shape_right_seen_share": convergence.shape_right_seen.get(track),
         "in_last_map": in_last_map,
         "wall_support": history.wall_support,
@@ -251,7 +251,7 @@ def track_row(track: int, history: TrackHistory, convergence: Convergence, *, in
     }
 
 
-def _moment(name: str, snapshot_ref: SnapshotRef | None) -> dict[str, Any]:
+def _snapshot_ref_columns(name: str, snapshot_ref: SnapshotRef | None) -> dict[str, Any]:
     return {
         f"{name}_snapshot": snapshot_ref and snapshot_ref.snapshot,
         f"{name}_time_s": snapshot_ref and snapshot_ref.time_s,

@@ -21,6 +21,20 @@ def part_of(path: Path) -> Path:
     return path.with_name(f".{path.name}.part")
 
 
+def reason_of(error: Exception) -> str:
+    """Say in words why a file or folder cannot be used, without the system's error number."""
+    if not isinstance(error, OSError):
+        return str(error)
+    names = [name for name in (error.filename2, error.filename) if isinstance(name, str | os.PathLike)]
+    if isinstance(error, IsADirectoryError) and names:
+        return f"{os.fspath(names[0])} is a folder, not a file"
+    if isinstance(error, (FileExistsError, NotADirectoryError)):
+        for path in map(Path, names):
+            if file := next((each for each in (path, *path.parents) if each.is_file()), None):
+                return f"{file} is a file, not a folder"
+    return str(error).removeprefix(f"[Errno {error.errno}] ")
+
+
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
     """Turn an OSError in the context into an error that names the file.
@@ -33,7 +47,7 @@ def writing(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise OutputError(f"{path}: cannot be written: {error}") from error
+        raise OutputError(f"{path}: cannot be written: {reason_of(error)}") from error
 
 
 @contextmanager
@@ -135,7 +149,7 @@ def locked(path: Path, refusal: str) -> Iterator[None]:
             path.parent,
         )
     except OSError as error:
-        raise OutputError(f"{path.parent}: cannot be written: {error}") from error
+        raise OutputError(f"{path.parent}: cannot be written: {reason_of(error)}") from error
     try:
         yield
     finally:

@@ -1,7 +1,7 @@
-"""The rooms of every map of a run by the layout of its last one: smoothing, where tracking filters.
+"""Back projection: how much of each room of a run's last map every earlier map shows.
 
-What a map alone shows of a half seen building is often wrong. Once the run is over, its last map tells
-which rooms there are; an earlier map shows how much of each was seen.
+What a single map shows of a half seen building is often wrong. Once the run is over, its last map says
+which rooms there are, and an earlier map how much of each had been seen.
 """
 
 from __future__ import annotations
@@ -43,8 +43,8 @@ class BackProjector:
     """Carries the rooms of a run's last map over to the maps before it.
 
     A map is laid over the last one: first as it moved from map to map, then by its walls. Each of its free
-    cells takes the room that lies there in the end; the nearest, where the last map shows no free space.
-    Pieces of a room smaller than `back_projected_min_area_m2` take the room beside them.
+    cells takes the room that is there in the end; the nearest, where the last map shows no free space.
+    Pieces of a room smaller than `back_projected_min_area_m2` join the room next to them.
 
     Parameters
     ----------
@@ -211,7 +211,7 @@ class RunBackProjection:
         Parameters
         ----------
         snapshots : iterable of OccupancySnapshot
-            The maps of the run once more. Those that were not taken before are left out.
+            The maps of the run again. Those that were not taken before are left out.
         """
         last = self._last
         if last is None:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from rose2_logs.model.occupancy import FloatArray
 
 DIRECT_LABELS = 1000
-"""Labels up to this one are counted as they are: their table of pairs stays below the size of a map."""
+"""Labels up to this one are counted directly: their table of pairs stays smaller than a map."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -77,7 +77,7 @@ class RigidMotion:
 
 
 class MapAligner:
-    """Tells of successive maps how each lies against the one before, by their walls.
+    """Finds how each of successive maps moved relative to the one before, by their walls.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ class MapAligner:
         -------
         RigidMotion or None
             The motion, in the world frame, of what both maps show; None where it is less than `shift_min_m`
-            on average, or the walls do not tell.
+            on average, or the walls do not determine it.
         """
         points = wall_points(snapshot, self._occupancy)
         before, self._before = self._before, None
@@ -120,12 +120,12 @@ class MapAligner:
 
 
 def wall_points(snapshot: OccupancySnapshot, parameters: OccupancyParameters) -> FloatArray:
-    """World centers (N, 2) of the occupied cells beside free ones: the faces of walls."""
+    """World centers (N, 2) of the occupied cells next to free ones: the faces of walls."""
     return wall_faces(*classify(snapshot.cells, parameters), snapshot.geometry)
 
 
 def wall_faces(free: BoolArray, occupied: BoolArray, geometry: GridGeometry) -> FloatArray:
-    """Do the same for a map whose cells (H, W) are told apart already."""
+    """Do the same for a map whose cells (H, W) are already classified."""
     return geometry.cell_centers(*np.nonzero(occupied & _beside(free)))
 
 
@@ -289,7 +289,7 @@ def _step(
 ) -> tuple[FloatArray, float]:
     """Shift (2,) and turn about the origin that close gaps (N, 2) across walls with the least squares.
 
-    What the walls do not tell, as the shift along a single corridor, stays as it is.
+    What the walls do not determine, such as the shift along a single corridor, stays as it is.
     """
     turned = np.stack([-points[:, 1], points[:, 0]], axis=1) / radius_m
     rows = np.column_stack([across, (across * turned).sum(axis=1)])

@@ -1,4 +1,4 @@
-"""What is known of every room over the run: gathered map by map, some facts and one shape a room."""
+"""What is known of every room over the run: collected map by map, some facts and one shape per room."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class TrackHistory:
     wall_support, frontier_m : float or None
         Evidence there, None where it was not measured.
     splits, merges, losses : int
-        How often it was split, took in others, and was lost.
+        How often it was split, had another room merged into it, and was lost.
     """
 
     first: SnapshotRef
@@ -89,7 +89,7 @@ class TrackHistories:
         self._first_time_ns: int | None = None
 
     def snapshot_ref(self, step: TrackedSnapshot) -> SnapshotRef:
-        """Return when a map was; the first one that is asked for begins the run."""
+        """Return when a map was recorded; the first map given begins the run."""
         if self._first_time_ns is None:
             self._first_time_ns = step.snapshot.log_time_ns
         time_s = (step.snapshot.log_time_ns - self._first_time_ns) / 1e9

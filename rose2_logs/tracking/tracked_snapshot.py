@@ -18,7 +18,7 @@ from rose2_logs.tracking.registration import RigidMotion
 
 EventKind = Literal["shifted", "continued", "returned", "born", "split", "merged", "lost"]
 EVENT_ORDER: tuple[EventKind, ...] = get_args(EventKind)
-"""Order of one snapshot's events: the map, what the rooms are, then what became of the tracks before."""
+"""Order of one snapshot's events: the map, the present rooms, then what happened to the earlier tracks."""
 MAP_TRACK = 0
 """Stands for the track in an event of the whole map."""
 

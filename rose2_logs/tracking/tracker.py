@@ -60,7 +60,7 @@ class _Tracks:
 class RoomTracker:
     """Gives the rooms of successive maps the numbers of the tracks that they continue.
 
-    Rooms are compared where they lie in the world, whatever the maps' canvas; where the whole map moved, as
+    Rooms are compared in world coordinates, whatever the maps' canvas; where the whole map moved, as
     in a loop closure, what is remembered moves along. A track remembers a few shapes of its room. A room can
     continue a track, also a lost one, if it overlaps one of them by `match_min_iou`, or if it or the newest
     one holds `part_min_share` of the other, as when a room seen through its door is entered. Among all these
@@ -91,7 +91,7 @@ class RoomTracker:
         Parameters
         ----------
         snapshot : OccupancySnapshot
-            The map; its index goes into the events, its walls tell whether it moved.
+            The map; its index goes into the events, its walls show whether it moved.
         analysis : SnapshotAnalysis or RoomMap
             Its rooms, or the analysis that holds them.
 

@@ -1,4 +1,4 @@
-"""What a user asks for, from input to written results: one module per command."""
+"""What a user requests, from input to written results: one module per command."""
 
 from rose2_logs.drawing import PRINT_WIDTH_PX
 

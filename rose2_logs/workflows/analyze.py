@@ -42,7 +42,7 @@ __all__ = [
 logger = logging.getLogger(__name__)
 
 NAMELESS = "log"
-"""What the results of a log without a name of its own are called."""
+"""Name of the results of a log that has no name itself."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ def analyze_log(
     path : path
         The log.
     folder : path
-        Where to; it is made. All results appear in it at the end, the summary last.
+        Output folder, created if needed. All results appear in it at the end, the summary last.
     options : RunOptions, optional
         What to take, do and write; by default everything of the only map topic.
     on_snapshot : callable, optional
@@ -218,10 +218,10 @@ def _follow(
 
 
 def _project_back(reader: LogReader, history: RunHistory, store: RunStore, sinks: Sequence[Sink]) -> None:
-    """Read the maps once more to tell how much of the last map's rooms each shows, if that is wanted."""
+    """If requested, read the maps again to measure how much of the last map's rooms each of them shows."""
     if not history.projects_back:
         return
-    logger.info("the maps are read once more, to project the last layout back")
+    logger.info("the maps are read again, to project the last layout back")
     counts = reader.counts
     with muted():  # these warnings came the first time
         for found in history.back_projected(reader.snapshots()):
@@ -254,7 +254,7 @@ def _run_info(path: Path, reader: LogReader, options: RunOptions) -> RunInfo:
 
 
 def _facts(info: RunInfo, options: RunOptions) -> dict[str, Any]:
-    """Tell what the analysis of the maps depends on; what also stands in the summary, as it stands there."""
+    """Return what the analysis of the maps depends on, in the form of the summary where it is part of it."""
     return {
         **options.deciding(),
         "input": info.provenance,

@@ -62,7 +62,7 @@ def compare_runs(
     Raises
     ------
     ResultsError
-        If a folder holds no results, or the last map of a run has too few walls to tell how it lies.
+        If a folder holds no results, or the last map of a run has too few walls to be aligned.
     OutputError
         If the folder is that of a run, there is a comparison already and it may not be replaced, or a file
         cannot be written.
@@ -110,19 +110,19 @@ def compare_stored(
     Raises
     ------
     ResultsError
-        If results cannot be read, or a last map has too few walls to tell how it lies.
+        If results cannot be read, or a last map has too few walls to be aligned.
     """
     a = read_final_layout(run_a, name_a, parameters)
     b = read_final_layout(run_b, name_b, parameters)
     comparison = compare_layouts(a, b)
     if comparison is None:
         few = run_a if not a.map.can_be_placed else run_b
-        raise ResultsError(f"{few.folder}: the last map has too few walls to be laid over another")
+        raise ResultsError(f"{few.folder}: the last map has too few walls to be aligned with another")
     return comparison
 
 
 def _names(folder_a: Path, folder_b: Path) -> tuple[str, str]:
-    """Name two folders by as much of their ends as tells them apart."""
+    """Name two folders by the shortest ends of their paths that differ."""
     parts_a, parts_b = folder_a.resolve().parts, folder_b.resolve().parts
     for count in range(1, max(len(parts_a), len(parts_b))):
         if parts_a[-count:] != parts_b[-count:]:

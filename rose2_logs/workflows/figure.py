@@ -35,7 +35,7 @@ def write_figure(
     snapshot, coverage : int, float, optional
         Which map, see `Run.choose`.
     back_projected : bool
-        Draw the rooms of the last map as far as this one shows them, instead of its own.
+        Draw the rooms of the last map as far as this one shows them, instead of the rooms found in it.
     width_px : int
         Width of a PNG.
     overwrite : bool
@@ -85,7 +85,7 @@ def export_plan(
     out : path, optional
         Folder for the files; by default that of the results.
     snapshot, coverage : int, float, optional
-        Which map, see `Run.choose`; its number stands in the files' names if it is not the last.
+        Which map, see `Run.choose`; its number is part of the files' names if it is not the last.
     overwrite : bool
         Whether files may be replaced.
 

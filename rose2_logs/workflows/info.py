@@ -1,4 +1,4 @@
-"""What ``info`` tells of a log: its topics, and of each map topic the first and the last map."""
+"""What ``info`` shows of a log: its topics, and the first and the last map of each map topic."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def describe_log(log: str, parameters: Parameters | None = None) -> LogFacts:
     Raises
     ------
     LogError
-        If the log cannot be opened. A map topic that cannot be read is told as such.
+        If the log cannot be opened. A map topic that cannot be read is listed with the reason instead.
     """
     # Opened once: the index of a large log is megabytes.
     used = parameters or Parameters()

@@ -38,7 +38,7 @@ logger = logging.getLogger(__name__)
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Segmentation(SnapshotAnalysis):
-    """The analysis of a map of its own, which can be drawn.
+    """The analysis of a single map, which can be drawn.
 
     Attributes
     ----------
@@ -108,7 +108,7 @@ def segment_snapshot(
     name: str = "map",
     voronoi: bool = False,
 ) -> Segmentation:
-    """Segment a map of its own; warn if it is so large that it was analyzed in coarser cells."""
+    """Segment a single map; warn if it is so large that it was analyzed in coarser cells."""
     found = analyze(snapshot, parameters, method, voronoi=voronoi)
     note = coarser_for_its_size(snapshot.geometry, found.resolution_m, parameters.occupancy)
     if note is not None:
@@ -141,14 +141,14 @@ def segment_map(
     formats : sequence of str
         Further formats for the floor plan, see `exports.formats`.
     resolution_m : float, optional
-        Side of a cell, for an image without a ``.yaml`` beside it; its origin is then its lower left corner.
+        Side of a cell, for an image without a ``.yaml`` next to it; its origin is then its lower left corner.
     overwrite : bool
         Whether earlier results may be replaced.
 
     Raises
     ------
     LogError, InvalidMapError, ParameterError
-        If the map cannot be read, or its resolution is neither given nor written beside it.
+        If the map cannot be read, or its resolution is neither given nor in a ``.yaml`` next to it.
     OutputError
         If results exist and may not be replaced, cannot be written, or could not name the map.
     """
@@ -178,15 +178,15 @@ def read_static_map(
     Raises
     ------
     LogError, InvalidMapError, ParameterError
-        If it cannot be read, is a log, or its resolution is neither given nor written beside it.
+        If it cannot be read, is a log, or its resolution is neither given nor in a ``.yaml`` next to it.
     """
     if not map_file.is_file():
-        what = "is a folder: name the map in it" if map_file.is_dir() else "there is no such file"
+        what = "is a folder, not a file; name the map in it" if map_file.is_dir() else "there is no such file"
         raise LogError(f"{map_file}: {what}")
     is_bare = map_file.suffix.lower() in IMAGE_ENDINGS and not map_file.with_suffix(".yaml").exists()
     if is_bare and resolution_m is None:
         raise ParameterError(
-            f"{map_file}: no .yaml lies beside it; give the side of a cell in meters (resolution_m=0.05)"
+            f"{map_file}: there is no .yaml next to it; give the side of a cell in meters (resolution_m=0.05)"
         )
     if not is_bare and resolution_m is not None:
         raise ParameterError(
@@ -195,7 +195,7 @@ def read_static_map(
     with _described(map_file, resolution_m) as log, open_log(log, limits=limits) as reader:
         if not isinstance(reader.source, MapFilesSource):
             raise LogError(
-                f"{map_file}: is a log, no saved map: rose2-logs analyze finds the rooms of its maps"
+                f"{map_file}: is a log, not a saved map; analyze it as a log to find the rooms of its maps"
             )
         return reader.first()
 

@@ -113,7 +113,7 @@ def test_time_options_are_seconds_into_the_log(cli, maps: Path, tmp_path: Path):
             ["analyze", SAMPLE_LOGS / "office.mcap", "-o", "out", "--start", "nan"],
             "--start nan: it must be a number",
         ),
-        (["segment", SAMPLE_LOGS / "office.mcap", "-o", "out"], "is a log, no saved map"),
+        (["segment", SAMPLE_LOGS / "office.mcap", "-o", "out"], "is a log, not a saved map"),
         (["analyze", "x.bag", "-o", "out", "--method", "magic"], "--method 'magic': it must be one of rose2"),
         (["analyze", "a/x.bag", "b/x.mcap", "-o", "out"], "several logs are named x"),
         (["batch", "nowhere*.mcap", "-o", "out"], "nowhere*.mcap: no log there"),
@@ -305,6 +305,6 @@ def test_a_folder_above_is_told_with_the_one_that_may_have_been_meant(cli, tmp_p
     _, _, err = cli("view", tmp_path / "results")
     assert f"did you mean {tmp_path / 'results' / 'run'}?" in err
     _, _, err = cli("analyze", tmp_path / "results", "-o", tmp_path / "out")
-    assert "for a folder of many logs use rose2-logs batch" in err
+    assert "analyze a folder of many logs as a batch" in err
     _, _, err = cli("segment", tmp_path / "results", "-o", tmp_path / "out")
-    assert "is a folder: name the map in it" in err
+    assert "is a folder, not a file; name the map in it" in err

@@ -166,7 +166,7 @@ def test_a_map_that_the_method_stumbles_over_is_left_out(monkeypatch, tmp_path):
     assert "an internal error of rose2-logs" in told["message"]
 
 
-def test_notices_are_gathered_by_kind_in_this_thread_only_while_asked_for():
+def test_warnings_are_collected_by_kind_in_this_thread_and_only_inside_the_context():
     logger = logging.getLogger(f"{PACKAGE}.test")
     with collect_warnings() as outer:
         with collect_warnings() as inner:

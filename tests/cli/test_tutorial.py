@@ -32,7 +32,7 @@ def printed(tmp_path: Path, monkeypatch) -> str:
     out = io.StringIO()
     # Not `file`, whose value is where standard output goes at that time: it would be kept after the test.
     monkeypatch.setattr("rose2_logs.cli.printing._out._file", out)
-    names: dict[str, object] = {"print": lambda frame: out.write(f"{frame.to_string(index=False)}\n")}
+    names: dict[str, object] = {"print": lambda text: out.write(f"{text}\n")}
     for language, block in re.findall(r"```(sh|python)\n(.*?)```", TUTORIAL, re.DOTALL):
         if language == "python":
             exec(block, names)

@@ -132,21 +132,21 @@ def test_nothing_gives_the_defaults():
             "parameters must be Parameters or a dict of values, not 'walls.extension_m=6'",
         ),
         ({"walls": 3}, "'walls' must be a table of parameters, not 3"),
-        ({"wals.extension_m": 6}, "no parameter block 'wals'; did you mean walls.extension_m?; there are: "),
+        ({"wals.extension_m": 6}, "no parameter block 'wals'; did you mean walls.extension_m?"),
         (
             {"walls.extension": 6},
-            "no parameter walls.extension; did you mean walls.extension_m?; there are: ",
+            "no parameter walls.extension; did you mean walls.extension_m?",
         ),
         (
             {"extension_m": 6},
-            "no parameter block 'extension_m'; did you mean walls.extension_m?; there are: ",
+            "no parameter block 'extension_m'; did you mean walls.extension_m?",
         ),
     ],
 )
 def test_what_names_no_parameter_is_refused_with_the_next_name(value: Any, message: str):
     with pytest.raises(ParameterError) as raised:
         Parameters.from_any(value)
-    assert str(raised.value).startswith(message)
+    assert str(raised.value) == message
 
 
 def test_resolved_parameters_make_the_same_again():

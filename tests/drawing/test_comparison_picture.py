@@ -80,6 +80,14 @@ def test_rooms_are_named_and_partners_share_a_color(comparison: LayoutComparison
     assert len([each for each in fills if each.shape.area]) == 2
 
 
+def test_two_numbers_of_a_room_are_explained(comparison: LayoutComparison):
+    """Where a room that changed is named by both."""
+    changed = (dataclasses.replace(comparison.rooms[0], status="changed"), *comparison.rooms[1:])
+    page = draw_comparison(dataclasses.replace(comparison, rooms=changed))
+    texts = {each.text for each in page.shapes if isinstance(each, Text)}
+    assert {"1 > 7", "what differs (A > B: a room's number in A and in B)"} <= texts
+
+
 def test_b_lies_where_its_motion_brings_it(comparison: LayoutComparison):
     """The pictures of both maps cover the same place of the panel of what differs."""
     page = draw_comparison(comparison)
@@ -91,7 +99,7 @@ def test_b_lies_where_its_motion_brings_it(comparison: LayoutComparison):
 def test_the_title_warns_where_the_runs_do_not_fit(comparison: LayoutComparison):
     unsure = dataclasses.replace(comparison.placement, runner_up_score=0.95)
     other = dataclasses.replace(comparison.placement, score=0.1, agreement=0.1)
-    assert "B may lie wrongly" in draw_comparison(dataclasses.replace(comparison, placement=unsure)).title
+    assert "B may be misaligned" in draw_comparison(dataclasses.replace(comparison, placement=unsure)).title
     assert (
         "do not seem to be two runs"
         in draw_comparison(dataclasses.replace(comparison, placement=other)).title

@@ -19,8 +19,8 @@ from rose2_logs.drawing.evaluation_pictures import (
     STRIPE_WIDTH,
     TILE_PX,
     CasePictures,
+    case_sheet,
     draw_along,
-    draw_case,
     draw_panels,
 )
 from rose2_logs.drawing.image_files import write_label_image
@@ -139,7 +139,8 @@ def test_rooms_are_numbered_within_themselves(drawn):
 def test_the_whole_picture_tells_figures_counts_and_colors(drawn):
     """Title, captions, and a legend with each mark's color and share."""
     cells, truth, found = drawn
-    page = draw_case(cells, compare(truth, found), score(truth, found), "group/name")
+    comparison = compare(truth, found)
+    page = case_sheet(draw_panels(cells, comparison), comparison, score(truth, found), "group/name")
     texts = [each.text for each in page.shapes if isinstance(each, Text)]
     assert any(text.startswith("group/name   iou_seg ") and text.endswith(" 2/2") for text in texts)
     assert {"map", "truth: 2 rooms", "errors"} <= set(texts)
@@ -154,7 +155,9 @@ def test_the_whole_picture_tells_figures_counts_and_colors(drawn):
 def test_a_map_without_any_room_or_known_cell_is_drawn():
     """Nothing found, nothing true, nothing known: a picture all the same."""
     none = np.zeros((5, 4), int)
-    page = draw_case(np.full((5, 4), -1, np.int8), compare(none, none), score(none, none), "empty")
+    comparison = compare(none, none)
+    panels = draw_panels(np.full((5, 4), -1, np.int8), comparison)
+    page = case_sheet(panels, comparison, score(none, none), "empty")
     assert page.pixels().dtype == np.uint8
 
 

@@ -82,8 +82,8 @@ def test_a_motion_and_its_inverse_leave_everything_where_it_is():
     assert twice.points(points) == pytest.approx(MOTION.points(MOTION.points(points)))
 
 
-def lived(*labels: np.ndarray) -> tuple[TrackHistories, list[RoomRows], dict[int, SnapshotRef]]:
-    """Lives of the rooms of a run, its rooms as rows, and its maps; coverage is a tenth a map."""
+def tracked(*labels: np.ndarray) -> tuple[TrackHistories, list[RoomRows], dict[int, SnapshotRef]]:
+    """Track histories of a run, its rooms as rows, and its maps; each map adds 0.1 of coverage."""
     histories, tracker, all_rows, snapshot_refs = TrackHistories(), RoomTracker(TrackingParameters()), [], {}
     for index, map_ in enumerate(labels):
         snapshot, analysis = drawn(map_, index)
@@ -97,7 +97,7 @@ def lived(*labels: np.ndarray) -> tuple[TrackHistories, list[RoomRows], dict[int
 
 
 def measured(*labels: np.ndarray) -> tuple[TrackHistories, Convergence]:
-    histories, all_rows, snapshot_refs = lived(*labels)
+    histories, all_rows, snapshot_refs = tracked(*labels)
     return histories, measure_convergence(
         all_rows, histories, snapshot_refs, dict.fromkeys(snapshot_refs, RigidMotion.none())
     )
@@ -144,7 +144,7 @@ def test_an_area_that_changes_again_has_not_settled():
 
 def test_a_prediction_is_right_before_the_room_is_seen():
     """The shape counts with its predicted part; how much was seen is told."""
-    histories, all_rows, snapshot_refs = lived(rows("1111......"), rows("1111111111"))
+    histories, all_rows, snapshot_refs = tracked(rows("1111......"), rows("1111111111"))
     all_rows[0].polygons[0] = shapely.box(0, 0, 9, 1)
     found = measure_convergence(
         all_rows, histories, snapshot_refs, dict.fromkeys(snapshot_refs, RigidMotion.none())
@@ -171,7 +171,7 @@ def test_a_last_map_without_rooms_has_no_layout():
 
 def test_shapes_are_compared_where_the_last_map_has_them():
     """A room that moved with the whole map was right from the beginning."""
-    histories, all_rows, snapshot_refs = lived(rows("1111", "1111"), rows("1111", "1111"))
+    histories, all_rows, snapshot_refs = tracked(rows("1111", "1111"), rows("1111", "1111"))
     moved = shapely.transform(all_rows[1].polygons, MOTION.points)
     histories.tracks[1] = dataclasses.replace(histories.tracks[1], polygon=moved[0])
     all_rows[1] = dataclasses.replace(all_rows[1], polygons=moved)

@@ -28,7 +28,7 @@ EXAMPLE = (
     "The same command again continues where it was stopped, and adds logs that are new."
 )
 MOST_BARS = 10
-"""Logs in work that have a bar of their own; a cluster may have hundreds."""
+"""At most this many logs in progress have their own bar; a cluster may work on hundreds."""
 COLORS = {"done": "green", "up to date": "green", "failed": "bold red"}
 
 
@@ -52,7 +52,7 @@ def batch(
     ],
     options: BatchOptions,
 ) -> None:
-    """Analyze many logs, each to a folder of its own, with one data set and one summary of all."""
+    """Analyze many logs, each into its own folder, with one data set and one summary of all."""
     from rose2_logs.batch.driver import run_batch
 
     with BatchDisplay() as display:
@@ -97,12 +97,12 @@ class BatchDisplay:
         self._bar.update(self._running[told.name], completed=told.share)
 
     def retry(self, name: str, reason: str) -> None:
-        """Tell that a log is tried again."""
+        """Show that a log is tried again."""
         warning(f"{name}: {reason}; it is tried again")
         self._remove(name)
 
     def finished(self, state: LogState) -> None:
-        """Tell what became of a log."""
+        """Show how a log ended."""
         if state.outcome is not None:
             # A log that had moved was begun under another name.
             self._over.add(state.outcome.name)

@@ -46,7 +46,7 @@ def compare(
 
 
 def print_comparison(result: ComparisonResult) -> None:
-    """Print how the layouts lie, what became of rooms and walls, and where the results are."""
+    """Print how the layouts are aligned, how rooms and walls changed, and where the results are."""
     found = result.comparison
     if not found.same_building:
         warning(
@@ -63,7 +63,7 @@ def print_comparison(result: ComparisonResult) -> None:
     elif found.ambiguous:
         warning(
             "the building fits about as well in another way, as when it looks the same turned by half a "
-            "circle: B may lie wrongly over A"
+            "circle: B may be misaligned with A"
         )
     _print_overview(found)
     _print_rooms(found)

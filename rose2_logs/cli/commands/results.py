@@ -95,7 +95,7 @@ def figure(
         bool,
         typer.Option(
             "--back-projected",
-            help="Draw the rooms of the last map, as far as the chosen map shows them, instead of its own.",
+            help="Draw the rooms of the last map, as far as the chosen map shows them.",
             rich_help_panel=WHICH_MAP,
         ),
     ] = False,
@@ -169,7 +169,7 @@ def export(
 
 
 def _choice(snapshot: int | None, coverage: float | None, last: bool) -> tuple[int | None, float | None]:
-    """Return which map was asked for; it can be told in one way only."""
+    """Return which map was requested; it can be given in one way only."""
     from rose2_logs.errors import ParameterError
 
     if (snapshot is not None) + (coverage is not None) + last > 1:

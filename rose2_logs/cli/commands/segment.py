@@ -29,7 +29,7 @@ def segment(
         float | None,
         typer.Option(
             metavar="M",
-            help="Side of a cell in meters, for an image without a .yaml beside it.",
+            help="Side of a cell in meters, for an image without a .yaml next to it.",
             show_default=False,
         ),
     ] = None,

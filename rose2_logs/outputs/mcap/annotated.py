@@ -32,7 +32,7 @@ from rose2_logs.outputs.mcap.viewer_layouts import MapScene, bag_metadata_path, 
 from rose2_logs.outputs.mcap.writer import McapWriter
 from rose2_logs.runs.history import RunSummary
 from rose2_logs.runs.sink import RunInfo, Sink
-from rose2_logs.system.files import part_of
+from rose2_logs.system.files import part_of, reason_of
 from rose2_logs.system.warnings import log_warning
 from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot
 
@@ -300,4 +300,4 @@ class AnnotatedMcap(Sink):
         try:
             yield
         except (OSError, McapError) as error:
-            raise OutputError(f"{self._path}: cannot be written: {error}") from error
+            raise OutputError(f"{self._path}: cannot be written: {reason_of(error)}") from error

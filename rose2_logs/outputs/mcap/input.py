@@ -127,7 +127,7 @@ def copied_log(source: MessageSource) -> CopiedLog:
 
 
 class _NoLog(CopiedLog):
-    """Saved maps: no messages of their own."""
+    """Saved maps: there are no original messages."""
 
     def channels(self) -> list[CopiedChannel]:
         return []

@@ -96,7 +96,7 @@ def _final(final: dict[str, Any] | None, last: int) -> tuple[str, str]:
 
 
 def notes(results: Run, plan: RoomPlan) -> list[Note]:
-    """Tell what is not as it should be, or not sure."""
+    """List what is not as it should be, or is unsure."""
     summary = results.summary
     found, messages = summary["results"], summary.get("messages", {})
     found_notes: list[Note] = []

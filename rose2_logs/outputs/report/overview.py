@@ -35,9 +35,9 @@ PICTURES_MOST = 100
 PICTURE_PX = 320
 PICTURE = dataclasses.replace(PANEL, font=0.0)
 BATCH_FOLDER = "logs/"
-"""Where a batch has the results of its logs; their names are told without it."""
+"""Where a batch keeps the results of its logs; the names on the page leave it out."""
 BATCH_SUMMARY = "summary.csv"
-"""Where a batch tells what became of each log."""
+"""Where a batch writes how each log ended."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ def write_reports(
     folder : path
         What `analyze_log` or a batch has written.
     out : path, optional
-        The page of one log; of several the folder for their pages. By default each lies with its results.
+        The page of one log; of several the folder for their pages. By default each goes next to its results.
     panels, overwrite
         As for `write_report`.
 

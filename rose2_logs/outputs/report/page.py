@@ -100,7 +100,7 @@ def render(template: str, **content: Any) -> str:
 
 
 def _drawn(svg: str) -> str:
-    """Let a picture stand in the page as it is: SVG in which whoever drew it has escaped all names."""
+    """Put a picture into the page unchanged: SVG in which all names are already escaped."""
     from markupsafe import Markup
 
     return Markup(svg)  # noqa: S704

@@ -16,7 +16,7 @@ from rose2_logs.runs.run import Run
 from rose2_logs.runs.tables import BACK_PROJECTED
 
 MOSTLY = 0.9
-"""A room is told to be seen when this share of its floor is: what is left is mostly behind furniture."""
+"""A room counts as seen once this share of its floor is: the rest is mostly behind furniture."""
 
 
 @dataclass(frozen=True)
@@ -40,8 +40,8 @@ def seen_rooms(results: Run) -> SeenRooms | None:
         each: (
             room(int(tracks[each])),
             number(float(areas_m2[each])),
-            *_moment(int(first[each]), coverage, time_s),
-            *_moment(int(mostly[each]), coverage, time_s),
+            *_seen_at(int(first[each]), coverage, time_s),
+            *_seen_at(int(mostly[each]), coverage, time_s),
         )
         for each in order
     }
@@ -98,7 +98,7 @@ def _first_at_least(shares: FloatArray, least: float) -> NDArray[np.intp]:
     return places
 
 
-def _moment(place: int, coverage: list[float], time_s: list[float]) -> tuple[Cell, Cell]:
+def _seen_at(place: int, coverage: list[float], time_s: list[float]) -> tuple[Cell, Cell]:
     if place == len(coverage):
         return share(None), when(None)
     return share(coverage[place]), when(time_s[place])

@@ -24,11 +24,11 @@ from rose2_logs.outputs.report.words import (
 from rose2_logs.runs.run import Run
 
 ROWS_MOST = 300
-"""Rows of a table: more can be read by programs only, and they stand in the Parquet tables."""
+"""Rows of a table: more are useful to programs only, and those are in the Parquet tables."""
 EVENT_WORDS = {
     "shifted": "the whole map shifted",
     "split": "split",
-    "merged": "took in",
+    "merged": "merged with",
     "returned": "came back",
     "lost": "was lost",
     "born": "was first seen",
@@ -78,7 +78,7 @@ def room_table(results: Run, plan: RoomPlan) -> Table:
         Column("area settled", "coverage from which on its area stayed within 10 % of the last"),
         Column("maps", "number of maps that show it"),
         Column("splits", "how often it was split"),
-        Column("merges", "how often it took in others"),
+        Column("merges", "how often another room merged into it"),
         Column("losses", "how often it was lost"),
     )
     return Table("Rooms", columns, tuple(rows), _cut(len(tracks), len(shown), "tracks.parquet"))

@@ -1,4 +1,4 @@
-"""Numbers as people read them, and the tables that they stand in."""
+"""Numbers as people read them, and tables of them."""
 
 from __future__ import annotations
 

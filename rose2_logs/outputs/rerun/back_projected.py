@@ -37,7 +37,7 @@ class BackProjectedWorld:
     Parameters
     ----------
     layers : Layers
-        Where to; of its own, as the pass begins at the first map again.
+        A separate stream, because this pass begins at the first map again.
     recording : RecordingStream
         For what stays the same over the run.
     """

@@ -48,7 +48,7 @@ def make_blueprint(
     *,
     back_projected: bool = False,
 ) -> rrb.Blueprint:
-    """Map from above, a tab for each stage of the method, beside curves, histories of rooms, events, summary.
+    """Map from above and a tab per stage of the method; next to it curves, room lanes, events, summary.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ def make_blueprint(
                     (0.0, 1.05),
                 ),
                 rrb.Tabs(
-                    _lives(),
+                    _room_lanes(),
                     _curves("Area, m²", ("/run/area/**",), legend=False),
                     *([_curves("Seen share", (f"{SEEN_SHARE}/**",), legend=False)] if back_projected else []),
                     _curves("Count", ("/run/rooms",)),
@@ -189,5 +189,5 @@ def _curves(
     )
 
 
-def _lives() -> rrb.StateTimelineView:
+def _room_lanes() -> rrb.StateTimelineView:
     return rrb.StateTimelineView(name="Rooms over the run", origin=LANES, time_view=_axis())

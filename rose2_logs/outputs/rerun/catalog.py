@@ -23,7 +23,7 @@ logger = logging.getLogger(__name__)
 MARGIN_M = 5.0
 """Around the points where rooms are deepest: half a large room."""
 NO_TABLES_M = 20.0
-"""Half the side of the part of the world that is shown where no tables tell where the rooms are."""
+"""Half the side of the view, used where no tables say where the rooms are."""
 
 
 @contextmanager
@@ -89,7 +89,7 @@ def find_recordings(folder: Path) -> list[Path]:
             continue
         found |= dict.fromkeys(ids, path)
     if not found:
-        raise LogError(f"{folder}: holds no recording (.rrd); rose2-logs batch and analyze write them")
+        raise LogError(f"{folder}: holds no recording (.rrd); an analysis writes one for each log")
     return sorted(set(found.values()))
 
 

@@ -35,7 +35,7 @@ class Strips:
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """A picture that lies in the world.
+    """A picture at a position in the world.
 
     Attributes
     ----------
@@ -44,7 +44,7 @@ class Picture:
     cell_m : float
         Side of a pixel.
     corner_m : (float, float, float)
-        Where its lower left corner lies in the world.
+        Position of its lower left corner in the world.
     yaw_rad : float
         How it is turned, counter-clockwise.
     colormap : Colormap, optional

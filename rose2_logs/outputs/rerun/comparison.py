@@ -35,7 +35,7 @@ CELLS_OF_A, CELLS_OF_B = (200, 120, 120), (120, 140, 200)
 ROOM_ALPHA = 150
 """The map shows through rooms of this opacity, of 255."""
 WIDE_VIEW, FLAT_VIEW = 1.05, 1.65
-"""Width over height of the views on an ordinary screen: the large one, and those that stand beside it."""
+"""Width over height of the views on an ordinary screen: the large one, and those next to it."""
 
 
 def write_comparison_recording(path: Path, comparison: LayoutComparison) -> None:
@@ -206,7 +206,7 @@ def _document(comparison: LayoutComparison) -> str:
     if not comparison.same_building:
         verdict = f"**These do not seem to be two runs in one building.** {verdict}"
     elif comparison.ambiguous:
-        verdict = f"**B may lie wrongly: another way fits about as well.** {verdict}"
+        verdict = f"**B may be misaligned: another position fits about as well.** {verdict}"
     return (
         f"A: {comparison.a.name}, B: {comparison.b.name}\n\n{verdict}\n\n"
         f"| rooms | | |\n|---|---|---|\n{counts}\n\n"

@@ -25,7 +25,7 @@ WAITING_BYTES = 1 << 24
 
 
 class Instant(NamedTuple):
-    """Where a snapshot stands on each timeline: nanoseconds, its number, steps of `COVERAGE_UNIT`."""
+    """Position of a snapshot on each timeline: nanoseconds, its number, steps of `COVERAGE_UNIT`."""
 
     message_log_time: int
     ros2_timestamp: int
@@ -55,7 +55,7 @@ class Layers:
     Parameters
     ----------
     recording : RecordingStream
-        Where to.
+        Where to log.
     chunk_bytes : int
         Rows of an entity wait until they have this size; with 0 they do not wait.
     waiting_bytes : int
@@ -89,7 +89,7 @@ class Layers:
 
     @property
     def now(self) -> Instant:
-        """Where the present snapshot stands on each timeline."""
+        """Position of the present snapshot on each timeline."""
         return self._now
 
     def show(self, path: str, layer: LayerKind) -> None:
@@ -113,7 +113,7 @@ class Layers:
             self._write(*max(self._entities.items(), key=lambda item: item[1].nbytes))
 
     def clear(self, path: str) -> None:
-        """Show nothing under a path and what lies below from the present snapshot on."""
+        """Show nothing at and below a path from the present snapshot on."""
         for known in [each for each in self._entities if each == path or each.startswith(f"{path}/")]:
             # Of what stands at one place of a timeline, a viewer takes what was written last.
             self._write(known, self._entities.pop(known))
@@ -154,7 +154,7 @@ def time_columns(instants: Sequence[Instant]) -> list[rr.TimeColumn]:
     return times + [rr.TimeColumn(name, sequence=columns[name]) for name in ("snapshot", "coverage")]
 
 
-# What `dataclasses.fields` would tell of each layer again.
+# Computed once: what `dataclasses.fields` would return for each layer.
 _VALUES = {
     Strips: attrgetter("points_m", "lengths", "colors"),
     Picture: attrgetter("pixels", "cell_m", "corner_m", "yaw_rad", "colormap"),

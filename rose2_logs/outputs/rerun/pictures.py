@@ -75,7 +75,7 @@ class MapPictures:
         index = labels.astype(np.intp)
         index <<= 8
         index |= self._cells
-        # No index lies beyond the table; said so, it is not looked for in a pass of its own.
+        # No index is beyond the table; the mode saves a separate pass that would check for it.
         pixels: NDArray[np.uint8] = table.take(index, mode="clip").view(np.uint8)
         return pixels.reshape(*self._cells.shape, 4)
 

@@ -24,7 +24,7 @@ from rose2_logs.outputs.rerun.summary import summary_text
 from rose2_logs.outputs.rerun.world import World
 from rose2_logs.runs.history import RunSummary
 from rose2_logs.runs.sink import RunInfo, Sink
-from rose2_logs.system.files import part_of, writing
+from rose2_logs.system.files import part_of, reason_of, writing
 from rose2_logs.system.text import percent
 from rose2_logs.tracking.back_projection import BackProjectedSnapshot
 from rose2_logs.tracking.tracked_snapshot import RoomEvent, TrackedSnapshot, map_motion
@@ -193,7 +193,7 @@ class RerunRecording(Sink):
             if not self._live:
                 self._is_lost = True
                 abandon(self._stream)
-                raise OutputError(f"{self._path}: cannot be written: {error}") from error
+                raise OutputError(f"{self._path}: cannot be written: {reason_of(error)}") from error
             self._viewer_answers = False
             logger.warning("the Rerun viewer does not answer any more; the run goes on without it")
 

@@ -55,8 +55,8 @@ def summary_text(info: RunInfo, summary: RunSummary) -> str:
         settled = convergence.area_settled.get(track)
         walls = "" if history.wall_support is None else _percent(history.wall_support)
         rows.append(
-            f"| {track} | {history.area_m2:.1f} | {_percent(history.first.coverage)} | {_moment(right)} "
-            f"| {_moment(settled)} | {walls} |"
+            f"| {track} | {history.area_m2:.1f} | {_percent(history.first.coverage)} | {_coverage(right)} "
+            f"| {_coverage(settled)} | {walls} |"
         )
     text.append("\n".join(rows))
     text.append(
@@ -80,7 +80,7 @@ def summary_text(info: RunInfo, summary: RunSummary) -> str:
 
 
 def _worth_a_look(histories: TrackHistories) -> list[str]:
-    """Tell which rooms are unsure, and where the whole map shifted."""
+    """List which rooms are unsure, and where the whole map shifted."""
     lines = []
     shares = [(histories.tracks[track].wall_support, track) for track in histories.in_last_map]
     unsure = sorted((share, track) for share, track in shares if share is not None and is_unsure(share))
@@ -104,7 +104,7 @@ def _percent(share: float) -> str:
     return percent(share, " %")
 
 
-def _moment(snapshot_ref: SnapshotRef | None) -> str:
+def _coverage(snapshot_ref: SnapshotRef | None) -> str:
     return "" if snapshot_ref is None else _percent(snapshot_ref.coverage)
 
 

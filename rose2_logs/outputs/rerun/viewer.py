@@ -25,7 +25,7 @@ PAGE_PORT = 9090
 """Where Rerun serves its web viewer by default."""
 SERVER_MEMORY = "50%"
 SCREENS = ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET")
-"""Variables that tell of a screen."""
+"""Environment variables that are set where there is a screen."""
 RERUN = (sys.executable, "-m", "rerun", "--bind", "127.0.0.1")
 """Rerun's servers answer the whole network by default."""
 
@@ -80,14 +80,14 @@ def find_recording(named: Path | str) -> str:
     if path.is_file():
         return str(path)
     if not path.is_dir():
-        raise LogError(f"{path}: there is no such file; rose2-logs analyze writes recordings")
+        raise LogError(f"{path}: there is no such file; an analysis writes a recording (.rrd)")
     found = sorted(path.glob("*.rrd"))
     if not found:
         below = min(path.rglob("*.rrd"), default=None)
-        hint = f"; did you mean {below.parent}? rose2-logs serve shows all" if below else ""
+        hint = f"; did you mean {below.parent}?" if below else ""
         raise LogError(f"{path}: holds no recording{hint}")
     if len(found) > 1:
-        raise LogError(f"{path}: holds several recordings: name one, or show all with rose2-logs serve")
+        raise LogError(f"{path}: holds several recordings; name one, or serve the folder to show all")
     return str(found[0])
 
 
@@ -154,7 +154,7 @@ def _running(command: Sequence[str], said: IO[bytes]) -> Iterator[subprocess.Pop
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:
-    """End a command that began a session of its own, with all that it started."""
+    """End a command that was started in its own session, with all processes that it started."""
     if hasattr(os, "killpg"):
         # Rerun's command is a script that starts the viewer itself.
         with suppress(ProcessLookupError):

@@ -19,7 +19,7 @@ from rose2_logs.tracking.track_history import quality_of
 from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot
 
 LAYER_STEP_M = 0.01
-"""Layers lie this far above each other, so that none flickers through another."""
+"""Layers are this far above each other, so that none flickers through another."""
 OUTLINE_POINTS, DOOR_POINTS, PATH_POINTS, LINE_POINTS, THIN_POINTS = 2.0, 4.0, 2.0, 1.5, 0.75
 """Widths of lines in points of the screen, which stay readable at any zoom."""
 DOOR_COLOR, PATH_COLOR, ROBOT_COLOR = (230, 90, 20), (20, 90, 200), (200, 20, 60)
@@ -45,7 +45,7 @@ PREDICTED, PATH, ROBOT = "/world/predicted", "/world/path", "/world/robot"
 SEGMENTS, LINES, FACES, VORONOI = "/world/segments", "/world/lines", "/world/faces", "/world/voronoi"
 SPECTRUM = "/spectrum"
 HEIGHTS = (MAP, CLEAN, SCORE, FILLS, PREDICTED, ROOMS, FACES, LINES, SEGMENTS, VORONOI, DOORWAYS, PATH, ROBOT)
-"""From the lowest layer to the highest; labels stand above them all."""
+"""From the lowest layer to the highest; labels are above them all."""
 Color = tuple[int, int, int]
 
 
@@ -55,7 +55,7 @@ class World:
     Parameters
     ----------
     layers : Layers
-        Where to.
+        Where to log.
     recording : RecordingStream
         For what stays the same over the run.
     wanted : collection of str

@@ -108,7 +108,7 @@ def critical_lines(
 
 
 def best_lines(lines: CriticalLines, min_gap: float) -> BoolArray:
-    """Tell which lines have no better one close by.
+    """Find which lines have no better one close by.
 
     A better line has the larger angle or, where that is the same, the shorter length. Lines that are as good
     as each other stay both, whatever their order.

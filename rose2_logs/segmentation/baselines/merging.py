@@ -56,7 +56,7 @@ def merge_rooms(
 
 
 def _is_joined(rooms: _Rooms, room: int, target: int, p: VoronoiMergeParameters) -> bool:
-    """Tell whether a room is part of the neighbor with which it shares the longest border."""
+    """Return whether a room is part of the neighbor with which it shares the longest border."""
     border, wall = rooms.share(room, target), rooms.share(room, WALL)
     border_back, target_wall = rooms.share(target, room), rooms.share(target, WALL)
     has_one_neighbor = rooms.neighbor_count(room) == 1

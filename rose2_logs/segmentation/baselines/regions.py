@@ -1,4 +1,4 @@
-"""Masks of free cells: erosion, distance, parts, lines. What lies outside a mask or its frame is obstacle."""
+"""Masks of free cells: erosion, distance, parts, lines. All outside a mask or its frame is obstacle."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ CROSS = np.array(((0, 1, 0), (1, 1, 1), (0, 1, 0)), np.uint8)
 
 
 def eroded(mask: BoolArray, kernel: NDArray[np.uint8] = SQUARE, rounds: int = 1) -> BoolArray:
-    """Cells (H, W) whose neighborhood lies in the mask altogether, `rounds` times over."""
+    """Cells (H, W) whose whole neighborhood is in the mask, repeated `rounds` times."""
     result = cv2.erode(
         mask.astype(np.uint8), kernel, iterations=rounds, borderType=cv2.BORDER_CONSTANT, borderValue=0
     )

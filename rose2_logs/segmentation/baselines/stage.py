@@ -13,7 +13,7 @@ from rose2_logs.model.occupancy import BoolArray
 
 Labels = NDArray[np.int32]
 
-# Each is imported when it is asked for: most runs need none, and what they import takes its time.
+# Each is imported only when it is used: most runs need none of them, and their imports take time.
 
 
 def _morphological(free: BoolArray, resolution_m: float, parameters: Parameters) -> Labels:

@@ -143,7 +143,7 @@ def narrowest_cells(
 
 
 def _is_in(sorted_values: NDArray[np.int64], others: NDArray[np.int64]) -> BoolArray:
-    """Tell which values are among others; both ascending."""
+    """Find which values are among others; both ascending."""
     if len(others) == 0:
         return np.zeros(len(sorted_values), bool)
     place = np.minimum(np.searchsorted(others, sorted_values), len(others) - 1)

@@ -35,7 +35,7 @@ class EdgeEvidence:
         All of the edge.
     passage_share : (E,) float
         Width of the best passage through the edge (a stretch of its line without a wall) over the width of
-        the room beside it: about 1 across a corridor, less in a doorway, 0 where the edge is not open.
+        the room next to it: about 1 across a corridor, less in a doorway, 0 where the edge is not open.
     """
 
     wall_m: FloatArray
@@ -66,7 +66,7 @@ def edge_evidence(
     Parameters
     ----------
     edges_m : (E, 4) float
-        Edges in the grid frame, meters; those that lie on no line get zeros.
+        Edges in the grid frame, meters; those that are on no line get zeros.
     lines_m : (L, 4) float
         Representative lines.
     walls, free : (H, W) bool
@@ -165,7 +165,7 @@ def _between_jambs(
     step_m: FloatArray,
     parameters: FloorPlanParameters,
 ) -> BoolArray:
-    """Tell which stretches (R,) of samples have wall on their line before and after them."""
+    """Find which stretches (R,) of samples have wall on their line before and after them."""
     of_run = line[begins]
     count = np.maximum(1, np.round(parameters.jamb_length_m / step_m[of_run]).astype(np.intp))
     before = np.maximum(begins - count, np.searchsorted(line, of_run))
@@ -183,7 +183,7 @@ def _read_lines(
     resolution_m: float,
     parameters: FloorPlanParameters,
 ) -> tuple[NDArray[np.intp], FloatArray, BoolArray, BoolArray, BoolArray]:
-    """Sample each line once a cell: a wall is where a wall cell lies across it within the tolerance.
+    """Sample each line in steps of one cell; a sample is wall if a wall cell is within the tolerance across.
 
     A wall is blind where no free cell lies within `blind_look_m` on one of its sides, unless another wall
     runs there: what is behind was not seen, or is a piece of furniture.

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from rose2_logs.model.occupancy import BoolArray, FloatArray
 
 SNAP_M = 1e-3
-"""Vertices are snapped to this lattice (1 mm), far below a cell and far above rounding."""
+"""Numerical: vertices are snapped to a lattice of 1 mm, far below a cell and far above rounding errors."""
 SUBCELL_BITS = 8
 """Polygons are rasterized with vertices in 1/256 of a cell, the finest that OpenCV needs here."""
 

@@ -63,7 +63,7 @@ def settle_borders(labels: NDArray[np.int32], resolution_m: float, strip_m: floa
     grown[~core] = 0
     open_cells = labels > 0
     cross = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
-    # Every step reaches a cell further; twice the strip brings back what lies in corners.
+    # Every step reaches one cell further; twice the width of the strip also restores corners.
     for _ in range(4 * radius):
         np.copyto(grown, cv2.dilate(grown, cross), where=(grown == 0) & open_cells)
     settled = labels.copy()

@@ -62,7 +62,7 @@ def supported_cells(
     """Leave out small pieces of occupied cells that no structure supports: chairs, tables, people.
 
     A piece is what hangs together over gaps of `piece_max_gap_m`. One shorter than `piece_min_extent_m` is a
-    wall only where it lies in line with others, which its mean score tells.
+    wall only where it is in line with others, which its mean score shows.
 
     Parameters
     ----------

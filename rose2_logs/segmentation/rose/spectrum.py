@@ -14,7 +14,7 @@ from rose2_logs.model.occupancy import BoolArray, FloatArray
 from rose2_logs.segmentation.circular_peaks import circular_peaks
 
 PICTURE_SIDE = 160
-"""Pixels along the side of the spectrum's picture: its ridges are told apart, and it stays small."""
+"""Pixels along a side of the spectrum's picture: enough to separate its ridges, and still small."""
 
 
 @dataclass(frozen=True, eq=False)

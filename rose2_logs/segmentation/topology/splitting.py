@@ -107,7 +107,7 @@ def _cut(
     candidates: list[tuple[FloatArray, FloatArray]],
     min_purity: float,
 ) -> BoolArray | None:
-    """Tell which points (P,) lie on the second part's side of the best line of the first set that divides."""
+    """Find which points (P,) are on the second part's side of the best line of the first set that divides."""
     for normals, offsets in candidates:
         purity = np.array([_purity(one, two, n, d) for n, d in zip(normals, offsets, strict=True)])
         best = int(purity.argmax()) if len(purity) else -1
@@ -119,7 +119,7 @@ def _cut(
 
 
 def _purity(one: NDArray[np.float32], two: NDArray[np.float32], normal: FloatArray, offset: float) -> float:
-    """Share of the worse part that lies on its own side of a line."""
+    """Share of the worse part that is on its own side of a line."""
     a, b = (one @ normal > offset).mean(), (two @ normal > offset).mean()
     return float(max(min(a, 1 - b), min(1 - a, b)))
 

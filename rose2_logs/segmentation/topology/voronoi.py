@@ -54,7 +54,7 @@ def parts_of_room(
 
 
 def _is_one_part(inside: BoolArray, clear: NDArray[np.float32], parameters: TopologyParameters) -> bool:
-    """Tell quickly that a room has one part; most have.
+    """Check quickly whether a room has only one part, as most have.
 
     The summits of two parts lie in its cells that are as clear as a part must be. Where these hang together,
     and those that are clearer than a narrow passage can be do too, some way between the two is no passage.
@@ -66,19 +66,6 @@ def _is_one_part(inside: BoolArray, clear: NDArray[np.float32], parameters: Topo
         if pieces > 2:
             return False
     return True
-
-
-def voronoi_graph(
-    labels: NDArray[np.int32],
-    walls: BoolArray,
-    resolution_m: float,
-    min_clearance_m: float,
-    parameters: TopologyParameters,
-) -> NDArray[np.int32]:
-    """Row and column (K, 2) of the cells of the Voronoi graph: the skeleton of the clear free space."""
-    clearance = clearance_m(walls, resolution_m, parameters.clearance_blur_cells)
-    skeleton = skeletonize((labels > 0) & (clearance >= min_clearance_m))  # type: ignore[no-untyped-call]
-    return np.argwhere(skeleton).astype(np.int32)
 
 
 def voronoi_lines(

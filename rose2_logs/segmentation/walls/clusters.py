@@ -48,7 +48,7 @@ def cluster_segments(segments: Segments, parameters: WallParameters) -> WallClus
     second in every process, several times as long as a usual map.
 
     Distance is lateral offset over `cluster_lateral_m` or gap along the wall over `cluster_gap_m`, the larger
-    of the two. Each cluster lies at the median offset of its segments, weighted
+    of the two. Each cluster is at the median offset of its segments, weighted
     by their length.
     """
     direction, offset, start, end = segments.direction, segments.offset, segments.start, segments.end

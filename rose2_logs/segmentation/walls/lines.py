@@ -53,7 +53,7 @@ def representative_lines(
     reach = np.where(
         clusters.direction < dominant_count, parameters.extension_m, parameters.local_extension_m
     )
-    # A short wall says little about what lies far from it.
+    # A short wall says little about what is far from it.
     reach = np.minimum(reach, parameters.extension_per_length * clusters.covered)
     offset = _shared_offsets(clusters, parameters.line_lateral_m)
     order = np.lexsort((clusters.start - reach, offset, clusters.direction))

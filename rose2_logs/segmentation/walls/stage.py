@@ -57,7 +57,7 @@ def find_walls(
 ) -> WallResult:
     """Segments, wall clusters and representative lines of a clean map (H, W) and what is attached to it."""
     along, _ = detect_segments(clean, dominant_rad, resolution_m, parameters.segment_min_length_m, parameters)
-    # Off the dominant directions nothing but its length tells a wall from furniture.
+    # Off the dominant directions, only its length distinguishes a wall from furniture.
     length_m = parameters.local_segment_min_length_m
     local, local_walls = detect_segments(
         long_pieces(occupied & ~clean, resolution_m, length_m, parameters),

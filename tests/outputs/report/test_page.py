@@ -85,7 +85,7 @@ def test_it_says_what_the_tables_say(office_results: Path, tmp_path: Path):
 def test_it_says_when_each_room_was_seen_where_the_run_was_back_projected(
     office_results: Path, tmp_path: Path
 ):
-    """First, and 90 % of it, in that order; without smoothing there is no such section."""
+    """First, and 90 % of it, in that order; without back projection there is no such section."""
     assert "seen-table" not in Reader(write_report(office_results, tmp_path / "plain.html")).tables
     folder = run_of(SAMPLE_LOGS / "office.mcap", tmp_path / "out", annotated_log=False, back_project=True)
     told = Reader(write_report(folder)).rows("seen-table")

@@ -5,7 +5,7 @@ import pytest
 
 from rose2_logs.config.parameters import TopologyParameters
 from rose2_logs.segmentation.topology.splitting import split_rooms
-from rose2_logs.segmentation.topology.voronoi import clearance_m, parts_of_room, voronoi_graph, voronoi_lines
+from rose2_logs.segmentation.topology.voronoi import clearance_m, parts_of_room, voronoi_lines
 
 PARAMETERS = TopologyParameters()
 NO_LINES = np.zeros((0, 4))
@@ -50,15 +50,6 @@ def test_a_room_in_one_piece_stays_whole():
     labels = np.ones((80, 80), np.int32)
     split = split_rooms(labels, np.zeros((80, 80), bool), NO_LINES, AXES, 0.05, PARAMETERS)
     assert (split == labels).all()
-
-
-def test_the_voronoi_graph_runs_in_the_middle_of_a_corridor():
-    labels = np.zeros((40, 200), np.int32)
-    labels[10:30] = 1
-    graph = voronoi_graph(labels, labels == 0, 0.05, 0.25, PARAMETERS)
-    middle = graph[(graph[:, 1] > 30) & (graph[:, 1] < 170)]
-    assert len(middle) > 100
-    assert np.abs(middle[:, 0] - 19.5).max() <= 1
 
 
 def test_the_drawn_voronoi_graph_is_a_straight_line_in_a_corridor_and_goes_through_doors():
