@@ -59,7 +59,8 @@ class PreparedMap:
 
     def graph(self, answers: NDArray[np.float32] | None) -> RegionGraph:
         """The graph of the atoms, with a network's answers."""
-        return build_graph(self.atoms, self.raster, self.strong, self.faces, answers, self.cell_m)
+        count = len(self.tables[0]) - 1
+        return build_graph(self.atoms, self.raster, self.strong, self.faces, answers, self.cell_m, count)
 
 
 def prepare(one: TruthMap, parameters: AtomParameters, fold: int) -> PreparedMap:

@@ -98,7 +98,7 @@ def _summed(values: FloatArray, index: NDArray[np.int64], count: int) -> FloatAr
 
 def build_graph(
     atoms: Labels, raster: PlanRaster, strong: BoolArray, faces: Labels,
-    answers: NDArray[np.float32] | None, cell_m: float,
+    answers: NDArray[np.float32] | None, cell_m: float, count: int,
 ) -> RegionGraph:
     """Measure atoms and their borders on the plan frame.
 
@@ -113,8 +113,9 @@ def build_graph(
     answers : (OUTPUTS, H, W) float32, optional
         The network's.
     cell_m : float
+    count : int
+        Number of atoms; those that no center of a plan cell meets are not in the image.
     """
-    count = int(atoms.max(initial=0))
     wall = raster.wall > 0
     inside = (raster.free > 0) | (atoms > 0)
     atoms = _over_gaps(atoms, inside, 1.5)
