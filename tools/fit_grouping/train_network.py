@@ -12,10 +12,12 @@ from __future__ import annotations
 import argparse
 import copy
 import os
+import pickle
 import sys
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
+from typing import TypeVar
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 import cv2
@@ -31,6 +33,8 @@ from fit_grouping.buildings.raster import CELL_M
 from fit_grouping.maps_with_truth import TruthMap, load_benchmark
 from fit_grouping.network import RoomNetwork, export_onnx
 from fit_grouping.plan_rasters import PlanRaster, random_crop
+
+Kept = TypeVar("Kept")
 
 CROP_CELLS = 160
 BATCH = 6
@@ -67,6 +71,18 @@ def simulated_rasters(folder: Path, held_out: int, seed: int) -> tuple[list[Plan
     return rasters[:-held_out], rasters[-held_out:]
 
 
+def kept(path: Path | None, make: Callable[[], Kept]) -> Kept:
+    """What a file keeps, or what is made and then kept there."""
+    if path and path.exists():
+        read: Kept = pickle.loads(path.read_bytes())
+        return read
+    made = make()
+    if path:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(pickle.dumps(made))
+    return made
+
+
 def real_rasters(maps: Iterable[TruthMap], seed: int, variants: int) -> dict[str, list[PlanRaster]]:
     """Rasters of real maps by building."""
     rng = np.random.default_rng(seed)
@@ -82,6 +98,12 @@ def real_rasters(maps: Iterable[TruthMap], seed: int, variants: int) -> dict[str
             raster = PlanRaster.of(one.free, one.occupied, frame, one.truths)
             rasters.setdefault(one.building, []).append(raster)
     return rasters
+
+
+def _real_maps(cases: Path, seed: int) -> tuple[dict[str, list[PlanRaster]], dict[str, list[PlanRaster]]]:
+    """Varied and exact rasters of all buildings."""
+    maps = load_benchmark(cases)
+    return real_rasters(maps, seed, VARIANTS), real_rasters(maps, seed, 1)
 
 
 class Batches:
@@ -124,6 +146,7 @@ def main() -> None:
     parser.add_argument("--start", type=Path, help="checkpoint whose weights are begun with")
     parser.add_argument("--seconds", type=float, default=600.0)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--keep", type=Path, help="folder in which sampled maps are kept for the next run")
     parser.add_argument("--learning-rate", type=float, default=LEARNING_RATE)
     arguments = parser.parse_args()
     torch.set_num_threads(1)
@@ -144,14 +167,17 @@ def main() -> None:
         state = torch.load(arguments.start)
         network.load_state_dict(state["mean"])
         mean.load_state_dict(state["mean"])
-    simulated, held_out = simulated_rasters(arguments.simulated, 40, arguments.seed)
+    keep: Path | None = arguments.keep
+    simulated, held_out = kept(
+        keep and keep / "simulated.pkl", lambda: simulated_rasters(arguments.simulated, 40, arguments.seed)
+    )
     real: dict[str, list[PlanRaster]] = {}
     watched = {"simulated": held_out}
     if arguments.cases:
-        maps = load_benchmark(arguments.cases)
-        real = real_rasters([m for m in maps if m.fold != arguments.leave_out], arguments.seed, VARIANTS)
-        left_out = real_rasters([m for m in maps if m.fold == arguments.leave_out], 1, 1)
-        watched["left out"] = [r for rasters in left_out.values() for r in rasters[:3]]
+        maps, exact = kept(keep and keep / "real.pkl", lambda: _real_maps(arguments.cases, arguments.seed))
+        folds = {one.building: one.fold for one in load_benchmark(arguments.cases)}
+        real = {b: rasters for b, rasters in maps.items() if folds[b] != arguments.leave_out}
+        watched["left out"] = [r for b, rs in exact.items() if folds[b] == arguments.leave_out for r in rs[:3]]
     batches = Batches(simulated, real, arguments.real_share, arguments.seed + steps + 1)
     fixed = {
         name: [b.next() for b in [Batches(rasters, {}, 0.0, 7)] for _ in range(8)]
