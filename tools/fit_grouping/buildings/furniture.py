@@ -78,6 +78,8 @@ class Furnisher:
             half = between(rng, 0.1, 0.35)
             step = rng.uniform(3.5, 8)
             self._grid(drawn, step, step, lambda p: cv2.rectangle(drawn, (p[0] - half, p[1] - half), (p[0] + half, p[1] + half), 1, -1))
+        if chance(rng, 0.15):  # stands, pods and cages that can be looked into
+            self._grid(drawn, rng.uniform(2.2, 5), rng.uniform(2.2, 5), lambda p: self._frame(drawn, p), share=0.7)
         if kind in ("boxes", "mixed"):
             for _ in range(rng.poisson(min(area_m2, 400) / 15)):
                 self._box(drawn, 0.5, 3.0, at_wall=chance(rng, 0.4))
@@ -198,6 +200,11 @@ class Furnisher:
             for _ in range(self.rng.integers(1, 7)):
                 near = (spot[0] + int(self.rng.normal(0, 8)), spot[1] + int(self.rng.normal(0, 8)))
                 cv2.circle(drawn, near, int(self.rng.integers(0, 3)), 1, -1)
+
+    def _frame(self, drawn: Mask, spot: tuple[int, int]) -> None:
+        half = between(self.rng, 0.4, 0.9), between(self.rng, 0.4, 0.9)
+        low, high = (spot[0] - half[0], spot[1] - half[1]), (spot[0] + half[0], spot[1] + half[1])
+        cv2.rectangle(drawn, low, high, 1, int(self.rng.integers(1, 3)))
 
     def _rows(self, drawn: Mask, deep_m: float, way_m: float) -> None:
         """Shelves or desks in rows, with ways between them."""

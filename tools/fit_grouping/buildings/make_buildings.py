@@ -17,7 +17,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from fit_grouping.buildings.furniture import Furnisher
+from fit_grouping.buildings.bending import bent
+from fit_grouping.buildings.furniture import STYLES, Furnisher
 from fit_grouping.buildings.plans import make_plan
 from fit_grouping.buildings.sensing import SimulatedMap, make_map
 from fit_grouping.buildings.walls import build_walls
@@ -34,8 +35,6 @@ FURNISHING = {
 
 def simulate(seed: int) -> SimulatedMap:
     """One map; the same for the same seed."""
-    from fit_grouping.buildings.furniture import STYLES
-
     rng = np.random.default_rng(seed)
     while True:
         plan = make_plan(rng)
@@ -44,6 +43,7 @@ def simulate(seed: int) -> SimulatedMap:
         walled = build_walls(rng, plan)
         style = str(rng.choice(STYLES, p=FURNISHING[plan.kind]))
         furniture = Furnisher(rng, walled, style).furnish()
+        walled, furniture = bent(rng, walled, furniture)
         made = make_map(rng, walled, furniture, style)
         if made is not None:
             return made

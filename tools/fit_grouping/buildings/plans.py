@@ -175,6 +175,27 @@ def notches(rng: Generator, plan: Plan, mean: float) -> None:
         plan.rooms[low : low + height, left : left + width] = 0
 
 
+def chamfers(rng: Generator, plan: Plan, outer: float, inner: float) -> None:
+    """Cut corners off the building at an angle, and rooms in two along slanting lines."""
+    height, width = plan.rooms.shape
+    y, x = np.mgrid[:height, :width]
+    for _ in range(rng.poisson(outer)):
+        x0, y0, x1, y1 = plan.inner
+        corner = (x0 if chance(rng, 0.5) else x1, y0 if chance(rng, 0.5) else y1)
+        deep = between(rng, 1.5, 8.0)
+        across = np.abs(x - corner[0]) * rng.uniform(0.6, 1.6) + np.abs(y - corner[1])
+        plan.rooms[across < deep] = 0
+    for _ in range(rng.poisson(inner)):
+        rooms = np.unique(plan.rooms[plan.rooms > 0])
+        room = int(rng.choice(rooms))
+        inside = plan.rooms == room
+        if np.count_nonzero(inside) * CELL_M**2 < 9 or room in plan.corridors:
+            continue
+        angle = rng.uniform(0.3, 1.25) * rng.choice([-1, 1])
+        beyond = np.cos(angle) * (x - x[inside].mean()) + np.sin(angle) * (y - y[inside].mean()) > 0
+        plan.rooms[inside & beyond] = int(plan.rooms.max()) + 1
+
+
 def united_rooms(rng: Generator, plan: Plan, probability: float) -> None:
     """Unite some pairs of neighbors to rooms of L and other shapes."""
     for axis in (0, 1):
@@ -460,5 +481,6 @@ def make_plan(rng: Generator) -> Plan:
     """Lay out a building of a random kind."""
     makers, shares = zip(*MAKERS, strict=True)
     plan: Plan = makers[rng.choice(len(makers), p=np.array(shares) / sum(shares))](rng)
+    chamfers(rng, plan, 0.35, 0.25)
     plan.tidy()
     return plan

@@ -227,31 +227,22 @@ def _damaged(rng: Generator, gray: NDArray[np.uint8], walled: WalledPlan) -> NDA
 def _warped(
     rng: Generator, rooms: Labels, other: Labels, gray: NDArray[np.uint8]
 ) -> tuple[Labels, Labels, NDArray[np.uint8]]:
-    """Bend the building: a wing at a slant, a wave as of drift, a small turn, an arc."""
+    """Turn the map a little, or let it wave as drift does."""
     height, width = gray.shape
-    kind = rng.choice(["none", "turn", "slant", "wave", "arc"], p=[0.3, 0.25, 0.2, 0.2, 0.05])
+    kind = rng.choice(["none", "turn", "wave"], p=[0.45, 0.3, 0.25])
     if kind == "none":
         return rooms, other, gray
     y, x = np.mgrid[:height, :width].astype(np.float32)
     if kind == "turn":
         angle = rng.normal(0, 0.02)
         y, x = y + np.float32(angle) * (x - width / 2), x - np.float32(angle) * (y - height / 2)
-    elif kind == "slant":
-        at, angle = rng.uniform(0.2, 0.8), rng.normal(0, 0.06)
-        if chance(rng, 0.5):
-            y = y + np.float32(angle) * np.maximum(x - at * width, 0)
-        else:
-            x = x + np.float32(angle) * np.maximum(y - at * height, 0)
-    elif kind == "wave":
+    else:
         length, size = rng.uniform(8, 30) / CELL_M, rng.uniform(0.03, 0.3) / CELL_M
         phase = rng.uniform(0, 6, 2)
         y, x = (
             y + np.float32(size) * np.sin(x / np.float32(length / 6) + np.float32(phase[0])),
             x + np.float32(size) * np.sin(y / np.float32(length / 6) + np.float32(phase[1])),
         )
-    else:
-        radius = rng.uniform(1.2, 3.0) * max(height, width)
-        y = y + (x - width / 2) ** 2 / np.float32(2 * radius)
     y, x = y.astype(np.float32), x.astype(np.float32)
     move = lambda image, fill: cv2.remap(  # noqa: E731
         image, x, y, cv2.INTER_NEAREST, borderMode=cv2.BORDER_CONSTANT, borderValue=fill
