@@ -152,3 +152,33 @@ def _octagons(maxima: FloatArray) -> FloatArray:
     for cut in (x1 + y1 - s1, x0 + y0 - s0, x1 + y0 - d1, x0 + y1 - d0):
         area = area - OCTAGON_CORNER * np.maximum(cut, 0.0) ** 2
     return np.maximum(area, 0.01)
+
+
+REGION_FEATURES = (
+    "log_area", "outside", "clear", "clear_strong", "wall_share", "unknown_share", "open_share", "wide", "rectangle",
+    "octagon", "area_share",
+)  # fmt: skip
+"""Features that tell rooms from rays and the outside."""
+
+
+def region_features(graph: RegionGraph) -> FloatArray:
+    """Features (N, len(REGION_FEATURES)) of the regions of a graph."""
+    n = {name: graph.node_sums[:, k] for k, name in enumerate(NODE_SUMS)}
+    contact = graph.border_sums[:, 0] + graph.border_sums[:, 1]
+    open_edges = sum(np.bincount(graph.ends[:, k], contact, minlength=len(graph.node_sums)) for k in (0, 1))
+    outline = n["wall_edges"] + n["unknown_edges"] + open_edges + 0.01
+    area = n["area"]
+    columns = [
+        np.log(area + 0.01),
+        n["outside"] / area,
+        graph.node_maxima[:, 0],
+        graph.node_maxima[:, 1],
+        n["wall_edges"] / outline,
+        n["unknown_edges"] / outline,
+        open_edges / outline,
+        n["wide"] / area,
+        area / _boxes(graph.node_maxima)[:, 2],
+        area / _octagons(graph.node_maxima),
+        area / area.sum(),
+    ]
+    return np.stack(columns, axis=1)

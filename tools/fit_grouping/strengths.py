@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -73,6 +74,37 @@ class BoostedTrees:
             value[k, : len(nodes)] = np.where(nodes["is_leaf"] == 1, nodes["value"], 0.0)
             depth = max(depth, int(nodes["depth"].max()))
         return cls(feature, threshold, left, right, value, float(np.ravel(model._baseline_prediction)[0]), depth)
+
+
+def write_trees(path: Path, trees: BoostedTrees, names: tuple[str, ...] = FEATURES) -> None:
+    """Keep trees as named numbers, with the names of the features that they ask for."""
+    numbers = {field.name: np.asarray(getattr(trees, field.name)) for field in fields(trees)}
+    small = {name: values.astype(np.uint8) for name, values in numbers.items() if values.dtype.kind == "i"}
+    path.parent.mkdir(parents=True, exist_ok=True)
+    np.savez_compressed(path, **(numbers | small), names=np.array(names))  # type: ignore[arg-type]
+
+
+def read_trees(path: Path, names: tuple[str, ...] = FEATURES) -> BoostedTrees:
+    """Trees of a file.
+
+    Raises
+    ------
+    ValueError
+        If they were fitted on other features than these.
+    """
+    with np.load(path) as numbers:
+        if tuple(numbers["names"].tolist()) != names:
+            raise ValueError(f"{path}: fitted on other features")
+        index = {name: numbers[name].astype(np.intp) for name in ("feature", "left", "right")}
+        return BoostedTrees(
+            index["feature"],
+            numbers["threshold"],
+            index["left"],
+            index["right"],
+            numbers["value"],
+            float(numbers["start"]),
+            int(numbers["depth"]),
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -200,9 +200,9 @@ def main() -> None:
         steps += 1
         decay = min(MEAN_DECAY, 1 - 10 / (steps + 10))
         with torch.no_grad():
-            for kept, new in zip(mean.state_dict().values(), network.state_dict().values(), strict=True):
-                if kept.dtype.is_floating_point:
-                    kept.lerp_(new, 1 - decay)
+            for slow, new in zip(mean.state_dict().values(), network.state_dict().values(), strict=True):
+                if slow.dtype.is_floating_point:
+                    slow.lerp_(new, 1 - decay)
         if now - last > CHECKPOINT_EVERY_S or now - start + 1 > arguments.seconds:
             last = now
             mean.eval()
