@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from fit_grouping.plan_rasters import SHARE_STEPS, PlanRaster, network_input
+from fit_grouping.plan_rasters import PlanRaster, network_input, shares_of
 
 STRIDE = 32
 """Inputs are padded to a multiple of this many cells."""
@@ -29,9 +29,11 @@ class AnsweringNetwork:
         # Half of the padding on each side but a whole number of pairs of cells.
         top, left = (rows - height) // 4 * 2, (columns - width) // 4 * 2
         pad = ((top, rows - height - top), (left, columns - width - left))
-        steps = np.float32(SHARE_STEPS)
-        inputs = network_input(np.pad(raster.wall, pad) / steps, np.pad(raster.free, pad) / steps)
+        inputs = network_input(shares_of(np.pad(raster.wall, pad)), shares_of(np.pad(raster.free, pad)))
         self._network.setInput(np.ascontiguousarray(inputs[None]))
         out: NDArray[np.float32] = self._network.forward()[0]
         out = out[:, top : top + height, left : left + width]
-        return np.rint(out * ANSWER_STEPS) / np.float32(ANSWER_STEPS)
+        rounded: NDArray[np.float32] = np.rint(out * ANSWER_STEPS).astype(np.float32) / np.float32(
+            ANSWER_STEPS
+        )
+        return rounded

@@ -121,14 +121,12 @@ class PlanFrame:
         offset = turned.T @ (low / resolution_m + scale / 2) - 0.5
         return cls((int(size[1]), int(size[0])), cell_m, np.column_stack([linear, offset]))
 
-    def sampled(self, image: NDArray[np.generic], outside: int = 0) -> NDArray[np.generic]:
+    def sampled(self, image: Labels, outside: int = 0) -> Labels:
         """Value of the map's cell below the center of each plan cell; labels below 2^24."""
-        exact = image if image.dtype == np.uint8 else image.astype(np.float32)
+        exact = image.astype(np.float32)
         flags = cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP
-        warped = cv2.warpAffine(
-            exact, self.to_map, self.shape[::-1], flags=flags, borderValue=float(outside)
-        )
-        return warped.astype(image.dtype)
+        warped = cv2.warpAffine(exact, self.to_map, self.shape[::-1], flags=flags, borderValue=float(outside))
+        return warped.astype(np.int32)
 
     def share(self, mask: BoolArray, per_side: int = 3) -> NDArray[np.float32]:
         """Share of each plan cell that a mask of the map covers, of `per_side` squared points."""
@@ -142,13 +140,12 @@ class PlanFrame:
             size,
             flags=cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP,
         )
-        return cv2.resize(fine.astype(np.float32), self.shape[::-1], interpolation=cv2.INTER_AREA)
+        share = cv2.resize(fine.astype(np.float32), self.shape[::-1], interpolation=cv2.INTER_AREA)
+        return share.astype(np.float32)
 
     def back(self, image: Labels, shape: tuple[int, int]) -> Labels:
         """Plan labels below 2^24 at the cells of the map (H, W)."""
-        warped = cv2.warpAffine(
-            image.astype(np.float32), self.to_map, shape[::-1], flags=cv2.INTER_NEAREST
-        )
+        warped = cv2.warpAffine(image.astype(np.float32), self.to_map, shape[::-1], flags=cv2.INTER_NEAREST)
         return warped.astype(np.int32)
 
 
@@ -172,11 +169,16 @@ def clearance_basins(
     width = 2 * max(1, round(parameters.summit_reach_m / cell_m)) + 1
     summits = free & (height == cv2.dilate(height, np.ones((width, width), np.uint8)))
     markers, _ = ndimage.label(summits, np.ones((3, 3)))
-    return watershed(-smooth, markers, mask=free).astype(np.int32), smooth
+    basins = watershed(-smooth, markers, mask=free)  # type: ignore[no-untyped-call]
+    return basins.astype(np.int32), smooth.astype(np.float32)
 
 
 def cut_atoms(
-    free: BoolArray, occupied: BoolArray, faces: Labels, frame: PlanFrame, resolution_m: float,
+    free: BoolArray,
+    occupied: BoolArray,
+    faces: Labels,
+    frame: PlanFrame,
+    resolution_m: float,
     parameters: AtomParameters,
 ) -> Labels:
     """Atoms (H, W), 1.. on the free cells of the map, 0 elsewhere and on loose cells."""
@@ -186,7 +188,7 @@ def cut_atoms(
     basins = _grown(basins, 0.2 / frame.cell_m)
     basin = frame.back(basins, (free.shape[0], free.shape[1]))
     key = np.where(free, faces.astype(np.int64) * (int(basin.max()) + 1) + basin + 1, 0)
-    pieces = label(key, connectivity=1, background=0).astype(np.int32)
+    pieces = label(key, connectivity=1, background=0).astype(np.int32)  # type: ignore[no-untyped-call]
     return absorb_small(pieces, parameters.atom_min_m2 / resolution_m**2)
 
 

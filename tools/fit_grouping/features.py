@@ -22,7 +22,8 @@ SHAPE_FEATURES = (
     "spans_small", "spans_large", "neighbors_small", "neighbors_large", "wide_small", "wide_large",
 )  # fmt: skip
 ANSWER_FEATURES = (
-    "different_near", "different_middle", "different_far", "different", "log_pairs", "outside_small", "outside_large",
+    "different_near", "different_middle", "different_far", "different", "log_pairs",
+    "outside_small", "outside_large",
 )  # fmt: skip
 FEATURES = SHAPE_FEATURES + ANSWER_FEATURES
 NO_ANSWER = -1.0
@@ -30,7 +31,7 @@ CONTACT_MIN_M = 0.05
 """Regions that touch along less, but face one another across noise, may still be joined."""
 FACING_MIN_M = 0.3
 OCTAGON_CORNER = 0.5
-"""Area of a corner that an octagon's slanting side cuts off, per squared distance of the side from the corner."""
+"""Area that an octagon's slanting side cuts off a corner, per squared distance of the side from it."""
 
 
 def joinable(graph: RegionGraph) -> NDArray[np.bool_]:
@@ -46,19 +47,20 @@ def join_features(graph: RegionGraph, which: NDArray[np.intp]) -> FloatArray:
     top = {name: graph.node_maxima[:, k] for k, name in enumerate(NODE_MAXIMA)}
     s = {name: graph.border_sums[which, k] for k, name in enumerate(BORDER_SUMS)}
     m = {name: graph.border_maxima[which, k] for k, name in enumerate(BORDER_MAXIMA)}
-    count = len(graph.node_sums)
     ends = graph.ends[which]
     swap = n["area"][ends[:, 0]] > n["area"][ends[:, 1]]
     small, large = np.where(swap, ends[:, 1], ends[:, 0]), np.where(swap, ends[:, 0], ends[:, 1])
     all_contact = graph.border_sums[:, 0] + graph.border_sums[:, 1]
-    open_edges = sum(np.bincount(graph.ends[:, k], all_contact, minlength=count) for k in (0, 1))
-    touches = all_contact > 0.1
-    neighbors = sum(np.bincount(graph.ends[touches, k], minlength=count) for k in (0, 1))
+    open_edges = _at_ends(graph, all_contact)
+    neighbors = _at_ends(graph, (all_contact > 0.1).astype(float))
     outline = n["wall_edges"] + n["unknown_edges"] + open_edges + 0.01
     contact = s["upright"] + s["level"]
     some = contact > 0
     per_contact = np.where(some, 1 / np.maximum(contact, 1e-9), 0.0)
-    finite = lambda v: np.where(some, v, 0.0)  # noqa: E731
+
+    def finite(values: FloatArray) -> FloatArray:
+        return np.where(some, values, 0.0)
+
     width, height = (finite(m[f"{a}_high"] + m[f"{a}_low"]) for a in "xy")
     chord = np.hypot(width, height) + 0.01
     side = np.hypot(s["upright"], s["level"])
@@ -74,12 +76,15 @@ def join_features(graph: RegionGraph, which: NDArray[np.intp]) -> FloatArray:
     area = area_small + area_large
     rectangle = [area_small / box_small[:, 2], area_large / box_large[:, 2], area / box_union[:, 2]]
     eight = [area_small / octagon[small], area_large / octagon[large], area / _octagons(union_maxima)]
-    gain = lambda fills: fills[2] - (area_small * fills[0] + area_large * fills[1]) / area  # noqa: E731
-    lies = lambda b: np.log(b[:, 0] / b[:, 1])  # noqa: E731
+
+    def gain(fills: list[FloatArray]) -> FloatArray:
+        return fills[2] - (area_small * fills[0] + area_large * fills[1]) / area
+
+    def lies(boxes: FloatArray) -> FloatArray:
+        return np.log(boxes[:, 0] / boxes[:, 1])
+
     # A border that takes the whole side of a region leaves no wall beside it.
-    spans = [
-        np.maximum(s["upright"] / b[:, 1], s["level"] / b[:, 0]) for b in (box_small, box_large)
-    ]
+    spans = [np.maximum(s["upright"] / b[:, 1], s["level"] / b[:, 0]) for b in (box_small, box_large)]
     facing = s["facing_wall"] + s["facing_unknown"]
     columns = [
         np.log(contact + 0.05),
@@ -134,6 +139,14 @@ def join_features(graph: RegionGraph, which: NDArray[np.intp]) -> FloatArray:
     return np.stack(columns, axis=1)
 
 
+def _at_ends(graph: RegionGraph, values: FloatArray) -> FloatArray:
+    """Sum (N,) over the borders (M,) of each region."""
+    count = len(graph.node_sums)
+    one, other = (np.bincount(graph.ends[:, k], values, minlength=count) for k in (0, 1))
+    total: FloatArray = np.asarray(one + other, float)
+    return total
+
+
 def _ratio(part: FloatArray, whole: FloatArray) -> FloatArray:
     return np.where(whole > 0, part / np.maximum(whole, 1e-9), NO_ANSWER)
 
@@ -151,12 +164,13 @@ def _octagons(maxima: FloatArray) -> FloatArray:
     area = (x1 + x0) * (y1 + y0)
     for cut in (x1 + y1 - s1, x0 + y0 - s0, x1 + y0 - d1, x0 + y1 - d0):
         area = area - OCTAGON_CORNER * np.maximum(cut, 0.0) ** 2
-    return np.maximum(area, 0.01)
+    least: FloatArray = np.maximum(area, 0.01)
+    return least
 
 
 REGION_FEATURES = (
-    "log_area", "outside", "clear", "clear_strong", "wall_share", "unknown_share", "open_share", "wide", "rectangle",
-    "octagon", "area_share",
+    "log_area", "outside", "clear", "clear_strong", "wall_share", "unknown_share", "open_share", "wide",
+    "rectangle", "octagon", "area_share",
 )  # fmt: skip
 """Features that tell rooms from rays and the outside."""
 
@@ -165,7 +179,7 @@ def region_features(graph: RegionGraph) -> FloatArray:
     """Features (N, len(REGION_FEATURES)) of the regions of a graph."""
     n = {name: graph.node_sums[:, k] for k, name in enumerate(NODE_SUMS)}
     contact = graph.border_sums[:, 0] + graph.border_sums[:, 1]
-    open_edges = sum(np.bincount(graph.ends[:, k], contact, minlength=len(graph.node_sums)) for k in (0, 1))
+    open_edges = _at_ends(graph, contact)
     outline = n["wall_edges"] + n["unknown_edges"] + open_edges + 0.01
     area = n["area"]
     columns = [

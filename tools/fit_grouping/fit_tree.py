@@ -74,7 +74,9 @@ def gather(examples: Sequence[Example], strength: Strength, noise: float, seed: 
     return Samples(features, right, weight)
 
 
-def fit_trees(samples: Samples, columns: NDArray[np.intp], parameters: TreeParameters, seed: int) -> BoostedTrees:
+def fit_trees(
+    samples: Samples, columns: NDArray[np.intp], parameters: TreeParameters, seed: int
+) -> BoostedTrees:
     """Boosted trees on some of the features; light samples are thinned out rather than weighed down."""
     weight = samples.weight / samples.weight.mean()
     rng = np.random.default_rng(seed)
@@ -91,7 +93,9 @@ def fit_trees(samples: Samples, columns: NDArray[np.intp], parameters: TreeParam
         max_bins=128,
         random_state=seed,
     )
-    model.fit(samples.features[kept][:, columns], samples.right[kept], sample_weight=(weight / keep_share)[kept])
+    model.fit(
+        samples.features[kept][:, columns], samples.right[kept], sample_weight=(weight / keep_share)[kept]
+    )
     return BoostedTrees.of(model, columns)
 
 
@@ -147,7 +151,9 @@ def scores_at(
 def group_means(maps: Sequence[PreparedMap], scores: FloatArray) -> dict[str, float]:
     """Mean score of each group, and of the groups."""
     groups = list(dict.fromkeys(one.group for one in maps))
-    means = {g: float(np.mean([s for one, s in zip(maps, scores, strict=True) if one.group == g])) for g in groups}
+    means = {
+        g: float(np.mean([s for one, s in zip(maps, scores, strict=True) if one.group == g])) for g in groups
+    }
     return means | {"mean": float(np.mean(list(means.values())))}
 
 
@@ -156,8 +162,10 @@ def left_out_scores(maps: Sequence[PreparedMap], table: FloatArray) -> tuple[Flo
     chosen, best = np.zeros(len(maps)), {}
     fold = np.array([one.fold for one in maps])
     for k in sorted(set(fold.tolist())):
-        others = np.flatnonzero(fold != k)
-        means = [group_means([maps[i] for i in others], table[others, j])["mean"] for j in range(table.shape[1])]
+        others = np.flatnonzero(fold != k).tolist()
+        means = [
+            group_means([maps[i] for i in others], table[others, j])["mean"] for j in range(table.shape[1])
+        ]
         best[k] = int(np.argmax(means))
         chosen[fold == k] = table[fold == k, best[k]]
     return chosen, best

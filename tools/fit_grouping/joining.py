@@ -100,7 +100,11 @@ def sample_joins(
 
 
 def _run(
-    graph: RegionGraph, strength: Strength, least: float, tables: tuple[FloatArray, ...] | None, noise: float,
+    graph: RegionGraph,
+    strength: Strength,
+    least: float,
+    tables: tuple[FloatArray, ...] | None,
+    noise: float,
     seed: int,
 ) -> tuple[Joins, Samples | None]:
     """Rounds of joins: in each, every border that is the strongest of both its regions."""

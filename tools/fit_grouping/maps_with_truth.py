@@ -1,4 +1,4 @@
-"""Maps with true rooms as the fit takes them: the explored part of a map, and its truths on the same cells."""
+"""Maps with true rooms as the fit takes them: the explored part, and its truths on the same cells."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
@@ -117,7 +116,6 @@ def _on_blocks(part: ExploredPart, labels: NDArray[np.integer]) -> Labels:
     side = part.factor
     if side > 1:
         height, width = part.free.shape
-        window = cv2.copyMakeBorder(
-            window, 0, height * side - window.shape[0], 0, width * side - window.shape[1], cv2.BORDER_CONSTANT
-        )[side // 2 :: side, side // 2 :: side]
+        missing = ((0, height * side - window.shape[0]), (0, width * side - window.shape[1]))
+        window = np.pad(window, missing)[side // 2 :: side, side // 2 :: side]
     return np.ascontiguousarray(window)

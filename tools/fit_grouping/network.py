@@ -23,7 +23,7 @@ def _layer(inputs: int, outputs: int, kernel: int = 3, stride: int = 1) -> nn.Se
     )
 
 
-class RoomNetwork(nn.Module):
+class RoomNetwork(nn.Module):  # type: ignore[misc]
     """A U-shaped network: a map of 0.1 m cells in, an answer for each pair of cells out (log odds)."""
 
     def __init__(self, channels: tuple[int, ...] = CHANNELS) -> None:
@@ -33,11 +33,13 @@ class RoomNetwork(nn.Module):
             nn.Sequential(_layer(channels[max(i - 1, 0)], c), _layer(c, c)) for i, c in enumerate(channels)
         )
         self.up = nn.ModuleList(
-            nn.Sequential(_layer(channels[i + 1] + channels[i], channels[i]), _layer(channels[i], channels[i]))
+            nn.Sequential(
+                _layer(channels[i + 1] + channels[i], channels[i]), _layer(channels[i], channels[i])
+            )
             for i in range(len(channels) - 2, -1, -1)
         )
         self.answers = nn.Conv2d(channels[0], 4 * OUTPUTS, 1)
-        nn.init.constant_(self.answers.bias, -1.5)  # type: ignore[arg-type]
+        nn.init.constant_(self.answers.bias, -1.5)
         self.fine = nn.PixelShuffle(2)
 
     def forward(self, inputs: Tensor) -> Tensor:
@@ -54,7 +56,7 @@ class RoomNetwork(nn.Module):
         return out
 
 
-class _Probabilities(nn.Module):
+class _Probabilities(nn.Module):  # type: ignore[misc]
     def __init__(self, network: RoomNetwork) -> None:
         super().__init__()
         self.network = network

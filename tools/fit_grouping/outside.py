@@ -1,4 +1,4 @@
-"""What counts as outside: rays through windows, white around buildings, told by a fitted rule on final regions."""
+"""What counts as outside, told by a fitted rule: rays through windows, white around buildings."""
 
 from __future__ import annotations
 
@@ -20,7 +20,9 @@ ALL_OUTSIDE_SHARE = 0.8
 """Where more than this share of the map would be outside, the answer is not believed."""
 
 
-def region_samples(example: Example, region: NDArray[np.int64]) -> tuple[FloatArray, NDArray[np.bool_], FloatArray]:
+def region_samples(
+    example: Example, region: NDArray[np.int64]
+) -> tuple[FloatArray, NDArray[np.bool_], FloatArray]:
     """Features of the regions of a map, whether each is a true room, and weights."""
     graph, _ = example.graph.joined(region)
     room = np.zeros(len(graph.node_sums), bool)
@@ -33,9 +35,7 @@ def region_samples(example: Example, region: NDArray[np.int64]) -> tuple[FloatAr
     return region_features(graph)[large], room[large], weight
 
 
-def fit_outside(
-    examples: Sequence[Example], regions: Sequence[NDArray[np.int64]], seed: int
-) -> BoostedTrees:
+def fit_outside(examples: Sequence[Example], regions: Sequence[NDArray[np.int64]], seed: int) -> BoostedTrees:
     """Log odds that a region is a room, from the final regions of maps."""
     parts = [region_samples(e, r) for e, r in zip(examples, regions, strict=True)]
     features, room, weight = (np.concatenate(p) for p in zip(*parts, strict=True))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -46,7 +47,10 @@ class PlanRaster:
         cls, free: BoolArray, occupied: BoolArray, frame: PlanFrame, truths: tuple[Labels, ...] = ()
     ) -> PlanRaster:
         """Sample the masks and truths (H, W) of a map."""
-        steps = [np.rint(frame.share(mask, POINTS_PER_SIDE) * SHARE_STEPS).astype(np.uint8) for mask in (occupied, free)]
+        steps = [
+            np.rint(frame.share(mask, POINTS_PER_SIDE) * SHARE_STEPS).astype(np.uint8)
+            for mask in (occupied, free)
+        ]
         return cls(steps[0], steps[1], tuple(frame.sampled(t).astype(np.uint16) for t in truths))
 
 
@@ -71,18 +75,25 @@ def random_crop(
     rows, columns = np.nonzero(raster.truths[0])
     at = rng.integers(len(rows))
     low = np.array([rows[at], columns[at]]) - (rng.uniform(0.15, 0.85, 2) * size).astype(int)
-    images = [_window(image, low, size) for image in (raster.wall, raster.free, *raster.truths)]
     turns, mirror = int(rng.integers(4)), bool(rng.integers(2))
-    images = [np.rot90(image[:, ::-1] if mirror else image, turns) for image in images]
-    wall = images[0].astype(np.float32) / SHARE_STEPS
-    free = images[1].astype(np.float32) / SHARE_STEPS
+    images: list[Labels] = []
+    layers: list[NDArray[np.integer[Any]]] = [raster.wall, raster.free, *raster.truths]
+    for image in layers:
+        window = _window(image, low, size).astype(np.int32)
+        images.append(np.rot90(window[:, ::-1] if mirror else window, turns))
+    wall, free = shares_of(images[0]), shares_of(images[1])
     if rng.random() < 0.3:
         wall, free = _worn(rng, wall, free)
-    targets, weights = network_targets(free > 0.3, [t.astype(np.int32) for t in images[2:]])
+    targets, weights = network_targets(free > 0.3, images[2:])
     return network_input(wall, free), targets, weights
 
 
-def _window(image: NDArray[np.generic], low: NDArray[np.int64], size: int) -> NDArray[np.generic]:
+def shares_of(steps: NDArray[np.integer[Any]]) -> FloatImage:
+    """Shares in [0, 1] from counts of points."""
+    return (steps / np.float32(SHARE_STEPS)).astype(np.float32)
+
+
+def _window(image: NDArray[np.integer[Any]], low: NDArray[np.int64], size: int) -> NDArray[np.integer[Any]]:
     out = np.zeros((size, size), image.dtype)
     (r0, c0), (h, w) = low, image.shape
     ra, rb, ca, cb = max(r0, 0), min(r0 + size, h), max(c0, 0), min(c0 + size, w)
@@ -95,7 +106,8 @@ def _worn(rng: np.random.Generator, wall: FloatImage, free: FloatImage) -> tuple
     """Thin walls out, sprinkle spots, or cut unknown holes."""
     kind, size = rng.integers(3), wall.shape[0]
     if kind == 0:
-        return wall * (rng.random(wall.shape) > rng.uniform(0, 0.3)).astype(np.float32), free
+        left = (rng.random(wall.shape) > rng.uniform(0, 0.3)).astype(np.float32)
+        return wall * left, free
     wall, free = wall.copy(), free.copy()
     if kind == 1:
         spots = (rng.random(wall.shape) < rng.uniform(0, 0.006)) & (free > 0.5)

@@ -112,9 +112,7 @@ def _kept(path: Path, maps: Iterator[PreparedMap]) -> list[PreparedMap]:
     return made
 
 
-def answered(
-    maps: list[PreparedMap], network_of_fold: dict[int, Path]
-) -> list[NDArray[np.float32]]:
+def answered(maps: list[PreparedMap], network_of_fold: dict[int, Path]) -> list[NDArray[np.float32]]:
     """Answers for each map, of the network that did not see its fold."""
     networks = {path: AnsweringNetwork(path) for path in set(network_of_fold.values())}
     return [networks[network_of_fold[one.fold]](one.raster) for one in maps]

@@ -1,4 +1,4 @@
-"""The graph of regions: sums of regions and borders from which every feature of a join follows, after any joins."""
+"""The graph of regions: sums from which every feature of a join follows, after any joins."""
 
 from __future__ import annotations
 
@@ -25,7 +25,18 @@ SPECK_MAX_CELLS = 2
 """Occupied pieces up to this size do not narrow the clearance."""
 
 NODE_SUMS = ("area", "wall_edges", "unknown_edges", "wide", "outside")
-NODE_MAXIMA = ("clear", "clear_strong", "x_high", "x_low", "y_high", "y_low", "sum_high", "sum_low", "dif_high", "dif_low")
+NODE_MAXIMA = (
+    "clear",
+    "clear_strong",
+    "x_high",
+    "x_low",
+    "y_high",
+    "y_low",
+    "sum_high",
+    "sum_low",
+    "dif_high",
+    "dif_low",
+)
 """Maxima: of the clearance, and of the coordinates and their negatives, so that boxes and octagons follow."""
 BORDER_SUMS = (
     "upright", "level", "facing_wall", "facing_unknown", "clear", "on_face",
@@ -44,8 +55,8 @@ class RegionGraph:
     node_sums, node_maxima : (N, ...) float
         Columns as in `NODE_SUMS`, `NODE_MAXIMA`; meters and square meters.
     ends : (M, 2) int
-        The two regions of each border, the lower number first; each pair once. Pairs that do not touch but are
-        near are listed too, with a contact of 0.
+        The two regions of each border, the lower number first; each pair once. Pairs that do not touch but
+        are near are listed too, with a contact of 0.
     border_sums, border_maxima : (M, ...) float
         Columns as in `BORDER_SUMS`, `BORDER_MAXIMA`.
     """
@@ -97,8 +108,13 @@ def _summed(values: FloatArray, index: NDArray[np.int64], count: int) -> FloatAr
 
 
 def build_graph(
-    atoms: Labels, raster: PlanRaster, strong: BoolArray, faces: Labels,
-    answers: NDArray[np.float32] | None, cell_m: float, count: int,
+    atoms: Labels,
+    raster: PlanRaster,
+    strong: BoolArray,
+    faces: Labels,
+    answers: NDArray[np.float32] | None,
+    cell_m: float,
+    count: int,
 ) -> RegionGraph:
     """Measure atoms and their borders on the plan frame.
 
@@ -145,9 +161,7 @@ def build_graph(
     missed = np.isinf(node_maxima[:, 0])
     node_maxima[missed] = 0
     node_sums[missed, 0] = cell_m**2
-    keys, sums, maxima = _border_records(
-        atoms, wall, clear, clear_strong, faces, answers, cell_m, count
-    )
+    keys, sums, maxima = _border_records(atoms, wall, clear, clear_strong, faces, answers, cell_m, count)
     key, index = np.unique(keys, return_inverse=True)
     border_maxima = np.full((len(key), len(BORDER_MAXIMA)), -np.inf)
     touching = np.isfinite(maxima[:, 0])
@@ -168,8 +182,14 @@ def _fill_maxima(out: FloatArray, index: NDArray[np.int64], values: list[NDArray
 
 
 def _border_records(
-    atoms: Labels, wall: BoolArray, clear: NDArray[np.float32], clear_strong: NDArray[np.float32],
-    faces: Labels, answers: NDArray[np.float32] | None, cell_m: float, count: int,
+    atoms: Labels,
+    wall: BoolArray,
+    clear: NDArray[np.float32],
+    clear_strong: NDArray[np.float32],
+    faces: Labels,
+    answers: NDArray[np.float32] | None,
+    cell_m: float,
+    count: int,
 ) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
     """One row for each pair of cells beside one another (or asked about) that lie in two regions."""
     grown = _over_gaps(atoms, np.ones(atoms.shape, bool), GROW_M / cell_m)
@@ -224,12 +244,13 @@ def _wall_along(wall: BoolArray, upright: bool, length_m: float, cell_m: float) 
     size = 2 * round(length_m / cell_m / 2) + 1
     across = np.ones((1, 3), np.uint8) if upright else np.ones((3, 1), np.uint8)
     near = cv2.dilate(wall.astype(np.uint8), across).astype(np.float32)
-    return cv2.blur(near, (1, size) if upright else (size, 1), borderType=cv2.BORDER_CONSTANT)
+    window = (1, size) if upright else (size, 1)
+    return cv2.blur(near, window, borderType=cv2.BORDER_CONSTANT).astype(np.float32)
 
 
 def _clearance(blocked: BoolArray, cell_m: float) -> NDArray[np.float32]:
     distance = cv2.distanceTransform((~blocked).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
-    return distance * np.float32(cell_m)
+    return (distance * np.float32(cell_m)).astype(np.float32)
 
 
 def _without_specks(wall: BoolArray) -> BoolArray:
@@ -249,4 +270,6 @@ def _over_gaps(labels: Labels, where: BoolArray, reach_cells: float) -> Labels:
     )
     of_nearest = np.zeros(int(nearest.max()) + 1, np.int32)
     of_nearest[nearest[labels > 0]] = labels[labels > 0]
-    return np.where((distance <= reach_cells) & (where | (labels > 0)), of_nearest[nearest], 0).astype(np.int32)
+    return np.where((distance <= reach_cells) & (where | (labels > 0)), of_nearest[nearest], 0).astype(
+        np.int32
+    )

@@ -73,7 +73,9 @@ class BoostedTrees:
             left[k, inner], right[k, inner] = nodes["left"][inner], nodes["right"][inner]
             value[k, : len(nodes)] = np.where(nodes["is_leaf"] == 1, nodes["value"], 0.0)
             depth = max(depth, int(nodes["depth"].max()))
-        return cls(feature, threshold, left, right, value, float(np.ravel(model._baseline_prediction)[0]), depth)
+        return cls(
+            feature, threshold, left, right, value, float(np.ravel(model._baseline_prediction)[0]), depth
+        )
 
 
 def write_trees(path: Path, trees: BoostedTrees, names: tuple[str, ...] = FEATURES) -> None:

@@ -27,7 +27,7 @@ from torch import Tensor, nn
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from fit_grouping.atoms import AtomParameters, PlanFrame, find_generous_structure
+from fit_grouping.atoms import AtomParameters, BoolArray, PlanFrame, find_generous_structure
 from fit_grouping.buildings.make_buildings import read_maps
 from fit_grouping.buildings.raster import CELL_M
 from fit_grouping.maps_with_truth import TruthMap, load_benchmark
@@ -52,7 +52,9 @@ VARIANTS = 3
 """Each real map is sampled so many times, at other scales and slightly other directions."""
 
 
-def varied_frame(rng: np.random.Generator, known: np.ndarray, direction_rad: float, resolution_m: float) -> PlanFrame:  # type: ignore[type-arg]
+def varied_frame(
+    rng: np.random.Generator, known: BoolArray, direction_rad: float, resolution_m: float
+) -> PlanFrame:
     """Plan frame with a slightly wrong direction and cells that are smaller or larger than they say."""
     scale = rng.uniform(0.85, 1.2)
     return PlanFrame.of(known, direction_rad + rng.normal(0, 0.012), resolution_m, PLAN_CELL_M * scale)
@@ -177,7 +179,9 @@ def main() -> None:
         maps, exact = kept(keep and keep / "real.pkl", lambda: _real_maps(arguments.cases, arguments.seed))
         folds = {one.building: one.fold for one in load_benchmark(arguments.cases)}
         real = {b: rasters for b, rasters in maps.items() if folds[b] != arguments.leave_out}
-        watched["left out"] = [r for b, rs in exact.items() if folds[b] == arguments.leave_out for r in rs[:3]]
+        watched["left out"] = [
+            r for b, rs in exact.items() if folds[b] == arguments.leave_out for r in rs[:3]
+        ]
     batches = Batches(simulated, real, arguments.real_share, arguments.seed + steps + 1)
     fixed = {
         name: [b.next() for b in [Batches(rasters, {}, 0.0, 7)] for _ in range(8)]
@@ -193,7 +197,7 @@ def main() -> None:
         network.train()
         optimizer.zero_grad()
         loss = loss_of(network, batches.next())
-        loss.backward()  # type: ignore[no-untyped-call]
+        loss.backward()
         nn.utils.clip_grad_norm_(network.parameters(), GRADIENT_MAX)
         optimizer.step()
         losses.append(loss.item())
@@ -207,7 +211,9 @@ def main() -> None:
             last = now
             mean.eval()
             with torch.no_grad():
-                seen = {name: float(np.mean([loss_of(mean, b).item() for b in bs])) for name, bs in fixed.items()}
+                seen = {
+                    name: float(np.mean([loss_of(mean, b).item() for b in bs])) for name, bs in fixed.items()
+                }
             told = ", ".join(f"{name} {value:.3f}" for name, value in seen.items())
             print(f"{now - start:6.0f} s {steps:6d} steps: loss {np.mean(losses):.3f}, {told}", flush=True)
             losses.clear()

@@ -1,6 +1,6 @@
 """Measures what perfect grouping of atoms would give.
 
-    python tools/fit_grouping/upper_bounds.py CASES [--every N]
+python tools/fit_grouping/upper_bounds.py CASES [--every N]
 """
 
 from __future__ import annotations
@@ -31,7 +31,11 @@ def main() -> None:
     cv2.setNumThreads(1)
     maps = load_benchmark(arguments.cases)[:: arguments.every]
     groups = list(dict.fromkeys(m.group for m in maps))
-    print(" " * 24 + " ".join(f"{g[-9:]:>9s}" for g in groups) + "   mean | atoms median, max | s structure, atoms")
+    print(
+        " " * 24
+        + " ".join(f"{g[-9:]:>9s}" for g in groups)
+        + "   mean | atoms median, max | s structure, atoms"
+    )
     for least_m2 in arguments.atom_min_m2:
         parameters = replace(AtomParameters(), atom_min_m2=least_m2)
         bounds: dict[str, list[float]] = {}
@@ -52,7 +56,9 @@ def main() -> None:
             f"atoms of {least_m2:.2f} m2".ljust(24)
             + " ".join(f"{m:9.1f}" for m in means)
             + f" {np.mean(means):6.2f} | {np.median(counts):.0f} {max(counts)} | "
-            + " ".join(f"{s:.3f}" for s in np.mean(seconds, 0)), flush=True)
+            + " ".join(f"{s:.3f}" for s in np.mean(seconds, 0)),
+            flush=True,
+        )
 
 
 if __name__ == "__main__":

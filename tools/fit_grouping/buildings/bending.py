@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from fit_grouping.buildings.raster import Generator, Mask, between, chance
+from fit_grouping.buildings.raster import Generator, Mask, between
 from fit_grouping.buildings.walls import WalledPlan
 
 FloatImage = NDArray[np.float32]
@@ -23,28 +24,42 @@ def bent(rng: Generator, walled: WalledPlan, furniture: Mask) -> tuple[WalledPla
     if kind == "none":
         return walled, furniture
     height, width = furniture.shape
-    if chance(rng, 0.5):  # the other way round
-        turned = lambda image: np.ascontiguousarray(np.rot90(image))  # noqa: E731
+    turns = int(rng.integers(2))
+    if turns:
         height, width = width, height
-    else:
-        turned = np.ascontiguousarray
     if kind == "slant":
         x, y = _slant(rng, width, height)
     elif kind == "arc":
         x, y = _arc(rng, width, height)
     else:
         x, y = _bend(rng, width, height)
-    move = lambda image: cv2.remap(  # noqa: E731
-        turned(image), x, y, cv2.INTER_NEAREST, borderMode=cv2.BORDER_CONSTANT, borderValue=0
+    rooms, other, walls, glass, things = (
+        moved(np.rot90(image, turns), x, y)
+        for image in (walled.plan.rooms, walled.other, walled.walls, walled.glass, furniture)
     )
-    labels = lambda image: move(image.astype(np.float32)).astype(np.int32)  # noqa: E731
-    plan = replace(walled.plan, rooms=labels(walled.plan.rooms))
     # Points of a curved raster miss cells of thin walls here and there.
-    close = lambda image: cv2.morphologyEx(move(image), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))  # noqa: E731
-    other = replace(
-        walled, plan=plan, walls=close(walled.walls), glass=move(walled.glass), other=labels(walled.other)
+    closed = cv2.morphologyEx(walls, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8)).astype(np.uint8)
+    plan = replace(walled.plan, rooms=rooms.astype(np.int32))
+    building = replace(
+        walled, plan=plan, walls=closed, glass=glass.astype(np.uint8), other=other.astype(np.int32)
     )
-    return other, move(furniture)
+    return building, things.astype(np.uint8)
+
+
+def moved(
+    image: NDArray[np.integer[Any]], from_x: FloatImage, from_y: FloatImage, fill: int = 0
+) -> NDArray[np.integer[Any]]:
+    """Image whose cells come from the given places of another; labels below 2^24."""
+    exact = image if image.dtype == np.uint8 else image.astype(np.float32)
+    out = cv2.remap(
+        np.ascontiguousarray(exact),
+        from_x,
+        from_y,
+        cv2.INTER_NEAREST,
+        borderMode=cv2.BORDER_CONSTANT,
+        borderValue=float(fill),
+    )
+    return out.astype(image.dtype)
 
 
 def _slant(rng: Generator, width: int, height: int) -> tuple[FloatImage, FloatImage]:

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import cv2
 import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import find_objects
 
 from fit_grouping.buildings.raster import CELL_M, Generator, Mask, between, cells, chance
 from fit_grouping.buildings.walls import WalledPlan
@@ -69,7 +73,9 @@ class Furnisher:
 
     def _hall(self, drawn: Mask, area_m2: float) -> None:
         rng = self.rng
-        kind = rng.choice(["rows", "pillars", "tables", "boxes", "mixed", "empty"], p=[0.25, 0.15, 0.2, 0.15, 0.15, 0.1])
+        kind = rng.choice(
+            ["rows", "pillars", "tables", "boxes", "mixed", "empty"], p=[0.25, 0.15, 0.2, 0.15, 0.15, 0.1]
+        )
         if kind in ("rows", "mixed"):
             self._rows(drawn, rng.uniform(0.3, 1.0), rng.uniform(1.2, 3.0))
         if kind in ("tables", "mixed"):
@@ -77,9 +83,16 @@ class Furnisher:
         if kind == "pillars" or chance(rng, 0.2):
             half = between(rng, 0.1, 0.35)
             step = rng.uniform(3.5, 8)
-            self._grid(drawn, step, step, lambda p: cv2.rectangle(drawn, (p[0] - half, p[1] - half), (p[0] + half, p[1] + half), 1, -1))
+            self._grid(
+                drawn,
+                step,
+                step,
+                lambda p: cv2.rectangle(drawn, (p[0] - half, p[1] - half), (p[0] + half, p[1] + half), 1, -1),
+            )
         if chance(rng, 0.15):  # stands, pods and cages that can be looked into
-            self._grid(drawn, rng.uniform(2.2, 5), rng.uniform(2.2, 5), lambda p: self._frame(drawn, p), share=0.7)
+            self._grid(
+                drawn, rng.uniform(2.2, 5), rng.uniform(2.2, 5), lambda p: self._frame(drawn, p), share=0.7
+            )
         if kind in ("boxes", "mixed"):
             for _ in range(rng.poisson(min(area_m2, 400) / 15)):
                 self._box(drawn, 0.5, 3.0, at_wall=chance(rng, 0.4))
@@ -92,7 +105,14 @@ class Furnisher:
         rng = self.rng
         step_x, step_y = rng.uniform(0.8, 1.5), rng.uniform(0.8, 1.5)
         radius = int(rng.integers(2, 4))
-        self._grid(drawn, step_x, step_y, lambda p: cv2.circle(drawn, p, radius, 1, -1), share=rng.uniform(0.4, 1.0), rim=0.8)
+        self._grid(
+            drawn,
+            step_x,
+            step_y,
+            lambda p: cv2.circle(drawn, p, radius, 1, -1),
+            share=rng.uniform(0.4, 1.0),
+            rim=0.8,
+        )
         height, width = drawn.shape
         for _ in range(rng.poisson(1.0)):
             a, b = between(rng, 0.4, 1.0), between(rng, 0.8, 2.6)
@@ -109,7 +129,9 @@ class Furnisher:
             return
         self._along_walls(drawn, density * min(area_m2, 60) / 4)
         for _ in range(rng.poisson(density * min(area_m2, 60) / 9)):
-            kind = rng.choice(["table", "box", "legs", "chair", "screen", "disc"], p=[0.3, 0.2, 0.15, 0.2, 0.07, 0.08])
+            kind = rng.choice(
+                ["table", "box", "legs", "chair", "screen", "disc"], p=[0.3, 0.2, 0.15, 0.2, 0.07, 0.08]
+            )
             spot = self._spot(drawn)
             if kind == "table":
                 self._table(drawn, spot)
@@ -155,7 +177,10 @@ class Furnisher:
                 drawn[max(0, y) : max(0, y + long), max(0, x) : x + deep] = 1
             return
         angle = 0.0 if chance(rng, 0.6) else rng.uniform(0, 90)
-        size = (rng.uniform(low_m, high_m) / CELL_M, rng.uniform(low_m, max(low_m + 0.1, high_m / 2)) / CELL_M)
+        size = (
+            rng.uniform(low_m, high_m) / CELL_M,
+            rng.uniform(low_m, max(low_m + 0.1, high_m / 2)) / CELL_M,
+        )
         corners = cv2.boxPoints(((float(rng.integers(width)), float(rng.integers(height))), size, angle))
         cv2.fillPoly(drawn, [corners.astype(np.int32)], 1)
 
@@ -170,7 +195,10 @@ class Furnisher:
         else:
             self._legs(drawn, spot, long, wide)
         for _ in range(rng.poisson(1.5)):
-            offset = (rng.choice([-1, 1]) * cells(long / 2 + 0.3), rng.choice([-1, 1]) * cells(wide / 2 + 0.3))
+            offset = (
+                rng.choice([-1, 1]) * cells(long / 2 + 0.3),
+                rng.choice([-1, 1]) * cells(wide / 2 + 0.3),
+            )
             self._chair(drawn, (spot[0] + int(offset[0]), spot[1] + int(offset[1])))
 
     def _legs(self, drawn: Mask, spot: tuple[int, int], long_m: float, wide_m: float) -> None:
@@ -185,14 +213,22 @@ class Furnisher:
             for k in range(5):
                 tip = angle + 2 * np.pi * k / 5
                 reach = cells(0.3)
-                cv2.line(drawn, spot, (int(spot[0] + reach * np.cos(tip)), int(spot[1] + reach * np.sin(tip))), 1, 1)
+                cv2.line(
+                    drawn,
+                    spot,
+                    (int(spot[0] + reach * np.cos(tip)), int(spot[1] + reach * np.sin(tip))),
+                    1,
+                    1,
+                )
         else:
             self._legs(drawn, spot, 0.45, 0.45)
 
     def _line(self, drawn: Mask, spot: tuple[int, int], length_m: float) -> None:
         angle = self.rng.choice([0.0, np.pi / 2, self.rng.uniform(0, np.pi)])
         reach = length_m / CELL_M
-        cv2.line(drawn, spot, (int(spot[0] + reach * np.cos(angle)), int(spot[1] + reach * np.sin(angle))), 1, 1)
+        cv2.line(
+            drawn, spot, (int(spot[0] + reach * np.cos(angle)), int(spot[1] + reach * np.sin(angle))), 1, 1
+        )
 
     def _noise(self, drawn: Mask, mean: float) -> None:
         for _ in range(self.rng.poisson(mean)):
@@ -223,7 +259,16 @@ class Furnisher:
                 y += piece + between(rng, 0.0, 2.0)
             x += deep + way
 
-    def _grid(self, drawn, step_x_m, step_y_m, put, *, share: float = 0.8, rim: float = 1.2) -> None:  # type: ignore[no-untyped-def]
+    def _grid(
+        self,
+        drawn: Mask,
+        step_x_m: float,
+        step_y_m: float,
+        put: Callable[[tuple[int, int]], object],
+        *,
+        share: float = 0.8,
+        rim: float = 1.2,
+    ) -> None:
         height, width = drawn.shape
         for y in range(cells(rim), height - cells(rim) + 1, cells(step_y_m)):
             for x in range(cells(rim), width - cells(rim) + 1, cells(step_x_m)):
@@ -231,10 +276,8 @@ class Furnisher:
                     put((x, y))
 
 
-def _boxes(index: np.ndarray, count: int) -> list[tuple[int, int, int, int]]:  # type: ignore[type-arg]
+def _boxes(index: NDArray[np.intp], count: int) -> list[tuple[int, int, int, int]]:
     """x0, y0, x1, y1 of each label 0..count-1, without the walls' thickness."""
-    from scipy.ndimage import find_objects
-
     boxes = []
     for part in find_objects(index + 1, count):
         rows, columns = part

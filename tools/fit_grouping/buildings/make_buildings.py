@@ -1,6 +1,6 @@
 """Makes simulated maps with true rooms and keeps them in a file.
 
-    python tools/fit_grouping/buildings/make_buildings.py OUT.npz --count 400 --seed 1
+python tools/fit_grouping/buildings/make_buildings.py OUT.npz --count 400 --seed 1
 """
 
 from __future__ import annotations
@@ -66,7 +66,11 @@ def read_maps(path: Path) -> Iterator[SimulatedMap]:
     with np.load(path) as arrays:
         names = set(arrays.files)
         for number, kind in enumerate(arrays["kinds"]):
-            truths = [arrays[f"rooms_{number}_{k}"].astype(np.int32) for k in (0, 1) if f"rooms_{number}_{k}" in names]
+            truths = [
+                arrays[f"rooms_{number}_{k}"].astype(np.int32)
+                for k in (0, 1)
+                if f"rooms_{number}_{k}" in names
+            ]
             yield SimulatedMap(str(kind), arrays[f"map_{number}"], tuple(truths))
 
 

@@ -1,4 +1,4 @@
-"""Plans: which cells belong to which room, in the ways that homes, offices, campuses and halls are laid out."""
+"""Plans: which cells belong to which room, as homes, offices, campuses and halls are laid out."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ class Plan:
 
     def tidy(self) -> None:
         """Number the connected pieces of rooms; slivers go to the ground or to the room around them."""
-        pieces = label(self.rooms, connectivity=1, background=0)
+        pieces = label(self.rooms, connectivity=1, background=0)  # type: ignore[no-untyped-call]
         count = int(pieces.max()) + 1
         first = np.unique(pieces, return_index=True)[1]
         was = self.rooms.ravel()[first]
@@ -117,7 +117,13 @@ def cuts_along(rng: Generator, length: int, usual_m: float, least_m: float, regu
 
 
 def row_of_rooms(
-    rng: Generator, plan: Plan, strip: Rectangle, usual_m: float, *, least_m: float = 1.6, regular: bool = False
+    rng: Generator,
+    plan: Plan,
+    strip: Rectangle,
+    usual_m: float,
+    *,
+    least_m: float = 1.6,
+    regular: bool = False,
 ) -> None:
     """Cut a strip crosswise into rooms."""
     x0, y0, x1, y1 = strip
@@ -253,8 +259,13 @@ def _segments(rng: Generator, area: Rectangle, width: int, depth: int) -> list[R
     left, right = x0 + depth, x1 - depth - width
     low, high = y0 + depth, y1 - depth - width
     middle = x0 + round((x1 - x0 - width) * rng.uniform(0.25, 0.75))
-    level = lambda y, a, b: (a, y, b, y + width)  # noqa: E731
-    upright = lambda x, a, b: (x, a, x + width, b)  # noqa: E731
+
+    def level(y: int, a: int, b: int) -> Rectangle:
+        return a, y, b, y + width
+
+    def upright(x: int, a: int, b: int) -> Rectangle:
+        return x, a, x + width, b
+
     shape = rng.choice(["I", "I", "L", "T", "U", "H", "O", "O", "E"])
     if shape == "I" or y1 - y0 < 2 * depth + 2 * width + cells(2):
         return [level(across, x0, x1)]
@@ -263,12 +274,16 @@ def _segments(rng: Generator, area: Rectangle, width: int, depth: int) -> list[R
     if shape == "T":
         return [level(low, x0, x1), upright(middle, low + width, y1)]
     if shape == "U":
-        return [level(low, left, right + width), upright(left, low + width, y1), upright(right, low + width, y1)]
+        return [
+            level(low, left, right + width),
+            upright(left, low + width, y1),
+            upright(right, low + width, y1),
+        ]
     if shape == "H":
         return [level(low, x0, x1), level(high, x0, x1), upright(middle, low + width, high)]
     if shape == "E":
         count = rng.integers(2, 4)
-        teeth = np.linspace(x0, x1 - width, count + 2)[1:-1].astype(int)
+        teeth = np.linspace(x0, x1 - width, count + 2)[1:-1].astype(int).tolist()
         return [level(low, x0, x1)] + [upright(x, low + width, y1) for x in teeth]
     return [
         level(low, left, right + width),
@@ -312,7 +327,12 @@ def office(rng: Generator) -> Plan:
                 strip = (x0, y0 - own, x1, y0) if side else (x0, y1, x1, y1 + own)
             else:
                 strip = (x0 - own, y0, x0, y1) if side else (x1, y0, x1 + own, y1)
-            strip = (max(strip[0], area[0]), max(strip[1], area[1]), min(strip[2], area[2]), min(strip[3], area[3]))
+            strip = (
+                max(strip[0], area[0]),
+                max(strip[1], area[1]),
+                min(strip[2], area[2]),
+                min(strip[3], area[3]),
+            )
             row_of_rooms(rng, plan, strip, usual_m, regular=regular, least_m=1.5)
     if chance(rng, 0.6):  # what is left: halls and inner rooms, or a courtyard
         halved(rng, plan, area, rng.uniform(15, 90), 2.5)
@@ -388,7 +408,12 @@ def cubicles(rng: Generator) -> Plan:
                     )
         y += rows * block_depth + way
     for side, strip in enumerate(
-        ((x0, y0, x0 + depth, y1), (x0, y0, x1, y0 + depth), (x1 - depth, y0, x1, y1), (x0, y1 - depth, x1, y1))
+        (
+            (x0, y0, x0 + depth, y1),
+            (x0, y0, x1, y0 + depth),
+            (x1 - depth, y0, x1, y1),
+            (x0, y1 - depth, x1, y1),
+        )
     ):
         if sides[side]:
             row_of_rooms(rng, plan, strip, usual_m, regular=chance(rng, 0.7))
@@ -453,7 +478,10 @@ def hall(rng: Generator) -> Plan:
     for _ in range(rng.poisson(1.2)):
         depth = between(rng, 2, 6)
         strip = [
-            (x0, y0, x0 + depth, y1), (x1 - depth, y0, x1, y1), (x0, y0, x1, y0 + depth), (x0, y1 - depth, x1, y1)
+            (x0, y0, x0 + depth, y1),
+            (x1 - depth, y0, x1, y1),
+            (x0, y0, x1, y0 + depth),
+            (x0, y1 - depth, x1, y1),
         ][rng.integers(4)]
         row_of_rooms(rng, plan, strip, rng.uniform(2.5, 8), regular=chance(rng, 0.4))
     if chance(rng, 0.35):
@@ -461,8 +489,8 @@ def hall(rng: Generator) -> Plan:
         plan.hall((x0, y0, middle, y1))
     plan.hall(plan.inner)
     if chance(rng, 0.3):
-        island = [round(v) for v in (x0 + (x1 - x0) * rng.uniform(0.3, 0.5), y0 + (y1 - y0) * rng.uniform(0.3, 0.5))]
-        plan.paint((*island, island[0] + between(rng, 2.5, 7), island[1] + between(rng, 2.5, 6)), over=True)
+        x, y = round(x0 + (x1 - x0) * rng.uniform(0.3, 0.5)), round(y0 + (y1 - y0) * rng.uniform(0.3, 0.5))
+        plan.paint((x, y, x + between(rng, 2.5, 7), y + between(rng, 2.5, 6)), over=True)
     notches(rng, plan, 0.8)
     return plan
 

@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from fit_grouping.buildings.bending import moved
 from fit_grouping.buildings.raster import CELL_M, Generator, Labels, Mask, between, cells, chance
 from fit_grouping.buildings.walls import WalledPlan
 
@@ -103,7 +104,7 @@ def make_map(rng: Generator, walled: WalledPlan, furniture: Mask, furnishing: st
         if seen is None:
             return None
         gray = seen
-    gray = _damaged(rng, gray, walled)
+    gray = _damaged(rng, gray)
     rooms, other, gray = _warped(rng, rooms, walled.other, gray)
     window = _known_window(gray, rooms)
     gray, rooms, other = gray[window], rooms[window], other[window]
@@ -118,10 +119,7 @@ def make_map(rng: Generator, walled: WalledPlan, furniture: Mask, furnishing: st
 def _drawing(rng: Generator, walled: WalledPlan, furniture: Mask) -> NDArray[np.uint8]:
     """A floor plan or a simulator's map: all known, the outside white or unknown."""
     rooms = walled.plan.rooms
-    walls = walled.walls.copy()
-    border = cv2.dilate((rooms == 0).astype(np.uint8), np.ones((3, 3), np.uint8)) & (rooms > 0)
-    walls[(border > 0) & (walled.walls > 0)] = 1
-    gray = np.where((walls | furniture) > 0, OCCUPIED, FREE).astype(np.uint8)
+    gray = np.where((walled.walls | furniture) > 0, OCCUPIED, FREE).astype(np.uint8)
     outside = (rooms == 0) & (gray == FREE)
     if chance(rng, 0.7):
         gray[outside] = UNKNOWN
@@ -157,8 +155,8 @@ def _sensed(rng: Generator, walled: WalledPlan, solid: Mask) -> tuple[str, NDArr
         order += [n for n in numbers if n not in met]
     order = order[: max(1, round(share * len(order)))]
     kind = "whole" if share == 1.0 else "part"
-    standable = cv2.erode((solid == 0).astype(np.uint8), np.ones((7, 7), np.uint8)) * (rooms > 0)
-    rows, columns = np.nonzero(standable)
+    away = cv2.erode((solid == 0).astype(np.uint8), np.ones((7, 7), np.uint8)) > 0
+    rows, columns = np.nonzero(away & (rooms > 0))
     place = np.argsort(rooms[rows, columns], kind="stable")
     rows, columns = rows[place], columns[place]
     bounds = np.searchsorted(rooms[rows, columns], [*order, *[n + 1 for n in order]])
@@ -193,7 +191,7 @@ def _sensed(rng: Generator, walled: WalledPlan, solid: Mask) -> tuple[str, NDArr
     return kind, gray
 
 
-def _damaged(rng: Generator, gray: NDArray[np.uint8], walled: WalledPlan) -> NDArray[np.uint8]:
+def _damaged(rng: Generator, gray: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """Gaps in walls, spots, unknown holes, and a second, shifted copy of a part of the walls."""
     gray = gray.copy()
     occupied = gray == OCCUPIED
@@ -205,7 +203,9 @@ def _damaged(rng: Generator, gray: NDArray[np.uint8], walled: WalledPlan) -> NDA
         for _ in range(rng.poisson(len(rows) * CELL_M / 25)):
             at = rng.integers(len(rows))
             half = between(rng, 0.05, 0.25)
-            part = gray[max(0, rows[at] - half) : rows[at] + half, max(0, columns[at] - half) : columns[at] + half]
+            part = gray[
+                max(0, rows[at] - half) : rows[at] + half, max(0, columns[at] - half) : columns[at] + half
+            ]
             part[part == OCCUPIED] = rng.choice([UNKNOWN, FREE])
     if chance(rng, 0.3):
         spots = rng.random(gray.shape) < rng.uniform(0, 0.002)
@@ -215,12 +215,11 @@ def _damaged(rng: Generator, gray: NDArray[np.uint8], walled: WalledPlan) -> NDA
         gray[spots] = UNKNOWN
     if chance(rng, 0.15):
         down, right = rng.integers(-4, 5, 2)
-        height, width = gray.shape
+        width = gray.shape[1]
         low = int(rng.integers(0, width // 2))
         again = np.roll(gray, (down, right), (0, 1))[:, low : low + width // 2] == OCCUPIED
         part = gray[:, low : low + width // 2]
         part[again & (part != OCCUPIED)] = OCCUPIED
-    del walled
     return gray
 
 
@@ -243,12 +242,9 @@ def _warped(
             y + np.float32(size) * np.sin(x / np.float32(length / 6) + np.float32(phase[0])),
             x + np.float32(size) * np.sin(y / np.float32(length / 6) + np.float32(phase[1])),
         )
-    y, x = y.astype(np.float32), x.astype(np.float32)
-    move = lambda image, fill: cv2.remap(  # noqa: E731
-        image, x, y, cv2.INTER_NEAREST, borderMode=cv2.BORDER_CONSTANT, borderValue=fill
-    )
-    labels = [move(image.astype(np.float32), 0).astype(np.int32) for image in (rooms, other)]
-    return labels[0], labels[1], move(gray, UNKNOWN)
+    from_x, from_y = x.astype(np.float32), y.astype(np.float32)
+    labels = [moved(image, from_x, from_y).astype(np.int32) for image in (rooms, other)]
+    return labels[0], labels[1], moved(gray, from_x, from_y, UNKNOWN).astype(np.uint8)
 
 
 def _known_window(gray: NDArray[np.uint8], rooms: Labels) -> tuple[slice, slice]:

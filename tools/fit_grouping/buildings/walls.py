@@ -108,9 +108,11 @@ def build_walls(rng: Generator, plan: Plan) -> WalledPlan:
     border[:, :-1] |= rooms[:, :-1] != rooms[:, 1:]
     border[:-1] |= rooms[:-1] != rooms[1:]
     thickness = max(2, cells(rng.choice([0.1, 0.1, 0.15, 0.2, 0.3])))
-    walls = cv2.dilate(border, np.ones((thickness, thickness), np.uint8))
-    outer = cv2.dilate((rooms == 0).astype(np.uint8), np.ones((2 * thickness + 1, 2 * thickness + 1), np.uint8))
-    inner_side = walls * outer
+    walls = cv2.dilate(border, np.ones((thickness, thickness), np.uint8)).astype(np.uint8)
+    outer = cv2.dilate(
+        (rooms == 0).astype(np.uint8), np.ones((2 * thickness + 1, 2 * thickness + 1), np.uint8)
+    )
+    inner_side = (walls * outer).astype(np.uint8)
     runs = border_runs(rooms)
     neighbors: dict[int, list[int]] = {int(n): [] for n in np.unique(rooms[rooms > 0])}
     root = {n: n for n in neighbors}
@@ -167,7 +169,7 @@ def build_walls(rng: Generator, plan: Plan) -> WalledPlan:
         root[find(root, a)] = find(root, b)
         neighbors[a].append(b)
         neighbors[b].append(a)
-    for (low_room, room), parts in runs.items():
+    for (low_room, _), parts in runs.items():
         if low_room == 0 and chance(rng, 0.04):
             run = max(parts, key=lambda r: r.length)
             if run.length > cells(1.6):
@@ -195,7 +197,7 @@ def _stubs(rng: Generator, walls: Mask, thickness: int, count: int) -> None:
 def _glass(rng: Generator, walls: Mask, outer_walls: Mask) -> Mask:
     """Stretches of wall that rays pass: windows mostly, panes of inner walls at times."""
     if chance(rng, 0.05):  # a front of glass
-        return outer_walls
+        return outer_walls.copy()
     glass = np.zeros_like(walls)
     for mask, mean, low_m, high_m in ((outer_walls, 2.0, 0.3, 1.5), (walls, 0.5, 0.3, 0.8)):
         rows, columns = np.nonzero(mask)
@@ -206,4 +208,4 @@ def _glass(rng: Generator, walls: Mask, outer_walls: Mask) -> Mask:
             half = between(rng, low_m / 2, high_m / 2)
             y, x = rows[at], columns[at]
             glass[max(0, y - half) : y + half, max(0, x - half) : x + half] = 1
-    return glass & walls
+    return (glass & walls).astype(np.uint8)
