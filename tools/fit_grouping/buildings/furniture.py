@@ -147,10 +147,34 @@ class Furnisher:
                 cv2.circle(drawn, spot, between(rng, 0.1, 0.6), 1, -1)
         if self.style == "home" and area_m2 > 8 and chance(rng, 0.5):  # a bed or a sofa
             self._box(drawn, 1.4, 2.2, at_wall=True)
+        if self.style in ("home", "dense") and area_m2 > 14:
+            self._living_room(drawn)
         if self.style == "office" and area_m2 > 9 and chance(rng, 0.4):
             self._rows(drawn, rng.uniform(0.6, 0.9), rng.uniform(1.3, 2.2))
         if self.style == "dense":
             self._noise(drawn, area_m2 / 6)
+
+    def _living_room(self, drawn: Mask) -> None:
+        """Sofas and islands in the middle, counters that stand out from a wall like a wall."""
+        rng = self.rng
+        height, width = drawn.shape
+        for _ in range(rng.poisson(1.2)):
+            long, deep = between(rng, 1.4, 3.0), between(rng, 0.6, 1.1)
+            if chance(rng, 0.5):
+                long, deep = deep, long
+            x, y = self._spot(drawn)
+            drawn[y : y + deep, x : x + long] = 1
+        for _ in range(rng.poisson(0.6)):
+            reach, deep = between(rng, 1.2, 3.0), between(rng, 0.5, 0.8)
+            side = rng.integers(4)
+            if side < 2:
+                y = int(rng.integers(max(1, height - deep)))
+                x = 0 if side == 0 else max(0, width - reach)
+                drawn[y : y + deep, x : x + reach] = 1
+            else:
+                x = int(rng.integers(max(1, width - deep)))
+                y = 0 if side == 2 else max(0, height - reach)
+                drawn[y : y + reach, x : x + deep] = 1
 
     def _spot(self, drawn: Mask) -> tuple[int, int]:
         return int(self.rng.integers(drawn.shape[1])), int(self.rng.integers(drawn.shape[0]))

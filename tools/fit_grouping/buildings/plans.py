@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 from skimage.measure import label
 
 from fit_grouping.buildings.raster import CELL_M, Generator, Labels, between, cells, chance
@@ -202,6 +203,46 @@ def chamfers(rng: Generator, plan: Plan, outer: float, inner: float) -> None:
         plan.rooms[inside & beyond] = int(plan.rooms.max()) + 1
 
 
+def unvisited(rng: Generator, plan: Plan, share: float) -> None:
+    """Leave out rooms that nobody has opened."""
+    for room in np.unique(plan.rooms[plan.rooms > 0]).tolist():
+        small = np.count_nonzero(plan.rooms == room) * CELL_M**2 < 12
+        if small and room not in plan.corridors and chance(rng, share):
+            plan.rooms[plan.rooms == room] = 0
+
+
+def alcoves(rng: Generator, plan: Plan, mean: float) -> None:
+    """Move parts of the borders of rooms: recesses, chimneys, built-in cupboards."""
+    for room in np.unique(plan.rooms[plan.rooms > 0]).tolist():
+        for _ in range(rng.poisson(mean)):
+            inside = plan.rooms == room
+            rim = inside & ~_shrunk(inside)
+            rows, columns = np.nonzero(rim)
+            if len(rows) == 0:
+                continue
+            at = int(rng.integers(len(rows)))
+            half, deep = between(rng, 0.3, 1.2), between(rng, 0.2, 0.7)
+            high, wide = (half, deep) if chance(rng, 0.5) else (deep, half)
+            part = np.s_[
+                max(0, rows[at] - high) : rows[at] + high, max(0, columns[at] - wide) : columns[at] + wide
+            ]
+            window = plan.rooms[part]
+            if chance(rng, 0.6):
+                window[(window != room) & (window > 0)] = room
+            else:
+                window[window == room] = 0
+
+
+def _shrunk(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Cells all of whose neighbors are in the mask too."""
+    inner = mask.copy()
+    inner[1:] &= mask[:-1]
+    inner[:-1] &= mask[1:]
+    inner[:, 1:] &= mask[:, :-1]
+    inner[:, :-1] &= mask[:, 1:]
+    return inner
+
+
 def united_rooms(rng: Generator, plan: Plan, probability: float) -> None:
     """Unite some pairs of neighbors to rooms of L and other shapes."""
     for axis in (0, 1):
@@ -217,7 +258,7 @@ def united_rooms(rng: Generator, plan: Plan, probability: float) -> None:
 
 def home(rng: Generator) -> Plan:
     """A flat or house: halved again and again, or rooms along a hallway with a living room at its end."""
-    plan = Plan.empty("home", between(rng, 7, 20), between(rng, 6, 15))
+    plan = Plan.empty("home", between(rng, 7, 24), between(rng, 7, 17))
     x0, y0, x1, y1 = plan.inner
     plan.open_fronts = rng.choice([0.05, 0.2, 0.35])
     if chance(rng, 0.45):
@@ -248,7 +289,9 @@ def home(rng: Generator) -> Plan:
         halved(rng, plan, rest, 12, 1.5)
     corner_rooms(rng, plan, 1.2, 0.9, 2.4)
     notches(rng, plan, 1.0)
-    united_rooms(rng, plan, 0.06)
+    united_rooms(rng, plan, rng.choice([0.03, 0.06, 0.15]))
+    unvisited(rng, plan, rng.choice([0.0, 0.1, 0.25]))
+    alcoves(rng, plan, rng.choice([0.0, 0.3, 0.8]))
     return plan
 
 

@@ -160,8 +160,8 @@ def _sensed(rng: Generator, walled: WalledPlan, solid: Mask) -> tuple[str, NDArr
     place = np.argsort(rooms[rows, columns], kind="stable")
     rows, columns = rows[place], columns[place]
     bounds = np.searchsorted(rooms[rows, columns], [*order, *[n + 1 for n in order]])
-    skip = rng.choice([0.0, 0.06, 0.3, 0.6])
-    """Rooms that are seen through their doors only."""
+    # Share of the rooms that are seen through their doors only.
+    skip = rng.choice([0.0, 0.06, 0.3, 0.6], p=[0.6, 0.3, 0.1, 0.0] if walled.plan.kind == "home" else None)
     views = []
     per_view_m2 = rng.uniform(6, 16)
     for low, high, room in zip(bounds[: len(order)], bounds[len(order) :], order, strict=True):
