@@ -13,9 +13,8 @@ from skimage.segmentation import watershed
 
 from rose2_logs.config.fields import number
 from rose2_logs.config.parameters import Parameters
-from rose2_logs.segmentation.floor_plan.faces import build_faces
-from rose2_logs.segmentation.floor_plan.rooms import label_faces
-from rose2_logs.segmentation.floor_plan.stage import _frame
+from rose2_logs.segmentation.floor_plan.faces import build_faces, label_faces
+from rose2_logs.segmentation.floor_plan.stage import frame_along
 from rose2_logs.segmentation.rose.clean_map import attached_cells, structure_score, supported_cells
 from rose2_logs.segmentation.rose.spectrum import angular_energy, compute_spectrum, dominant_directions
 from rose2_logs.segmentation.walls.stage import find_walls
@@ -81,7 +80,9 @@ def find_generous_structure(
     attached = attached_cells(clean, supported & (score >= low))
     walls = find_walls(supported, clean, attached, directions, resolution_m, pipeline.walls)
     direction = float(directions[0]) if len(directions) else 0.0
-    graph = build_faces(walls.lines.ends_m, _frame(free | walls.walls, direction, resolution_m))
+    margin = pipeline.floor_plan.frame_margin_m
+    frame = frame_along(free | walls.walls, direction, resolution_m, margin)
+    graph = build_faces(walls.lines.ends_m, frame)
     shape = (free.shape[0], free.shape[1])
     return Structure(direction, score, walls.walls, label_faces(graph, shape, resolution_m))
 
