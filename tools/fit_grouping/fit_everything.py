@@ -1,6 +1,6 @@
 """Remakes all that is fitted, step by step; a step whose file exists is not made again.
 
-    python tools/fit_grouping/fit_everything.py WORK --cases CASES [--buildings 5000]
+    python tools/fit_grouping/fit_everything.py WORK --cases CASES [--buildings 5000] [--tree-buildings 800]
         [--network-seconds 7200] [--fold-seconds 3600] [--seed 0]
 
 WORK holds the simulated maps, checkpoints, answers and samples, and in the end `borders.onnx`, `joins.npz`,
@@ -10,12 +10,10 @@ WORK holds the simulated maps, checkpoints, answers and samples, and in the end 
 from __future__ import annotations
 
 import argparse
-import pickle
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TypeVar
 
 import cv2
 import numpy as np
@@ -23,7 +21,7 @@ from numpy.typing import NDArray
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from fit_grouping.features import SHAPE_FEATURES
+from fit_grouping.features import REGION_FEATURES, SHAPE_FEATURES
 from fit_grouping.figures import figures_table
 from fit_grouping.fit_tree import (
     Example,
@@ -36,6 +34,7 @@ from fit_grouping.fit_tree import (
     scores_at,
 )
 from fit_grouping.joining import Samples, join_regions
+from fit_grouping.keeping import kept
 from fit_grouping.maps_with_truth import FOLDS, load_benchmark
 from fit_grouping.outside import fit_outside
 from fit_grouping.preparing import PreparedMap, answered, prepared_benchmark, prepared_simulated
@@ -43,13 +42,10 @@ from fit_grouping.strengths import BoostedTrees, JoinStrength, by_hand, write_tr
 
 HERE = Path(__file__).parent
 MAPS_PER_FILE = 400
-TREE_FILES = 2
-"""Files of simulated maps that the network does not see: the trees are fitted on its answers for them."""
 SIMULATED_WEIGHT = 0.15
 """Weight of a simulated map in the fit of the trees, beside 1 for a real building of one map."""
 ANSWER_WEIGHT = 1.0
 LEVELS = tuple(np.arange(-1.5, 1.51, 0.5).tolist())
-Made = TypeVar("Made")
 
 
 def run_tool(script: str, *arguments: object) -> None:
@@ -57,34 +53,23 @@ def run_tool(script: str, *arguments: object) -> None:
     subprocess.run([sys.executable, str(HERE / script), *map(str, arguments)], check=True)
 
 
-def kept(path: Path, make: Callable[[], Made]) -> Made:
-    """What a file keeps, or what is made and then kept there."""
-    if path.exists():
-        read: Made = pickle.loads(path.read_bytes())
-        return read
-    made = make()
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(pickle.dumps(made))
-    return made
-
-
-def make_buildings(work: Path, count: int, seed: int) -> None:
-    """Simulated maps for the network, and more for the trees."""
-    files = -(-count // MAPS_PER_FILE)
-    for number in range(files + TREE_FILES):
-        folder = work / ("buildings" if number < files else "tree_buildings")
-        path = folder / f"{number:03d}.npz"
-        if not path.exists():
-            first = seed * 1_000_000 + number * MAPS_PER_FILE + 1
-            run_tool("buildings/make_buildings.py", path, "--count", MAPS_PER_FILE, "--seed", first)
+def make_buildings(work: Path, count: int, tree_count: int, seed: int) -> None:
+    """Simulated maps for the network, and others for the trees: those are fitted on its answers for them."""
+    first = seed * 1_000_000 + 1
+    for folder, wanted in (("buildings", count), ("tree_buildings", tree_count)):
+        for number, done in enumerate(range(0, wanted, MAPS_PER_FILE)):
+            maps = min(MAPS_PER_FILE, wanted - done)
+            path = work / folder / f"{number:03d}.npz"
+            if not path.exists():
+                run_tool("buildings/make_buildings.py", path, "--count", maps, "--seed", first)
+            first += maps
 
 
 def train_networks(work: Path, cases: Path, seconds: float, fold_seconds: float, seed: int) -> None:
     """One network on simulated maps, from it one for each fold left out, and one on all maps."""
     common = ("--simulated", work / "buildings", "--keep", work / "rasters")
     base = work / "networks/simulated"
-    if not base.with_suffix(".pt").exists():
-        run_tool("train_network.py", base, *common, "--seconds", seconds, "--seed", seed)
+    run_tool("train_network.py", base, *common, "--seconds", seconds, "--seed", seed)
     real = (
         "--cases",
         cases,
@@ -97,8 +82,7 @@ def train_networks(work: Path, cases: Path, seconds: float, fold_seconds: float,
     )
     for fold in (*range(FOLDS), -2):  # no map is in fold -2: it leaves out nothing
         out = work / f"networks/{f'fold{fold}' if fold >= 0 else 'all'}"
-        if not out.with_suffix(".pt").exists():
-            run_tool("train_network.py", out, *common, *real, "--leave-out", fold, "--seed", seed)
+        run_tool("train_network.py", out, *common, *real, "--leave-out", fold, "--seed", seed)
 
 
 def samples_of(examples: Sequence[Example], parameters: TreeParameters, seed: int) -> list[list[Samples]]:
@@ -123,20 +107,19 @@ def main() -> None:
     parser.add_argument("work", type=Path)
     parser.add_argument("--cases", type=Path, required=True)
     parser.add_argument("--buildings", type=int, default=5000)
+    parser.add_argument("--tree-buildings", type=int, default=800)
     parser.add_argument("--network-seconds", type=float, default=7200.0)
     parser.add_argument("--fold-seconds", type=float, default=3600.0)
     parser.add_argument("--seed", type=int, default=0)
     arguments = parser.parse_args()
     cv2.setNumThreads(1)
     work, cases, seed = arguments.work, arguments.cases, arguments.seed
-    make_buildings(work, arguments.buildings, seed)
+    make_buildings(work, arguments.buildings, arguments.tree_buildings, seed)
     train_networks(work, cases, arguments.network_seconds, arguments.fold_seconds, seed)
-    maps = kept(
-        work / "maps.pkl", lambda: prepared_benchmark(load_benchmark(cases), work / "prepared/real.pkl")
-    )
+    maps = prepared_benchmark(load_benchmark(cases), work / "prepared/real.pkl")
     simulated: list[PreparedMap] = []
     for path in sorted((work / "tree_buildings").glob("*.npz")):
-        simulated += prepared_simulated(path, work / f"prepared/{path.stem}.pkl")
+        simulated += prepared_simulated(path, work / f"prepared/simulated_{path.stem}.pkl")
     networks = {fold: work / f"networks/fold{fold}.onnx" for fold in range(FOLDS)}
     all_maps = work / "networks/all.onnx"
     answers: list[NDArray[np.float32]] = kept(work / "answers.pkl", lambda: answered(maps, networks))
@@ -163,8 +146,6 @@ def main() -> None:
     write_trees(work / "joins.npz", final)
     strength = JoinStrength(final, ANSWER_WEIGHT)
     regions = [join_regions(e.graph, strength, 0.0).regions(len(e.graph.node_sums), 0.0) for e in real]
-    from fit_grouping.features import REGION_FEATURES
-
     write_trees(work / "outside.npz", fit_outside(real, regions, seed), REGION_FEATURES)
     (work / "borders.onnx").write_bytes(all_maps.read_bytes())
     print((work / "figures.md").read_text(encoding="utf-8"))

@@ -59,7 +59,6 @@ def examples_of(
     return [
         Example(one, one.graph(answer), simulated_weight if one.fold < 0 else counts[one.building] ** -0.5)
         for one, answer in zip(maps, answers, strict=True)
-        if len(one.tables[0]) > 1
     ]
 
 

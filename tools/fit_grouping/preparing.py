@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import pickle
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,6 +20,7 @@ from fit_grouping.atoms import (
 )
 from fit_grouping.buildings.make_buildings import read_maps
 from fit_grouping.buildings.raster import CELL_M
+from fit_grouping.keeping import kept
 from fit_grouping.maps_with_truth import TruthMap
 from fit_grouping.plan_rasters import PlanRaster
 from fit_grouping.regions import STRONG_SCORE, RegionGraph, build_graph
@@ -85,31 +85,21 @@ def prepare(one: TruthMap, parameters: AtomParameters, fold: int) -> PreparedMap
 
 def prepared_benchmark(maps: Iterable[TruthMap], keep: Path) -> list[PreparedMap]:
     """Prepare the maps of a benchmark, or read them from `keep`."""
-    return _kept(keep, (prepare(one, AtomParameters(), one.fold) for one in maps))
+    return kept(keep, lambda: [prepare(one, AtomParameters(), one.fold) for one in maps])
 
 
 def prepared_simulated(path: Path, keep: Path) -> list[PreparedMap]:
     """Prepare the simulated maps of a file, or read them from `keep`."""
 
-    def made() -> Iterator[PreparedMap]:
+    def made() -> list[PreparedMap]:
+        maps = []
         for number, sim in enumerate(read_maps(path)):
-            name = f"{path.stem}_{number}"
-            one = TruthMap(
-                f"simulated/{sim.kind}", name, name, CELL_M, sim.gray > 229, sim.gray < 90, sim.truths
-            )
-            yield prepare(one, AtomParameters(), -1)
+            name, free, occupied = f"{path.stem}_{number}", sim.gray > 229, sim.gray < 90
+            one = TruthMap(f"simulated/{sim.kind}", name, name, CELL_M, free, occupied, sim.truths)
+            maps.append(prepare(one, AtomParameters(), -1))
+        return maps
 
-    return _kept(keep, made())
-
-
-def _kept(path: Path, maps: Iterator[PreparedMap]) -> list[PreparedMap]:
-    if path.exists():
-        kept: list[PreparedMap] = pickle.loads(path.read_bytes())
-        return kept
-    made = list(maps)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(pickle.dumps(made))
-    return made
+    return kept(keep, made)
 
 
 def answered(maps: list[PreparedMap], network_of_fold: dict[int, Path]) -> list[NDArray[np.float32]]:

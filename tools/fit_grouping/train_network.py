@@ -3,8 +3,9 @@
     python tools/fit_grouping/train_network.py OUT --simulated DIR [--start CHECKPOINT]
         [--cases CASES --leave-out FOLD --real-share 0.5] --seconds 3600
 
-OUT.pt is the checkpoint (weights, their running mean, the optimizer's state, steps done), written every few
-minutes; a run whose OUT.pt exists goes on from it. OUT.onnx holds the running mean of the weights.
+OUT.pt is the checkpoint (weights, their running mean, the optimizer's state, steps and seconds done), written
+every few minutes; a run whose OUT.pt exists goes on from it until it has trained for that long all told.
+OUT.onnx holds the running mean of the weights.
 """
 
 from __future__ import annotations
@@ -12,12 +13,10 @@ from __future__ import annotations
 import argparse
 import copy
 import os
-import pickle
 import sys
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from pathlib import Path
-from typing import TypeVar
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 import cv2
@@ -30,11 +29,11 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from fit_grouping.atoms import AtomParameters, BoolArray, PlanFrame, find_generous_structure
 from fit_grouping.buildings.make_buildings import read_maps
 from fit_grouping.buildings.raster import CELL_M
+from fit_grouping.keeping import kept
 from fit_grouping.maps_with_truth import TruthMap, load_benchmark
 from fit_grouping.network import RoomNetwork, export_onnx
 from fit_grouping.plan_rasters import PlanRaster, random_crop
-
-Kept = TypeVar("Kept")
+from rose2_logs.system.files import replacing
 
 CROP_CELLS = 160
 BATCH = 6
@@ -48,6 +47,8 @@ MEAN_DECAY = 0.998
 GRADIENT_MAX = 1.0
 CHECKPOINT_EVERY_S = 240.0
 PLAN_CELL_M = 0.1
+HELD_OUT_MAX, HELD_OUT_SHARE = 40, 0.1
+"""So many of the simulated maps, but no more than this share, are not trained on but watched."""
 VARIANTS = 3
 """Each real map is sampled so many times, at other scales and slightly other directions."""
 
@@ -60,7 +61,7 @@ def varied_frame(
     return PlanFrame.of(known, direction_rad + rng.normal(0, 0.012), resolution_m, PLAN_CELL_M * scale)
 
 
-def simulated_rasters(folder: Path, held_out: int, seed: int) -> tuple[list[PlanRaster], list[PlanRaster]]:
+def simulated_rasters(folder: Path, seed: int) -> tuple[list[PlanRaster], list[PlanRaster]]:
     """Simulated maps of all files of a folder for training, and the last ones for watching it."""
     rng = np.random.default_rng(seed)
     rasters = []
@@ -70,19 +71,8 @@ def simulated_rasters(folder: Path, held_out: int, seed: int) -> tuple[list[Plan
             frame = varied_frame(rng, free | occupied, 0.0, CELL_M)
             rasters.append(PlanRaster.of(free, occupied, frame, made.truths))
     rasters = [r for r in rasters if r.truths[0].any()]
+    held_out = max(1, min(HELD_OUT_MAX, int(HELD_OUT_SHARE * len(rasters))))
     return rasters[:-held_out], rasters[-held_out:]
-
-
-def kept(path: Path | None, make: Callable[[], Kept]) -> Kept:
-    """What a file keeps, or what is made and then kept there."""
-    if path and path.exists():
-        read: Kept = pickle.loads(path.read_bytes())
-        return read
-    made = make()
-    if path:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(pickle.dumps(made))
-    return made
 
 
 def real_rasters(maps: Iterable[TruthMap], seed: int, variants: int) -> dict[str, list[PlanRaster]]:
@@ -156,7 +146,7 @@ def main() -> None:
     torch.manual_seed(arguments.seed)
     network = RoomNetwork()
     optimizer = torch.optim.AdamW(network.parameters(), arguments.learning_rate, weight_decay=WEIGHT_DECAY)
-    steps = 0
+    steps, before = 0, 0.0
     checkpoint = arguments.out.with_suffix(".pt")
     mean = copy.deepcopy(network).eval()
     if checkpoint.exists():
@@ -164,14 +154,16 @@ def main() -> None:
         network.load_state_dict(state["network"])
         mean.load_state_dict(state["mean"])
         optimizer.load_state_dict(state["optimizer"])
-        steps = state["steps"]
+        steps, before = state["steps"], state.get("seconds", 0.0)
+        if before >= arguments.seconds:
+            return
     elif arguments.start:
         state = torch.load(arguments.start)
         network.load_state_dict(state["mean"])
         mean.load_state_dict(state["mean"])
     keep: Path | None = arguments.keep
     simulated, held_out = kept(
-        keep and keep / "simulated.pkl", lambda: simulated_rasters(arguments.simulated, 40, arguments.seed)
+        keep and keep / "simulated.pkl", lambda: simulated_rasters(arguments.simulated, arguments.seed)
     )
     real: dict[str, list[PlanRaster]] = {}
     watched = {"simulated": held_out}
@@ -189,7 +181,8 @@ def main() -> None:
         if rasters
     }
     print(f"{len(simulated)} simulated maps, {len(real)} real buildings, from step {steps}", flush=True)
-    start, last, losses = time.monotonic(), time.monotonic(), []
+    last = time.monotonic()
+    start, losses = last - before, []
     while (now := time.monotonic()) - start < arguments.seconds:
         rate = arguments.learning_rate * min(1.0, (steps + 1) / WARM_UP_STEPS) / (1 + steps / HALF_LIFE_STEPS)
         for group in optimizer.param_groups:
@@ -217,24 +210,30 @@ def main() -> None:
             told = ", ".join(f"{name} {value:.3f}" for name, value in seen.items())
             print(f"{now - start:6.0f} s {steps:6d} steps: loss {np.mean(losses):.3f}, {told}", flush=True)
             losses.clear()
-            _save(checkpoint, network, mean, optimizer, steps)
-    _save(checkpoint, network, mean, optimizer, steps)
+            _save(checkpoint, network, mean, optimizer, steps, time.monotonic() - start)
+    _save(checkpoint, network, mean, optimizer, steps, time.monotonic() - start)
 
 
 def _save(
-    path: Path, network: RoomNetwork, mean: RoomNetwork, optimizer: torch.optim.Optimizer, steps: int
+    path: Path,
+    network: RoomNetwork,
+    mean: RoomNetwork,
+    optimizer: torch.optim.Optimizer,
+    steps: int,
+    seconds: float,
 ) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
     state = {
         "network": network.state_dict(),
         "mean": mean.state_dict(),
         "optimizer": optimizer.state_dict(),
         "steps": steps,
+        "seconds": seconds,
     }
-    unfinished = path.with_suffix(".part")
-    torch.save(state, unfinished)
-    unfinished.replace(path)
-    export_onnx(mean, path.with_suffix(".onnx"))
+    # The network first: where there is a checkpoint, there is the network that belongs to it or a later one.
+    with replacing(path.with_suffix(".onnx")) as part:
+        export_onnx(mean, part)
+    with replacing(path) as part:
+        torch.save(state, part)
 
 
 if __name__ == "__main__":

@@ -22,6 +22,7 @@ from fit_grouping.buildings.furniture import STYLES, Furnisher
 from fit_grouping.buildings.plans import make_plan
 from fit_grouping.buildings.sensing import SimulatedMap, make_map
 from fit_grouping.buildings.walls import build_walls
+from rose2_logs.system.files import replacing
 
 FURNISHING = {
     "home": ([0.12, 0.08, 0.6, 0.0, 0.2]),
@@ -57,8 +58,8 @@ def write_maps(path: Path, maps: list[SimulatedMap]) -> None:
         for which, truth in enumerate(made.truths):
             arrays[f"rooms_{number}_{which}"] = truth.astype(np.uint16)
     arrays["kinds"] = np.array([made.kind for made in maps])
-    path.parent.mkdir(parents=True, exist_ok=True)
-    np.savez_compressed(path, **arrays)  # type: ignore[arg-type]
+    with replacing(path) as part, part.open("wb") as file:
+        np.savez_compressed(file, **arrays)  # type: ignore[arg-type]
 
 
 def read_maps(path: Path) -> Iterator[SimulatedMap]:
