@@ -1,7 +1,15 @@
 """The fit of border strengths: atoms, graph of regions, joins, trees, simulated buildings."""
 
+import json
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
+from PIL import Image
+
+TOOL = Path(__file__).parents[2] / "tools/fit_grouping/fit_everything.py"
 
 
 @pytest.fixture(scope="module")
@@ -139,6 +147,43 @@ def test_trees_as_arrays_answer_as_the_fitted_model():
     np.testing.assert_allclose(trees(features), expected, atol=1e-6)
 
 
+def test_trees_of_one_kind_of_decision_are_refused():
+    from fit_grouping.strengths import BoostedTrees
+    from sklearn.ensemble import HistGradientBoostingClassifier
+
+    features = np.random.default_rng(0).normal(size=(50, 3))
+    model = HistGradientBoostingClassifier(max_iter=2).fit(features, np.ones(50, bool))
+    with pytest.raises(ValueError, match="one kind"):
+        BoostedTrees.of(model, np.arange(3))
+
+
+def test_rule_fitted_without_anything_outside_keeps_every_room(prepared):
+    from fit_grouping.features import region_features
+    from fit_grouping.fit_tree import examples_of
+    from fit_grouping.outside import SURE_LOG_ODDS, fit_outside
+
+    (example,) = examples_of([prepared], [None])
+    rooms = prepared.tables[0][1:].argmax(1) > 1
+    rule = fit_outside([example], [rooms.astype(np.int64)], 0)
+    np.testing.assert_array_equal(rule(region_features(example.graph)), SURE_LOG_ODDS)
+
+
+def test_maps_without_free_floor_have_no_rooms():
+    from fit_grouping.atoms import AtomParameters
+    from fit_grouping.fit_tree import examples_of, scores_at
+    from fit_grouping.maps_with_truth import TruthMap
+    from fit_grouping.preparing import prepare
+    from fit_grouping.strengths import by_hand
+
+    occupied = np.zeros((40, 60), bool)
+    occupied[20] = True
+    nothing = np.zeros(occupied.shape, bool)
+    one = TruthMap("drawn", "wall", "wall", 0.05, nothing, occupied, (nothing.astype(np.int32),))
+    map_without_floor = prepare(one, AtomParameters(), 0)
+    examples = examples_of([map_without_floor], [None])
+    assert scores_at(examples, [by_hand], [0.0]).tolist() == [[0.0]]
+
+
 def test_strength_weighs_trees_and_answers():
     from fit_grouping.features import FEATURES
     from fit_grouping.strengths import DIFFERENT, JoinStrength
@@ -211,3 +256,34 @@ def test_network_answers_the_same_from_its_file(tmp_path, prepared):
     assert answers.shape == (OUTPUTS, *prepared.raster.wall.shape)
     assert (answers >= 0).all()
     assert (answers <= 1).all()
+
+
+def test_everything_is_fitted_by_one_command(tmp_path):
+    """A tiny run: three maps in three folds, trained on for a second."""
+    pytest.importorskip("torch", reason="the network is trained with torch, which is not installed")
+    from fit_grouping.buildings.make_buildings import simulate
+    from fit_grouping.features import REGION_FEATURES
+    from fit_grouping.strengths import read_trees
+
+    cases = []
+    for number, seed in enumerate((2, 3, 8)):
+        one = simulate(seed)
+        name = f"home_{2 * number}"
+        Image.fromarray(np.flipud(one.gray)).save(tmp_path / f"{name}.png")
+        Image.fromarray(np.flipud(one.truths[0]).astype(np.uint8)).save(tmp_path / f"{name}.rooms.png")
+        images = {"map": f"{name}.png", "rooms": f"{name}.rooms.png"}
+        cases.append({"group": "homes", "name": name, "resolution_m": 0.05, **images})
+    (tmp_path / "cases.json").write_text(json.dumps({"cases": cases}), encoding="utf-8")
+    work = tmp_path / "work"
+    command = [sys.executable, TOOL, work, "--cases", tmp_path / "cases.json", "--buildings", "4"]
+    command += ["--tree-buildings", "2", "--network-seconds", "1", "--fold-seconds", "1", "--trees", "8"]
+    subprocess.run(command, check=True)
+    figures = (work / "figures.md").read_text(encoding="utf-8")
+    assert "| sum |" in figures
+    assert (work / "borders.onnx").stat().st_size > 0
+    assert len(read_trees(work / "joins.npz").feature) == 8
+    read_trees(work / "outside.npz", REGION_FEATURES)
+    made = {path: path.stat().st_mtime_ns for path in (work / "networks").iterdir()}
+    subprocess.run(command, check=True)
+    assert {path: path.stat().st_mtime_ns for path in (work / "networks").iterdir()} == made
+    assert (work / "figures.md").read_text(encoding="utf-8") == figures

@@ -1,7 +1,7 @@
 """Remakes all that is fitted, step by step; a step whose file exists is not made again.
 
     python tools/fit_grouping/fit_everything.py WORK --cases CASES [--buildings 5000] [--tree-buildings 800]
-        [--network-seconds 7200] [--fold-seconds 3600] [--seed 0]
+        [--network-seconds 7200] [--fold-seconds 3600] [--trees 250] [--seed 0]
 
 WORK holds the simulated maps, checkpoints, answers and samples, and in the end `borders.onnx`, `joins.npz`,
 `outside.npz` (fitted on all maps), and `figures.md` (with the building left out).
@@ -33,11 +33,12 @@ from fit_grouping.fit_tree import (
     left_out_scores,
     scores_at,
 )
-from fit_grouping.joining import Samples, join_regions
+from fit_grouping.joining import Samples, Strength, join_regions
 from fit_grouping.keeping import kept
 from fit_grouping.maps_with_truth import FOLDS, load_benchmark
-from fit_grouping.outside import fit_outside
+from fit_grouping.outside import fit_outside, rooms_of
 from fit_grouping.preparing import PreparedMap, answered, prepared_benchmark, prepared_simulated
+from fit_grouping.scores import best_iou_sym
 from fit_grouping.strengths import BoostedTrees, JoinStrength, by_hand, write_trees
 
 HERE = Path(__file__).parent
@@ -101,6 +102,11 @@ def fit_on(parts: Sequence[Sequence[Samples]], parameters: TreeParameters, seed:
     return fit_trees(samples, columns_of(SHAPE_FEATURES), parameters, seed)
 
 
+def regions_of(examples: Sequence[Example], strength: Strength) -> list[NDArray[np.int64]]:
+    """Region of each atom of each map, joined as long as that is more likely right than wrong."""
+    return [join_regions(e.graph, strength, 0.0).regions(len(e.graph.node_sums), 0.0) for e in examples]
+
+
 def main() -> None:
     """Make, train, fit, measure."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -110,6 +116,7 @@ def main() -> None:
     parser.add_argument("--tree-buildings", type=int, default=800)
     parser.add_argument("--network-seconds", type=float, default=7200.0)
     parser.add_argument("--fold-seconds", type=float, default=3600.0)
+    parser.add_argument("--trees", type=int, default=250)
     parser.add_argument("--seed", type=int, default=0)
     arguments = parser.parse_args()
     cv2.setNumThreads(1)
@@ -124,7 +131,7 @@ def main() -> None:
     all_maps = work / "networks/all.onnx"
     answers: list[NDArray[np.float32]] = kept(work / "answers.pkl", lambda: answered(maps, networks))
     simulated_answers = kept(work / "tree_answers.pkl", lambda: answered(simulated, {-1: all_maps}))
-    parameters = TreeParameters(trees=250, leaves=16)
+    parameters = TreeParameters(trees=arguments.trees, leaves=16)
     real = examples_of(maps, answers)
     made = examples_of(simulated, simulated_answers, SIMULATED_WEIGHT)
     parts = kept(work / "samples.pkl", lambda: samples_of(real, parameters, seed))
@@ -141,11 +148,18 @@ def main() -> None:
         ("sum", [JoinStrength(trees[f], ANSWER_WEIGHT) for f in fold_of]),
     ):
         rows[name], _ = left_out_scores(maps, scores_at(real, strengths, LEVELS))
+    rows["sum, rule for outside"] = np.zeros(len(maps))
+    for fold in range(FOLDS):
+        regions = regions_of(real, JoinStrength(trees[fold], ANSWER_WEIGHT))
+        others = np.flatnonzero(fold_of != fold).tolist()
+        rule = fit_outside([real[k] for k in others], [regions[k] for k in others], seed)
+        for k in np.flatnonzero(fold_of == fold).tolist():
+            rooms = rooms_of(real[k], regions[k], rule, 0.0)
+            rows["sum, rule for outside"][k] = best_iou_sym(maps[k].tables, rooms)
     (work / "figures.md").write_text(figures_table(maps, rows) + "\n", encoding="utf-8")
     final = fit_on(parts + made_parts, parameters, seed)
     write_trees(work / "joins.npz", final)
-    strength = JoinStrength(final, ANSWER_WEIGHT)
-    regions = [join_regions(e.graph, strength, 0.0).regions(len(e.graph.node_sums), 0.0) for e in real]
+    regions = regions_of(real, JoinStrength(final, ANSWER_WEIGHT))
     write_trees(work / "outside.npz", fit_outside(real, regions, seed), REGION_FEATURES)
     (work / "borders.onnx").write_bytes(all_maps.read_bytes())
     print((work / "figures.md").read_text(encoding="utf-8"))

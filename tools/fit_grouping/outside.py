@@ -16,6 +16,8 @@ from fit_grouping.strengths import BoostedTrees
 FloatArray = NDArray[np.float64]
 
 TREES, LEAVES, LEAST_SAMPLES = 60, 6, 40
+SURE_LOG_ODDS = 5.0
+"""Answer of a rule that was fitted on maps without anything outside."""
 ALL_OUTSIDE_SHARE = 0.8
 """Where more than this share of the map would be outside, the answer is not believed."""
 
@@ -39,6 +41,8 @@ def fit_outside(examples: Sequence[Example], regions: Sequence[NDArray[np.int64]
     """Log odds that a region is a room, from the final regions of maps."""
     parts = [region_samples(e, r) for e, r in zip(examples, regions, strict=True)]
     features, room, weight = (np.concatenate(p) for p in zip(*parts, strict=True))
+    if room.all():
+        return BoostedTrees.constant(SURE_LOG_ODDS)
     model = HistGradientBoostingClassifier(
         max_iter=TREES, learning_rate=0.08, max_leaf_nodes=LEAVES, min_samples_leaf=LEAST_SAMPLES,
         l2_regularization=5.0, early_stopping=False, random_state=seed,

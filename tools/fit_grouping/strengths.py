@@ -56,8 +56,22 @@ class BoostedTrees:
         return total
 
     @classmethod
+    def constant(cls, log_odds: float) -> BoostedTrees:
+        """One tree of one leaf: the same answer to everything."""
+        leaf = np.zeros((1, 1), np.intp)
+        return cls(leaf, np.full((1, 1), np.inf), leaf, leaf, np.zeros((1, 1)), log_odds, 0)
+
+    @classmethod
     def of(cls, model: Any, columns: NDArray[np.intp]) -> BoostedTrees:
-        """Take the trees of scikit-learn's histogram gradient boosting, fitted on some of the features."""
+        """Take the trees of scikit-learn's histogram gradient boosting, fitted on some of the features.
+
+        Raises
+        ------
+        ValueError
+            If all that they were fitted on was right, or all wrong: there is nothing to tell apart.
+        """
+        if len(model.classes_) != 2:
+            raise ValueError(f"all decisions were of one kind ({model.classes_[0]})")
         trees = [predictors[0].nodes for predictors in model._predictors]
         size = max(len(nodes) for nodes in trees)
         feature = np.zeros((len(trees), size), np.intp)
