@@ -200,8 +200,8 @@ def main() -> None:
             for slow, new in zip(mean.state_dict().values(), network.state_dict().values(), strict=True):
                 if slow.dtype.is_floating_point:
                     slow.lerp_(new, 1 - decay)
-        if now - last > CHECKPOINT_EVERY_S or now - start + 1 > arguments.seconds:
-            last = now
+        due = now - last > CHECKPOINT_EVERY_S
+        if due or now - start + 1 > arguments.seconds:
             mean.eval()
             with torch.no_grad():
                 seen = {
@@ -210,6 +210,8 @@ def main() -> None:
             told = ", ".join(f"{name} {value:.3f}" for name, value in seen.items())
             print(f"{now - start:6.0f} s {steps:6d} steps: loss {np.mean(losses):.3f}, {told}", flush=True)
             losses.clear()
+        if due:
+            last = now
             _save(checkpoint, network, mean, optimizer, steps, time.monotonic() - start)
     _save(checkpoint, network, mean, optimizer, steps, time.monotonic() - start)
 
