@@ -181,9 +181,9 @@ def main() -> None:
         if rasters
     }
     print(f"{len(simulated)} simulated maps, {len(real)} real buildings, from step {steps}", flush=True)
-    last = time.monotonic()
-    start, losses = last - before, []
-    while (now := time.monotonic()) - start < arguments.seconds:
+    now = last = time.monotonic()
+    start, losses = now - before, []
+    while now - start < arguments.seconds:
         rate = arguments.learning_rate * min(1.0, (steps + 1) / WARM_UP_STEPS) / (1 + steps / HALF_LIFE_STEPS)
         for group in optimizer.param_groups:
             group["lr"] = rate
@@ -200,8 +200,9 @@ def main() -> None:
             for slow, new in zip(mean.state_dict().values(), network.state_dict().values(), strict=True):
                 if slow.dtype.is_floating_point:
                     slow.lerp_(new, 1 - decay)
-        due = now - last > CHECKPOINT_EVERY_S
-        if due or now - start + 1 > arguments.seconds:
+        now = time.monotonic()
+        if now - last > CHECKPOINT_EVERY_S or now - start >= arguments.seconds:
+            last = now
             mean.eval()
             with torch.no_grad():
                 seen = {
@@ -210,10 +211,7 @@ def main() -> None:
             told = ", ".join(f"{name} {value:.3f}" for name, value in seen.items())
             print(f"{now - start:6.0f} s {steps:6d} steps: loss {np.mean(losses):.3f}, {told}", flush=True)
             losses.clear()
-        if due:
-            last = now
-            _save(checkpoint, network, mean, optimizer, steps, time.monotonic() - start)
-    _save(checkpoint, network, mean, optimizer, steps, time.monotonic() - start)
+            _save(checkpoint, network, mean, optimizer, steps, now - start)
 
 
 def _save(
