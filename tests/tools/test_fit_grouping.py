@@ -1,6 +1,7 @@
 """The fit of border strengths: atoms, graph of regions, joins, trees, simulated buildings."""
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -277,13 +278,14 @@ def test_everything_is_fitted_by_one_command(tmp_path):
     work = tmp_path / "work"
     command = [sys.executable, TOOL, work, "--cases", tmp_path / "cases.json", "--buildings", "4"]
     command += ["--tree-buildings", "2", "--network-seconds", "1", "--fold-seconds", "1", "--trees", "8"]
-    subprocess.run(command, check=True)
+    one_thread = os.environ | {"OMP_NUM_THREADS": "1"}
+    subprocess.run(command, check=True, env=one_thread)
     figures = (work / "figures.md").read_text(encoding="utf-8")
     assert "| sum |" in figures
     assert (work / "borders.onnx").stat().st_size > 0
     assert len(read_trees(work / "joins.npz").feature) == 8
     read_trees(work / "outside.npz", REGION_FEATURES)
     made = {path: path.stat().st_mtime_ns for path in (work / "networks").iterdir()}
-    subprocess.run(command, check=True)
+    subprocess.run(command, check=True, env=one_thread)
     assert {path: path.stat().st_mtime_ns for path in (work / "networks").iterdir()} == made
     assert (work / "figures.md").read_text(encoding="utf-8") == figures
