@@ -58,7 +58,9 @@ def make_floor_plan(
     The plane is cut within a box along `direction_rad`, the strongest dominant direction: what lies beyond
     counts as unseen, so that a box along the axes of the raster would give other rooms to a turned map.
     """
-    graph = build_faces(lines_m, _frame(free | walls, direction_rad, resolution_m, parameters.frame_margin_m))
+    graph = build_faces(
+        lines_m, frame_along(free | walls, direction_rad, resolution_m, parameters.frame_margin_m)
+    )
     count = len(graph.polygons)
     evidence = edge_evidence(graph.edges_m, lines_m, walls, free, resolution_m, parameters)
     face_of_cell = label_faces(graph, (free.shape[0], free.shape[1]), resolution_m)
@@ -74,8 +76,22 @@ def make_floor_plan(
     return FloorPlanResult(graph, evidence, seen, group, labels)
 
 
-def _frame(known: BoolArray, direction_rad: float, resolution_m: float, margin_m: float) -> shapely.Polygon:
-    """Box around the known cells along a direction, with a margin: it turns with the map."""
+def frame_along(
+    known: BoolArray, direction_rad: float, resolution_m: float, margin_m: float
+) -> shapely.Polygon:
+    """Box around the known cells along a direction, with a margin: it turns with the map.
+
+    Parameters
+    ----------
+    known : (H, W) bool
+        Where there is none, the box is that of the raster, without a margin.
+    direction_rad, resolution_m, margin_m : float
+
+    Returns
+    -------
+    shapely Polygon
+        Meters, grid frame.
+    """
     rows = np.flatnonzero(known.any(1))
     if len(rows) == 0:
         return shapely.box(0, 0, known.shape[1] * resolution_m, known.shape[0] * resolution_m)

@@ -1,0 +1,291 @@
+"""The fit of border strengths: atoms, graph of regions, joins, trees, simulated buildings."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+TOOL = Path(__file__).parents[2] / "tools/fit_grouping/fit_everything.py"
+
+
+@pytest.fixture(scope="module")
+def two_rooms():
+    """Two rooms of 5 m x 4 m with a door of 0.9 m, 5 cm a cell; free, occupied, true rooms."""
+    occupied = np.ones((86, 206), bool)
+    occupied[3:83, 3:101] = False
+    occupied[3:83, 105:203] = False
+    occupied[30:48, 101:105] = False
+    truth = np.zeros(occupied.shape, np.int32)
+    truth[:, :103], truth[:, 103:] = 1, 2
+    truth[occupied] = 0
+    return ~occupied, occupied, truth
+
+
+@pytest.fixture(scope="module")
+def prepared(two_rooms):
+    from fit_grouping.atoms import AtomParameters
+    from fit_grouping.maps_with_truth import TruthMap
+    from fit_grouping.preparing import prepare
+
+    free, occupied, truth = two_rooms
+    one = TruthMap("drawn", "two rooms", "two rooms", 0.05, free, occupied, (truth,))
+    return prepare(one, AtomParameters(), 0)
+
+
+def answers_of(prepared):
+    from fit_grouping.plan_rasters import OUTPUTS
+
+    rng = np.random.default_rng(0)
+    return rng.random((OUTPUTS, *prepared.atoms.shape)).astype(np.float32)
+
+
+def test_atoms_of_two_rooms_do_not_cross_the_wall(prepared):
+    from fit_grouping.scores import upper_bound
+
+    assert len(prepared.tables[0]) > 2
+    assert upper_bound(prepared.tables) > 98
+
+
+def test_small_pieces_go_to_the_neighbor_that_they_touch_most():
+    from fit_grouping.atoms import absorb_small
+
+    pieces = np.zeros((10, 30), np.int32)
+    pieces[:, :14], pieces[:, 15:29], pieces[:6, 14], pieces[9, 29] = 1, 2, 3, 4
+    pieces[6:, 14] = 2
+    absorbed = absorb_small(pieces, 20)
+    assert set(np.unique(absorbed)) == {1, 2} or set(np.unique(absorbed)) == {0, 1, 2}
+    assert absorbed[0, 14] > 0
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.4, -1.2])
+def test_plan_frame_keeps_areas_and_leads_back(angle):
+    from fit_grouping.atoms import PlanFrame
+
+    mask = np.zeros((120, 160), bool)
+    mask[20:100, 30:140] = True
+    frame = PlanFrame.of(mask, angle, 0.05, 0.1)
+    share = frame.share(mask)
+    assert share.sum() * 0.01 == pytest.approx(mask.sum() * 0.0025, rel=0.01)
+    labels = frame.sampled(mask.astype(np.int32) * 7)
+    back = frame.back(labels, mask.shape)
+    assert np.mean((back == 7) == mask) > 0.97
+
+
+def test_sums_of_joined_regions_are_those_of_the_joined_atoms(prepared):
+    """Whatever is joined, the graph is the one that is built from the joined regions."""
+    from fit_grouping.regions import build_graph
+
+    answers = answers_of(prepared)
+    count = len(prepared.tables[0]) - 1
+    graph = prepared.graph(answers)
+    root = np.random.default_rng(1).integers(0, max(count // 2, 1), count)
+    root = np.unique(root, return_inverse=True)[1]
+    joined, border = graph.joined(root)
+    relabeled = np.concatenate([[0], root + 1])[prepared.atoms].astype(np.int32)
+    again = build_graph(
+        relabeled, prepared.raster, prepared.strong, prepared.faces, answers, prepared.cell_m, root.max() + 1
+    )
+    assert np.array_equal(joined.ends, again.ends)
+    np.testing.assert_allclose(joined.node_sums, again.node_sums, atol=1e-4)
+    np.testing.assert_allclose(joined.node_maxima, again.node_maxima, atol=1e-4)
+    np.testing.assert_allclose(joined.border_sums, again.border_sums, atol=1e-4)
+    np.testing.assert_allclose(joined.border_maxima, again.border_maxima, atol=1e-4)
+    assert set(border[border >= 0]) == set(range(len(joined.ends)))
+
+
+def test_features_are_finite(prepared):
+    from fit_grouping.features import FEATURES, join_features, joinable
+
+    graph = prepared.graph(answers_of(prepared))
+    which = np.flatnonzero(joinable(graph))
+    features = join_features(graph, which)
+    assert features.shape == (len(which), len(FEATURES))
+    assert np.isfinite(features).all()
+
+
+def test_a_lower_level_joins_more(prepared):
+    from fit_grouping.joining import join_regions
+    from fit_grouping.strengths import by_hand
+
+    graph = prepared.graph(None)
+    joins = join_regions(graph, by_hand)
+    counts = [joins.regions(len(graph.node_sums), level).max() + 1 for level in (-9, -1, 0, 1, 9)]
+    assert counts == sorted(counts)
+    assert counts[0] == 1
+
+
+def test_samples_join_only_what_is_one_room(prepared):
+    from fit_grouping.joining import sample_joins
+    from fit_grouping.strengths import by_hand
+
+    graph = prepared.graph(None)
+    samples = sample_joins(graph, tuple(t[1:] for t in prepared.tables), by_hand, 0.0, 0)
+    atoms = len(graph.node_sums)
+    rooms = len(set(prepared.tables[0][1:].argmax(1)))
+    assert samples.right.sum() == atoms - rooms
+    assert (~samples.right).sum() >= 1
+    assert (samples.weight > 0).all()
+
+
+def test_trees_as_arrays_answer_as_the_fitted_model():
+    from fit_grouping.features import FEATURES
+    from fit_grouping.strengths import BoostedTrees
+    from sklearn.ensemble import HistGradientBoostingClassifier
+
+    rng = np.random.default_rng(0)
+    features = rng.normal(size=(900, len(FEATURES)))
+    right = features[:, 3] + features[:, 5] ** 2 > 1
+    columns = np.array([3, 5, 7])
+    model = HistGradientBoostingClassifier(max_iter=9, max_leaf_nodes=6, random_state=0)
+    model.fit(features[:, columns], right)
+    trees = BoostedTrees.of(model, columns)
+    expected = model.decision_function(features[:, columns])
+    np.testing.assert_allclose(trees(features), expected, atol=1e-6)
+
+
+def test_trees_of_one_kind_of_decision_are_refused():
+    from fit_grouping.strengths import BoostedTrees
+    from sklearn.ensemble import HistGradientBoostingClassifier
+
+    features = np.random.default_rng(0).normal(size=(50, 3))
+    model = HistGradientBoostingClassifier(max_iter=2).fit(features, np.ones(50, bool))
+    with pytest.raises(ValueError, match="one kind"):
+        BoostedTrees.of(model, np.arange(3))
+
+
+def test_rule_fitted_without_anything_outside_keeps_every_room(prepared):
+    from fit_grouping.features import region_features
+    from fit_grouping.fit_tree import examples_of
+    from fit_grouping.outside import SURE_LOG_ODDS, fit_outside
+
+    (example,) = examples_of([prepared], [None])
+    rooms = prepared.tables[0][1:].argmax(1) > 1
+    rule = fit_outside([example], [rooms.astype(np.int64)], 0)
+    np.testing.assert_array_equal(rule(region_features(example.graph)), SURE_LOG_ODDS)
+
+
+def test_maps_without_free_floor_have_no_rooms():
+    from fit_grouping.atoms import AtomParameters
+    from fit_grouping.fit_tree import examples_of, scores_at
+    from fit_grouping.maps_with_truth import TruthMap
+    from fit_grouping.preparing import prepare
+    from fit_grouping.strengths import by_hand
+
+    occupied = np.zeros((40, 60), bool)
+    occupied[20] = True
+    nothing = np.zeros(occupied.shape, bool)
+    one = TruthMap("drawn", "wall", "wall", 0.05, nothing, occupied, (nothing.astype(np.int32),))
+    map_without_floor = prepare(one, AtomParameters(), 0)
+    examples = examples_of([map_without_floor], [None])
+    assert scores_at(examples, [by_hand], [0.0]).tolist() == [[0.0]]
+
+
+def test_strength_weighs_trees_and_answers():
+    from fit_grouping.features import FEATURES
+    from fit_grouping.strengths import DIFFERENT, JoinStrength
+
+    features = np.zeros((3, len(FEATURES)))
+    features[:, DIFFERENT] = [0.0, 1.0, -1.0]
+    strength = JoinStrength(None, answer_weight=1.0, answer_scale=12.0, offset=1.0)
+    np.testing.assert_allclose(strength(features), [5.0, -7.0, -7.0])
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_simulated_maps_are_the_same_for_the_same_seed(seed):
+    from fit_grouping.buildings.make_buildings import simulate
+
+    one, again = simulate(seed), simulate(seed)
+    assert np.array_equal(one.gray, again.gray)
+    for truth in one.truths:
+        assert truth.shape == one.gray.shape
+        assert (one.gray[truth > 0] == 254).all()
+        assert set(np.unique(truth[truth > 0])) == set(range(1, truth.max() + 1))
+
+
+def test_simulated_maps_come_back_from_their_file(tmp_path):
+    from fit_grouping.buildings.make_buildings import read_maps, simulate, write_maps
+
+    maps = [simulate(3), simulate(4)]
+    write_maps(tmp_path / "maps.npz", maps)
+    for one, read in zip(maps, read_maps(tmp_path / "maps.npz"), strict=True):
+        assert one.kind == read.kind
+        assert np.array_equal(one.gray, read.gray)
+        assert all(np.array_equal(a, b) for a, b in zip(one.truths, read.truths, strict=True))
+
+
+def test_targets_ask_about_pairs_of_rooms_only_where_truths_agree():
+    from fit_grouping.plan_rasters import OFFSETS, network_targets
+
+    first = np.zeros((40, 40), np.int32)
+    first[5:35, 5:20], first[5:35, 20:35] = 1, 2
+    united = np.where(first > 0, 1, 0).astype(np.int32)
+    valid = np.ones(first.shape, bool)
+    targets, weights = network_targets(valid, [first])
+    level = OFFSETS.index((0, 2))
+    assert targets[level, 10, 21] == 1
+    assert targets[level, 10, 15] == 0
+    assert weights[level, 10, 21] > weights[level, 10, 15] > 0
+    assert targets[-1, 0, 0] == 1
+    _, weights = network_targets(valid, [first, united])
+    assert weights[level, 10, 21] == 0
+    assert weights[level, 10, 15] > 0
+
+
+def test_score_of_a_grouping_is_that_of_its_label_image(two_rooms, prepared):
+    from fit_grouping.scores import best_iou_sym, iou_sym, perfect_grouping, upper_bound
+
+    grouping = perfect_grouping(prepared.tables[0])
+    assert best_iou_sym(prepared.tables, grouping) == upper_bound(prepared.tables)
+    assert iou_sym(np.array([[0.0, 0, 0], [0, 8, 0], [0, 0, 8]])) == 100
+
+
+def test_network_answers_the_same_from_its_file(tmp_path, prepared):
+    torch = pytest.importorskip("torch")
+    from fit_grouping.answers import AnsweringNetwork
+    from fit_grouping.network import RoomNetwork, export_onnx
+    from fit_grouping.plan_rasters import OUTPUTS
+
+    torch.manual_seed(0)
+    network = RoomNetwork((4, 6, 8, 8, 8)).eval()
+    export_onnx(network, tmp_path / "n.onnx")
+    answers = AnsweringNetwork(tmp_path / "n.onnx")(prepared.raster)
+    assert answers.shape == (OUTPUTS, *prepared.raster.wall.shape)
+    assert (answers >= 0).all()
+    assert (answers <= 1).all()
+
+
+def test_everything_is_fitted_by_one_command(tmp_path):
+    """A tiny run: three maps in three folds, trained on for a second."""
+    pytest.importorskip("torch", reason="the network is trained with torch, which is not installed")
+    from fit_grouping.buildings.make_buildings import simulate
+    from fit_grouping.features import REGION_FEATURES
+    from fit_grouping.strengths import read_trees
+
+    cases = []
+    for number, seed in enumerate((2, 3, 8)):
+        one = simulate(seed)
+        name = f"home_{2 * number}"
+        Image.fromarray(np.flipud(one.gray)).save(tmp_path / f"{name}.png")
+        Image.fromarray(np.flipud(one.truths[0]).astype(np.uint8)).save(tmp_path / f"{name}.rooms.png")
+        images = {"map": f"{name}.png", "rooms": f"{name}.rooms.png"}
+        cases.append({"group": "homes", "name": name, "resolution_m": 0.05, **images})
+    (tmp_path / "cases.json").write_text(json.dumps({"cases": cases}), encoding="utf-8")
+    work = tmp_path / "work"
+    command = [sys.executable, TOOL, work, "--cases", tmp_path / "cases.json", "--buildings", "4"]
+    command += ["--tree-buildings", "2", "--network-seconds", "1", "--fold-seconds", "1", "--trees", "8"]
+    one_thread = os.environ | {"OMP_NUM_THREADS": "1"}
+    subprocess.run(command, check=True, env=one_thread)
+    figures = (work / "figures.md").read_text(encoding="utf-8")
+    assert "| sum |" in figures
+    assert (work / "borders.onnx").stat().st_size > 0
+    assert len(read_trees(work / "joins.npz").feature) == 8
+    read_trees(work / "outside.npz", REGION_FEATURES)
+    made = {path: path.stat().st_mtime_ns for path in (work / "networks").iterdir()}
+    subprocess.run(command, check=True, env=one_thread)
+    assert {path: path.stat().st_mtime_ns for path in (work / "networks").iterdir()} == made
+    assert (work / "figures.md").read_text(encoding="utf-8") == figures

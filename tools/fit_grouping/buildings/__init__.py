@@ -1,0 +1,1 @@
+"""Simulated buildings with true rooms, as maps that robots make of them; thousands in minutes."""

@@ -1,0 +1,309 @@
+"""Furniture: what stands along walls, in rows, around tables and in the middle of halls."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import find_objects
+
+from fit_grouping.buildings.raster import CELL_M, Generator, Mask, between, cells, chance
+from fit_grouping.buildings.walls import WalledPlan
+
+STYLES = ("none", "survey", "home", "office", "dense")
+"""Ways to furnish: not at all, dots and boxes as drawn by hand, as in homes, as in offices, and cluttered."""
+KEEP_CLEAR_M = 0.55
+"""Furniture stays this far from openings, most of the time."""
+
+
+class Furnisher:
+    """Places furniture in one building."""
+
+    def __init__(self, rng: Generator, walled: WalledPlan, style: str) -> None:
+        self.rng, self.walled, self.style = rng, walled, style
+        self.rooms = walled.plan.rooms
+        self.solid = np.zeros(self.rooms.shape, np.uint8)
+        gaps = np.zeros_like(self.solid)
+        border = np.zeros(self.rooms.shape, bool)
+        border[:, :-1] |= self.rooms[:, :-1] != self.rooms[:, 1:]
+        border[:-1] |= self.rooms[:-1] != self.rooms[1:]
+        gaps[border & (walled.walls == 0)] = 1
+        size = 2 * cells(KEEP_CLEAR_M) + 1
+        self.clear = cv2.dilate(gaps, np.ones((size, size), np.uint8)) > 0
+
+    def furnish(self) -> Mask:
+        """Furnish every room; 1 where something stands."""
+        if self.style == "none":
+            return self.solid
+        way = self.walled.plan.corridors
+        numbers, flat = np.unique(self.rooms, return_inverse=True)
+        boxes = _boxes(flat.reshape(self.rooms.shape), len(numbers))
+        for number, box in zip(numbers.tolist(), boxes, strict=True):
+            if number == 0:
+                continue
+            x0, y0, x1, y1 = box
+            inside = self.rooms[y0:y1, x0:x1] == number
+            area = np.count_nonzero(inside) * CELL_M**2
+            target = self.solid[y0:y1, x0:x1]
+            drawn = np.zeros_like(target)
+            if number in way:
+                self._corridor(drawn, area)
+            elif number in self.walled.plan.halls or area > 70:
+                self._hall(drawn, area)
+            elif self.style == "survey":
+                self._survey_room(drawn)
+            else:
+                self._room(drawn, area)
+            keep = ~self.clear[y0:y1, x0:x1] if chance(self.rng, 0.85) else True
+            target[(drawn > 0) & inside & keep] = 1
+        return self.solid
+
+    def _corridor(self, drawn: Mask, area_m2: float) -> None:
+        rng = self.rng
+        if self.style == "survey":
+            for _ in range(rng.poisson(min(area_m2, 150) / 40)):
+                cv2.circle(drawn, self._spot(drawn), cells(rng.uniform(0.25, 0.6)), 1, -1)
+            return
+        for _ in range(rng.poisson(min(area_m2, 100) / 50)):
+            self._box(drawn, 0.3, 1.2, at_wall=True)
+        if chance(rng, 0.15):
+            self._noise(drawn, min(area_m2, 100) / 20)
+
+    def _hall(self, drawn: Mask, area_m2: float) -> None:
+        rng = self.rng
+        kind = rng.choice(
+            ["rows", "pillars", "tables", "boxes", "mixed", "empty"], p=[0.25, 0.15, 0.2, 0.15, 0.15, 0.1]
+        )
+        if kind in ("rows", "mixed"):
+            self._rows(drawn, rng.uniform(0.3, 1.0), rng.uniform(1.2, 3.0))
+        if kind in ("tables", "mixed"):
+            self._grid(drawn, rng.uniform(2.0, 4.0), rng.uniform(2.0, 4.0), lambda p: self._table(drawn, p))
+        if kind == "pillars" or chance(rng, 0.2):
+            half = between(rng, 0.1, 0.35)
+            step = rng.uniform(3.5, 8)
+            self._grid(
+                drawn,
+                step,
+                step,
+                lambda p: cv2.rectangle(drawn, (p[0] - half, p[1] - half), (p[0] + half, p[1] + half), 1, -1),
+            )
+        if chance(rng, 0.15):  # stands, pods and cages that can be looked into
+            self._grid(
+                drawn, rng.uniform(2.2, 5), rng.uniform(2.2, 5), lambda p: self._frame(drawn, p), share=0.7
+            )
+        if kind in ("boxes", "mixed"):
+            for _ in range(rng.poisson(min(area_m2, 400) / 15)):
+                self._box(drawn, 0.5, 3.0, at_wall=chance(rng, 0.4))
+        if chance(rng, 0.4):
+            self._along_walls(drawn, area_m2 / 20)
+        self._noise(drawn, min(area_m2, 300) / 30 * rng.random())
+
+    def _survey_room(self, drawn: Mask) -> None:
+        """Chairs as dots on a grid, boxes in corners."""
+        rng = self.rng
+        step_x, step_y = rng.uniform(0.8, 1.5), rng.uniform(0.8, 1.5)
+        radius = int(rng.integers(2, 4))
+        self._grid(
+            drawn,
+            step_x,
+            step_y,
+            lambda p: cv2.circle(drawn, p, radius, 1, -1),
+            share=rng.uniform(0.4, 1.0),
+            rim=0.8,
+        )
+        height, width = drawn.shape
+        for _ in range(rng.poisson(1.0)):
+            a, b = between(rng, 0.4, 1.0), between(rng, 0.8, 2.6)
+            if chance(rng, 0.5):
+                a, b = b, a
+            x = 0 if chance(rng, 0.5) else width - a
+            y = 0 if chance(rng, 0.5) else height - b
+            drawn[max(0, y) : y + b, max(0, x) : x + a] = 1
+
+    def _room(self, drawn: Mask, area_m2: float) -> None:
+        rng = self.rng
+        density = {"home": 1.2, "office": 1.2, "dense": 2.2}[self.style] * rng.uniform(0.3, 1.5)
+        if chance(rng, 0.12):
+            return
+        self._along_walls(drawn, density * min(area_m2, 60) / 4)
+        for _ in range(rng.poisson(density * min(area_m2, 60) / 9)):
+            kind = rng.choice(
+                ["table", "box", "legs", "chair", "screen", "disc"], p=[0.3, 0.2, 0.15, 0.2, 0.07, 0.08]
+            )
+            spot = self._spot(drawn)
+            if kind == "table":
+                self._table(drawn, spot)
+            elif kind == "box":
+                self._box(drawn, 0.4, 2.2, at_wall=False)
+            elif kind == "legs":
+                self._legs(drawn, spot, rng.uniform(0.4, 1.8), rng.uniform(0.4, 1.0))
+            elif kind == "chair":
+                self._chair(drawn, spot)
+            elif kind == "screen":
+                self._line(drawn, spot, rng.uniform(0.6, 2.5))
+            else:
+                cv2.circle(drawn, spot, between(rng, 0.1, 0.6), 1, -1)
+        if self.style == "home" and area_m2 > 8 and chance(rng, 0.5):  # a bed or a sofa
+            self._box(drawn, 1.4, 2.2, at_wall=True)
+        if self.style in ("home", "dense") and area_m2 > 14:
+            self._living_room(drawn)
+        if self.style == "office" and area_m2 > 9 and chance(rng, 0.4):
+            self._rows(drawn, rng.uniform(0.6, 0.9), rng.uniform(1.3, 2.2))
+        if self.style == "dense":
+            self._noise(drawn, area_m2 / 6)
+
+    def _living_room(self, drawn: Mask) -> None:
+        """Sofas and islands in the middle, counters that stand out from a wall like a wall."""
+        rng = self.rng
+        height, width = drawn.shape
+        for _ in range(rng.poisson(1.2)):
+            long, deep = between(rng, 1.4, 3.0), between(rng, 0.6, 1.1)
+            if chance(rng, 0.5):
+                long, deep = deep, long
+            x, y = self._spot(drawn)
+            drawn[y : y + deep, x : x + long] = 1
+        for _ in range(rng.poisson(0.6)):
+            reach, deep = between(rng, 1.2, 3.0), between(rng, 0.5, 0.8)
+            side = rng.integers(4)
+            if side < 2:
+                y = int(rng.integers(max(1, height - deep)))
+                x = 0 if side == 0 else max(0, width - reach)
+                drawn[y : y + deep, x : x + reach] = 1
+            else:
+                x = int(rng.integers(max(1, width - deep)))
+                y = 0 if side == 2 else max(0, height - reach)
+                drawn[y : y + reach, x : x + deep] = 1
+
+    def _spot(self, drawn: Mask) -> tuple[int, int]:
+        return int(self.rng.integers(drawn.shape[1])), int(self.rng.integers(drawn.shape[0]))
+
+    def _along_walls(self, drawn: Mask, mean: float) -> None:
+        for _ in range(self.rng.poisson(mean)):
+            self._box(drawn, 0.35, 2.0, at_wall=True)
+
+    def _box(self, drawn: Mask, low_m: float, high_m: float, *, at_wall: bool) -> None:
+        rng = self.rng
+        height, width = drawn.shape
+        if at_wall:
+            deep, long = between(rng, 0.3, 0.8), between(rng, low_m, high_m)
+            if low_m > 1:
+                deep = between(rng, 0.9, 1.9)
+            side = rng.integers(4)
+            if side < 2:
+                x = int(rng.integers(-cells(0.3), max(1, width - long)))
+                y = 0 if side == 0 else height - deep
+                drawn[max(0, y) : y + deep, max(0, x) : max(0, x + long)] = 1
+            else:
+                y = int(rng.integers(-cells(0.3), max(1, height - long)))
+                x = 0 if side == 2 else width - deep
+                drawn[max(0, y) : max(0, y + long), max(0, x) : x + deep] = 1
+            return
+        angle = 0.0 if chance(rng, 0.6) else rng.uniform(0, 90)
+        size = (
+            rng.uniform(low_m, high_m) / CELL_M,
+            rng.uniform(low_m, max(low_m + 0.1, high_m / 2)) / CELL_M,
+        )
+        corners = cv2.boxPoints(((float(rng.integers(width)), float(rng.integers(height))), size, angle))
+        cv2.fillPoly(drawn, [corners.astype(np.int32)], 1)
+
+    def _table(self, drawn: Mask, spot: tuple[int, int]) -> None:
+        rng = self.rng
+        long, wide = rng.uniform(0.8, 2.0), rng.uniform(0.6, 1.0)
+        if chance(rng, 0.5):
+            long, wide = wide, long
+        if chance(rng, 0.4):
+            a, b = cells(long / 2), cells(wide / 2)
+            cv2.rectangle(drawn, (spot[0] - a, spot[1] - b), (spot[0] + a, spot[1] + b), 1, -1)
+        else:
+            self._legs(drawn, spot, long, wide)
+        for _ in range(rng.poisson(1.5)):
+            offset = (
+                rng.choice([-1, 1]) * cells(long / 2 + 0.3),
+                rng.choice([-1, 1]) * cells(wide / 2 + 0.3),
+            )
+            self._chair(drawn, (spot[0] + int(offset[0]), spot[1] + int(offset[1])))
+
+    def _legs(self, drawn: Mask, spot: tuple[int, int], long_m: float, wide_m: float) -> None:
+        radius = int(self.rng.integers(0, 2))
+        angle = 0.0 if chance(self.rng, 0.7) else self.rng.uniform(0, 90)
+        for corner in cv2.boxPoints((spot, (long_m / CELL_M, wide_m / CELL_M), angle)):
+            cv2.circle(drawn, (int(corner[0]), int(corner[1])), radius, 1, -1)
+
+    def _chair(self, drawn: Mask, spot: tuple[int, int]) -> None:
+        if chance(self.rng, 0.3):  # five legs as a star
+            angle = self.rng.uniform(0, 2)
+            for k in range(5):
+                tip = angle + 2 * np.pi * k / 5
+                reach = cells(0.3)
+                cv2.line(
+                    drawn,
+                    spot,
+                    (int(spot[0] + reach * np.cos(tip)), int(spot[1] + reach * np.sin(tip))),
+                    1,
+                    1,
+                )
+        else:
+            self._legs(drawn, spot, 0.45, 0.45)
+
+    def _line(self, drawn: Mask, spot: tuple[int, int], length_m: float) -> None:
+        angle = self.rng.choice([0.0, np.pi / 2, self.rng.uniform(0, np.pi)])
+        reach = length_m / CELL_M
+        cv2.line(
+            drawn, spot, (int(spot[0] + reach * np.cos(angle)), int(spot[1] + reach * np.sin(angle))), 1, 1
+        )
+
+    def _noise(self, drawn: Mask, mean: float) -> None:
+        for _ in range(self.rng.poisson(mean)):
+            spot = self._spot(drawn)
+            for _ in range(self.rng.integers(1, 7)):
+                near = (spot[0] + int(self.rng.normal(0, 8)), spot[1] + int(self.rng.normal(0, 8)))
+                cv2.circle(drawn, near, int(self.rng.integers(0, 3)), 1, -1)
+
+    def _frame(self, drawn: Mask, spot: tuple[int, int]) -> None:
+        half = between(self.rng, 0.4, 0.9), between(self.rng, 0.4, 0.9)
+        low, high = (spot[0] - half[0], spot[1] - half[1]), (spot[0] + half[0], spot[1] + half[1])
+        cv2.rectangle(drawn, low, high, 1, int(self.rng.integers(1, 3)))
+
+    def _rows(self, drawn: Mask, deep_m: float, way_m: float) -> None:
+        """Shelves or desks in rows, with ways between them."""
+        rng = self.rng
+        image = drawn if chance(rng, 0.5) else drawn.T
+        height, width = image.shape
+        rim = between(rng, 0.8, 2.0)
+        deep, way = cells(deep_m), cells(way_m)
+        piece = between(rng, 1.2, 6.0)
+        x = rim
+        while x + deep < width - rim:
+            y = rim
+            while y + piece < height - rim // 2:
+                if chance(rng, 0.85):
+                    image[y : y + piece, x : x + deep] = 1
+                y += piece + between(rng, 0.0, 2.0)
+            x += deep + way
+
+    def _grid(
+        self,
+        drawn: Mask,
+        step_x_m: float,
+        step_y_m: float,
+        put: Callable[[tuple[int, int]], object],
+        *,
+        share: float = 0.8,
+        rim: float = 1.2,
+    ) -> None:
+        height, width = drawn.shape
+        for y in range(cells(rim), height - cells(rim) + 1, cells(step_y_m)):
+            for x in range(cells(rim), width - cells(rim) + 1, cells(step_x_m)):
+                if chance(self.rng, share):
+                    put((x, y))
+
+
+def _boxes(index: NDArray[np.intp], count: int) -> list[tuple[int, int, int, int]]:
+    """x0, y0, x1, y1 of each label 0..count-1, without the walls' thickness."""
+    boxes = []
+    for part in find_objects(index + 1, count):
+        rows, columns = part
+        boxes.append((columns.start + 1, rows.start + 1, columns.stop - 1, rows.stop - 1))
+    return boxes

@@ -1,0 +1,28 @@
+"""The raster that buildings are drawn on."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+CELL_M = 0.05
+"""Side of a cell, the usual one of SLAM maps."""
+
+Labels = NDArray[np.int32]
+Mask = NDArray[np.uint8]
+Generator = np.random.Generator
+
+
+def cells(meters: float) -> int:
+    """Number of cells along a length."""
+    return round(meters / CELL_M)
+
+
+def between(rng: Generator, low_m: float, high_m: float) -> int:
+    """Random length of the given range, in cells."""
+    return cells(rng.uniform(low_m, high_m))
+
+
+def chance(rng: Generator, probability: float) -> bool:
+    """Whether something of that probability happens."""
+    return bool(rng.random() < probability)

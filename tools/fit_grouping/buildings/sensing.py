@@ -1,0 +1,263 @@
+"""How a map comes about: rays from views along a path, noise of pose and range, drawings, damage."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cache
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from fit_grouping.buildings.bending import moved
+from fit_grouping.buildings.raster import CELL_M, Generator, Labels, Mask, between, cells, chance
+from fit_grouping.buildings.walls import WalledPlan
+
+FREE, UNKNOWN, OCCUPIED = 254, 205, 0
+"""Gray values of the ROS map convention."""
+RAYS_PER_VIEW = 720
+"""Rays of a view: a lidar's usual half degree, so that far things show as fans."""
+VIEWS_MAX = 100
+ROOM_SEEN_MIN_M2 = 0.5
+"""Rooms of which less was seen are none in the truth."""
+
+
+@dataclass(frozen=True, eq=False)
+class SimulatedMap:
+    """A map with its true rooms, row 0 at the bottom.
+
+    Attributes
+    ----------
+    kind : str
+        Maker of the plan, furnishing and sensing, joined by slashes.
+    gray : (H, W) uint8
+    truths : tuple of (H, W) int32
+        The rooms; a second image where openings without jambs part nothing.
+    """
+
+    kind: str
+    gray: NDArray[np.uint8]
+    truths: tuple[Labels, ...] = field(default_factory=tuple)
+
+
+@cache
+def _rays(reach: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    angle = np.linspace(0, 2 * np.pi, RAYS_PER_VIEW, endpoint=False, dtype=np.float32)
+    step = np.arange(1, reach, dtype=np.float32)
+    return np.sin(angle)[:, None] * step, np.cos(angle)[:, None] * step
+
+
+class Sensor:
+    """Gathers evidence of views, like the log odds of a SLAM map."""
+
+    def __init__(self, rng: Generator, solid: Mask, glass: Mask, reach: int) -> None:
+        self.rng, self.reach = rng, reach
+        self.pad = reach + 4
+        self.solid = np.pad(solid, self.pad)
+        self.unglazed = np.pad(solid & (1 - glass), self.pad)
+        self.transmission = rng.uniform(0.3, 1.0)
+        """Share of the rays that pass glass."""
+        self.stride = self.solid.shape[1]
+        self.evidence = np.zeros(self.solid.shape, np.float32)
+        self.range_noise = rng.choice([0.0, 0.3, 0.6, 1.0])
+        self.pose_noise = rng.choice([0.0, 0.3, 0.6, 1.1], p=[0.25, 0.35, 0.25, 0.15])
+        self.hit_weight = np.float32(rng.choice([2.0, 3.0, 6.0]))
+
+    def look(self, row: int, column: int) -> None:
+        """Add one view."""
+        rng, reach = self.rng, self.reach
+        along_y, along_x = _rays(reach)
+        y = (along_y + np.float32(row + self.pad + 0.5)).astype(np.int32)
+        x = (along_x + np.float32(column + self.pad + 0.5)).astype(np.int32)
+        index = y * self.stride + x
+        passes = rng.random(RAYS_PER_VIEW) < self.transmission
+        solid = np.empty(index.shape, np.uint8)
+        solid[passes] = self.unglazed.ravel()[index[passes]]
+        solid[~passes] = self.solid.ravel()[index[~passes]]
+        first = np.where(solid.any(1), solid.argmax(1), reach)
+        hit = np.flatnonzero(first < reach - 1)
+        noise = rng.normal(0, self.range_noise, len(first)) if self.range_noise else np.zeros(len(first))
+        seen_to = np.maximum(first + np.round(noise), 0).astype(int)
+        ends = np.clip(seen_to[hit] + 1, 1, reach - 1) - 1
+        free = index[np.arange(reach - 1) < np.minimum(seen_to, first)[:, None]]
+        down, right = np.round(rng.normal(0, self.pose_noise, 2)).astype(int) if self.pose_noise else (0, 0)
+        move = int(np.clip(down, -3, 3)) * self.stride + int(np.clip(right, -3, 3))
+        flat = self.evidence.ravel()
+        flat[free + move] -= 1
+        flat[index[hit, ends] + move] += self.hit_weight
+
+    def map(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Free and occupied cells."""
+        inner = self.evidence[self.pad : -self.pad, self.pad : -self.pad]
+        return inner < 0, inner > 0
+
+
+def make_map(rng: Generator, walled: WalledPlan, furniture: Mask, furnishing: str) -> SimulatedMap | None:
+    """Map a furnished building in a random way; None where nothing was seen."""
+    rooms = walled.plan.rooms
+    solid = (walled.walls | furniture | _outdoors(rng, rooms)).astype(np.uint8)
+    drawn_share = 0.75 if furnishing == "survey" else 0.12
+    if chance(rng, drawn_share):
+        kind, gray = "drawing", _drawing(rng, walled, furniture)
+    else:
+        kind, seen = _sensed(rng, walled, solid)
+        if seen is None:
+            return None
+        gray = seen
+    gray = _damaged(rng, gray)
+    rooms, other, gray = _warped(rng, rooms, walled.other, gray)
+    window = _known_window(gray, rooms)
+    gray, rooms, other = gray[window], rooms[window], other[window]
+    truths = [_truth(gray, rooms)]
+    if (other != rooms).any():
+        truths.append(_truth(gray, other))
+    if not truths[0].any():
+        return None
+    return SimulatedMap(f"{walled.plan.kind}/{furnishing}/{kind}", np.ascontiguousarray(gray), tuple(truths))
+
+
+def _drawing(rng: Generator, walled: WalledPlan, furniture: Mask) -> NDArray[np.uint8]:
+    """A floor plan or a simulator's map: all known, the outside white or unknown."""
+    rooms = walled.plan.rooms
+    gray = np.where((walled.walls | furniture) > 0, OCCUPIED, FREE).astype(np.uint8)
+    outside = (rooms == 0) & (gray == FREE)
+    if chance(rng, 0.7):
+        gray[outside] = UNKNOWN
+    return gray
+
+
+def _outdoors(rng: Generator, rooms: Labels) -> Mask:
+    """Things outside the building that end the rays through its windows."""
+    solid = np.zeros(rooms.shape, np.uint8)
+    for _ in range(rng.poisson(rng.choice([5, 30, 100]))):
+        spot = int(rng.integers(rooms.shape[1])), int(rng.integers(rooms.shape[0]))
+        cv2.circle(solid, spot, between(rng, 0.05, 0.4), 1, -1)
+    solid[rooms > 0] = 0
+    return solid
+
+
+def _sensed(rng: Generator, walled: WalledPlan, solid: Mask) -> tuple[str, NDArray[np.uint8] | None]:
+    """Drive through rooms that can be reached, all or the first of them, and look around."""
+    rooms, neighbors = walled.plan.rooms, walled.neighbors
+    reach_m = float(rng.choice([4.0, 6.0, 8.0, 12.0, 18.0], p=[0.2, 0.25, 0.25, 0.2, 0.1]))
+    numbers = list(neighbors)
+    start = numbers[rng.integers(len(numbers))]
+    share = 1.0 if chance(rng, 0.55) else rng.uniform(0.15, 0.9)
+    order, queue, met = [], [start], {start}
+    while queue:
+        room = queue.pop(int(rng.integers(len(queue))))
+        order.append(room)
+        for beside in neighbors[room]:
+            if beside not in met:
+                met.add(beside)
+                queue.append(beside)
+    if len(order) < len(numbers) and chance(rng, 0.6):
+        order += [n for n in numbers if n not in met]
+    order = order[: max(1, round(share * len(order)))]
+    kind = "whole" if share == 1.0 else "part"
+    away = cv2.erode((solid == 0).astype(np.uint8), np.ones((7, 7), np.uint8)) > 0
+    rows, columns = np.nonzero(away & (rooms > 0))
+    place = np.argsort(rooms[rows, columns], kind="stable")
+    rows, columns = rows[place], columns[place]
+    bounds = np.searchsorted(rooms[rows, columns], [*order, *[n + 1 for n in order]])
+    # Share of the rooms that are seen through their doors only.
+    skip = rng.choice([0.0, 0.06, 0.3, 0.6], p=[0.6, 0.3, 0.1, 0.0] if walled.plan.kind == "home" else None)
+    views = []
+    per_view_m2 = rng.uniform(6, 16)
+    for low, high, room in zip(bounds[: len(order)], bounds[len(order) :], order, strict=True):
+        inside = room in walled.plan.corridors or room in walled.plan.halls or len(order) == 1
+        if high <= low or (not inside and chance(rng, skip)):
+            continue
+        spread_m2 = max(per_view_m2, 0.6 * reach_m**2) / rng.uniform(1, 2)
+        count = int(np.ceil((high - low) * CELL_M**2 / spread_m2))
+        at = rng.integers(low, high, max(count, 2))
+        views += list(zip(rows[at].tolist(), columns[at].tolist(), strict=True))
+    if not views:
+        return kind, None
+    if len(views) > VIEWS_MAX:
+        views = [views[i] for i in rng.choice(len(views), VIEWS_MAX, replace=False)]
+    sensor = Sensor(rng, solid, walled.glass, cells(reach_m))
+    for row, column in views:
+        sensor.look(row, column)
+    free, occupied = sensor.map()
+    if chance(rng, 0.7):  # rays leave gaps far out that a real map's many scans fill
+        free = cv2.morphologyEx(free.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8)) > 0
+    if chance(rng, 0.6):
+        size = int(rng.choice([2, 3]))
+        occupied = cv2.dilate(occupied.astype(np.uint8), np.ones((size, size), np.uint8)) > 0
+    gray = np.full(rooms.shape, UNKNOWN, np.uint8)
+    gray[free] = FREE
+    gray[occupied] = OCCUPIED
+    return kind, gray
+
+
+def _damaged(rng: Generator, gray: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Gaps in walls, spots, unknown holes, and a second, shifted copy of a part of the walls."""
+    gray = gray.copy()
+    occupied = gray == OCCUPIED
+    if chance(rng, 0.35):  # faint walls
+        lost = rng.uniform(0, 0.3)
+        gray[occupied & (rng.random(gray.shape) < lost)] = rng.choice([UNKNOWN, FREE])
+    if chance(rng, 0.3):  # gaps as a robot vacuum leaves them
+        rows, columns = np.nonzero(occupied)
+        for _ in range(rng.poisson(len(rows) * CELL_M / 25)):
+            at = rng.integers(len(rows))
+            half = between(rng, 0.05, 0.25)
+            part = gray[
+                max(0, rows[at] - half) : rows[at] + half, max(0, columns[at] - half) : columns[at] + half
+            ]
+            part[part == OCCUPIED] = rng.choice([UNKNOWN, FREE])
+    if chance(rng, 0.3):
+        spots = rng.random(gray.shape) < rng.uniform(0, 0.002)
+        gray[spots & (gray == FREE)] = OCCUPIED
+    if chance(rng, 0.25):
+        spots = (rng.random(gray.shape) < rng.uniform(0, 0.02)) & (gray == FREE)
+        gray[spots] = UNKNOWN
+    if chance(rng, 0.15):
+        down, right = rng.integers(-4, 5, 2)
+        width = gray.shape[1]
+        low = int(rng.integers(0, width // 2))
+        again = np.roll(gray, (down, right), (0, 1))[:, low : low + width // 2] == OCCUPIED
+        part = gray[:, low : low + width // 2]
+        part[again & (part != OCCUPIED)] = OCCUPIED
+    return gray
+
+
+def _warped(
+    rng: Generator, rooms: Labels, other: Labels, gray: NDArray[np.uint8]
+) -> tuple[Labels, Labels, NDArray[np.uint8]]:
+    """Turn the map a little, or let it wave as drift does."""
+    height, width = gray.shape
+    kind = rng.choice(["none", "turn", "wave"], p=[0.45, 0.3, 0.25])
+    if kind == "none":
+        return rooms, other, gray
+    y, x = np.mgrid[:height, :width].astype(np.float32)
+    if kind == "turn":
+        angle = rng.normal(0, 0.02)
+        y, x = y + np.float32(angle) * (x - width / 2), x - np.float32(angle) * (y - height / 2)
+    else:
+        length, size = rng.uniform(8, 30) / CELL_M, rng.uniform(0.03, 0.3) / CELL_M
+        phase = rng.uniform(0, 6, 2)
+        y, x = (
+            y + np.float32(size) * np.sin(x / np.float32(length / 6) + np.float32(phase[0])),
+            x + np.float32(size) * np.sin(y / np.float32(length / 6) + np.float32(phase[1])),
+        )
+    from_x, from_y = x.astype(np.float32), y.astype(np.float32)
+    labels = [moved(image, from_x, from_y).astype(np.int32) for image in (rooms, other)]
+    return labels[0], labels[1], moved(gray, from_x, from_y, UNKNOWN).astype(np.uint8)
+
+
+def _known_window(gray: NDArray[np.uint8], rooms: Labels) -> tuple[slice, slice]:
+    known = (gray != UNKNOWN) | (rooms > 0) & (gray == FREE)
+    rows, columns = np.flatnonzero(known.any(1)), np.flatnonzero(known.any(0))
+    return slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
+
+
+def _truth(gray: NDArray[np.uint8], rooms: Labels) -> Labels:
+    """Rooms of the free cells, without those of which next to nothing was seen."""
+    truth = np.where(gray == FREE, rooms, 0)
+    size = np.bincount(truth.ravel())
+    kept = size * CELL_M**2 >= ROOM_SEEN_MIN_M2
+    kept[0] = False
+    number = np.where(kept, np.cumsum(kept), 0).astype(np.int32)
+    return number[truth]

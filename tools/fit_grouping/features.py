@@ -1,0 +1,198 @@
+"""Features of a join, from the sums of its two regions and their border."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fit_grouping.regions import BORDER_MAXIMA, BORDER_SUMS, NODE_MAXIMA, NODE_SUMS, RegionGraph
+
+FloatArray = NDArray[np.float64]
+
+SHAPE_FEATURES = (
+    "log_contact", "contact_per_outline_small", "contact_per_outline_large", "contact_per_side_small",
+    "openness", "straightness", "log_chord", "on_face", "line_short", "line_middle", "line_long",
+    "saddle", "saddle_per_clear_low", "saddle_per_clear_high", "mean_clear_per_saddle",
+    "strong_saddle", "strong_saddle_per_clear_low", "strong_saddle_per_clear_high",
+    "log_area_small", "log_area_large", "area_ratio",
+    "rectangle_small", "rectangle_large", "rectangle_union", "rectangle_gain",
+    "octagon_small", "octagon_large", "octagon_union", "octagon_gain",
+    "wall_share_small", "wall_share_large", "unknown_share_small", "unknown_share_large",
+    "elongation_small", "elongation_large", "elongation_union", "aligned",
+    "spans_small", "spans_large", "neighbors_small", "neighbors_large", "wide_small", "wide_large",
+)  # fmt: skip
+ANSWER_FEATURES = (
+    "different_near", "different_middle", "different_far", "different", "log_pairs",
+    "outside_small", "outside_large",
+)  # fmt: skip
+FEATURES = SHAPE_FEATURES + ANSWER_FEATURES
+NO_ANSWER = -1.0
+CONTACT_MIN_M = 0.05
+"""Regions that touch along less, but face one another across noise, may still be joined."""
+FACING_MIN_M = 0.3
+OCTAGON_CORNER = 0.5
+"""Area that an octagon's slanting side cuts off a corner, per squared distance of the side from it."""
+
+
+def joinable(graph: RegionGraph) -> NDArray[np.bool_]:
+    """Borders (M,) along which regions touch, or face one another with nothing known between."""
+    contact = graph.border_sums[:, 0] + graph.border_sums[:, 1]
+    can: NDArray[np.bool_] = (contact >= CONTACT_MIN_M) | (graph.border_sums[:, 3] >= FACING_MIN_M)
+    return can
+
+
+def join_features(graph: RegionGraph, which: NDArray[np.intp]) -> FloatArray:
+    """Features (K, len(FEATURES)) of the borders of the given numbers (K,)."""
+    n = {name: graph.node_sums[:, k] for k, name in enumerate(NODE_SUMS)}
+    top = {name: graph.node_maxima[:, k] for k, name in enumerate(NODE_MAXIMA)}
+    s = {name: graph.border_sums[which, k] for k, name in enumerate(BORDER_SUMS)}
+    m = {name: graph.border_maxima[which, k] for k, name in enumerate(BORDER_MAXIMA)}
+    ends = graph.ends[which]
+    swap = n["area"][ends[:, 0]] > n["area"][ends[:, 1]]
+    small, large = np.where(swap, ends[:, 1], ends[:, 0]), np.where(swap, ends[:, 0], ends[:, 1])
+    all_contact = graph.border_sums[:, 0] + graph.border_sums[:, 1]
+    open_edges = _at_ends(graph, all_contact)
+    neighbors = _at_ends(graph, (all_contact > 0.1).astype(float))
+    outline = n["wall_edges"] + n["unknown_edges"] + open_edges + 0.01
+    contact = s["upright"] + s["level"]
+    some = contact > 0
+    per_contact = np.where(some, 1 / np.maximum(contact, 1e-9), 0.0)
+
+    def finite(values: FloatArray) -> FloatArray:
+        return np.where(some, values, 0.0)
+
+    width, height = (finite(m[f"{a}_high"] + m[f"{a}_low"]) for a in "xy")
+    chord = np.hypot(width, height) + 0.01
+    side = np.hypot(s["upright"], s["level"])
+    saddle, strong = np.minimum(finite(m["saddle"]), 4.0), np.minimum(finite(m["saddle_strong"]), 4.0)
+    clear = [top["clear"][small], top["clear"][large]]
+    clear_strong = [top["clear_strong"][small], top["clear_strong"][large]]
+    box = _boxes(graph.node_maxima)
+    box_small, box_large = box[small], box[large]
+    union_maxima = np.maximum(graph.node_maxima[small], graph.node_maxima[large])
+    box_union = _boxes(union_maxima)
+    octagon = _octagons(graph.node_maxima)
+    area_small, area_large = n["area"][small], n["area"][large]
+    area = area_small + area_large
+    rectangle = [area_small / box_small[:, 2], area_large / box_large[:, 2], area / box_union[:, 2]]
+    eight = [area_small / octagon[small], area_large / octagon[large], area / _octagons(union_maxima)]
+
+    def gain(fills: list[FloatArray]) -> FloatArray:
+        return fills[2] - (area_small * fills[0] + area_large * fills[1]) / area
+
+    def lies(boxes: FloatArray) -> FloatArray:
+        return np.log(boxes[:, 0] / boxes[:, 1])
+
+    # A border that takes the whole side of a region leaves no wall beside it.
+    spans = [np.maximum(s["upright"] / b[:, 1], s["level"] / b[:, 0]) for b in (box_small, box_large)]
+    facing = s["facing_wall"] + s["facing_unknown"]
+    columns = [
+        np.log(contact + 0.05),
+        contact / outline[small],
+        contact / outline[large],
+        side / np.sqrt(area_small),
+        contact / (contact + facing + 0.01),
+        np.minimum(side / chord, 4.0),
+        np.log(chord + 0.05),
+        s["on_face"] * per_contact,
+        s["line_0"] * per_contact,
+        s["line_1"] * per_contact,
+        s["line_2"] * per_contact,
+        saddle,
+        np.minimum(saddle / (np.minimum(*clear) + 0.02), 1.5),
+        np.minimum(saddle / (np.maximum(*clear) + 0.02), 1.5),
+        s["clear"] * per_contact / (saddle + 0.02),
+        strong,
+        np.minimum(strong / (np.minimum(*clear_strong) + 0.02), 1.5),
+        np.minimum(strong / (np.maximum(*clear_strong) + 0.02), 1.5),
+        np.log(area_small + 0.01),
+        np.log(area_large + 0.01),
+        area_small / area_large,
+        *rectangle,
+        gain(rectangle),
+        *eight,
+        gain(eight),
+        n["wall_edges"][small] / outline[small],
+        n["wall_edges"][large] / outline[large],
+        n["unknown_edges"][small] / outline[small],
+        n["unknown_edges"][large] / outline[large],
+        np.abs(lies(box_small)),
+        np.abs(lies(box_large)),
+        np.abs(lies(box_union)),
+        lies(box_small) * lies(box_large),
+        spans[0],
+        spans[1],
+        neighbors[small],
+        neighbors[large],
+        n["wide"][small] / area_small,
+        n["wide"][large] / area_large,
+    ]
+    different = np.stack([s[f"different_{k}"] for k in range(3)])
+    pairs = np.stack([s[f"pairs_{k}"] for k in range(3)])
+    columns += [_ratio(d, p) for d, p in zip(different, pairs, strict=True)]
+    columns += [
+        _ratio(different.sum(0), pairs.sum(0)),
+        np.log(pairs.sum(0) + 1),
+        n["outside"][small] / area_small,
+        n["outside"][large] / area_large,
+    ]
+    return np.stack(columns, axis=1)
+
+
+def _at_ends(graph: RegionGraph, values: FloatArray) -> FloatArray:
+    """Sum (N,) over the borders (M,) of each region."""
+    count = len(graph.node_sums)
+    one, other = (np.bincount(graph.ends[:, k], values, minlength=count) for k in (0, 1))
+    total: FloatArray = np.asarray(one + other, float)
+    return total
+
+
+def _ratio(part: FloatArray, whole: FloatArray) -> FloatArray:
+    return np.where(whole > 0, part / np.maximum(whole, 1e-9), NO_ANSWER)
+
+
+def _boxes(maxima: FloatArray) -> FloatArray:
+    """Width, height, area (K, 3) of the boxes along the plan frame's axes."""
+    width = np.maximum(maxima[:, 2] + maxima[:, 3], 0.01)
+    height = np.maximum(maxima[:, 4] + maxima[:, 5], 0.01)
+    return np.stack([width, height, width * height], axis=1)
+
+
+def _octagons(maxima: FloatArray) -> FloatArray:
+    """Area (K,) of the octagons along the axes and the diagonals."""
+    _, _, x1, x0, y1, y0, s1, s0, d1, d0 = maxima.T
+    area = (x1 + x0) * (y1 + y0)
+    for cut in (x1 + y1 - s1, x0 + y0 - s0, x1 + y0 - d1, x0 + y1 - d0):
+        area = area - OCTAGON_CORNER * np.maximum(cut, 0.0) ** 2
+    least: FloatArray = np.maximum(area, 0.01)
+    return least
+
+
+REGION_FEATURES = (
+    "log_area", "outside", "clear", "clear_strong", "wall_share", "unknown_share", "open_share", "wide",
+    "rectangle", "octagon", "area_share",
+)  # fmt: skip
+"""Features that tell rooms from rays and the outside."""
+
+
+def region_features(graph: RegionGraph) -> FloatArray:
+    """Features (N, len(REGION_FEATURES)) of the regions of a graph."""
+    n = {name: graph.node_sums[:, k] for k, name in enumerate(NODE_SUMS)}
+    contact = graph.border_sums[:, 0] + graph.border_sums[:, 1]
+    open_edges = _at_ends(graph, contact)
+    outline = n["wall_edges"] + n["unknown_edges"] + open_edges + 0.01
+    area = n["area"]
+    columns = [
+        np.log(area + 0.01),
+        n["outside"] / area,
+        graph.node_maxima[:, 0],
+        graph.node_maxima[:, 1],
+        n["wall_edges"] / outline,
+        n["unknown_edges"] / outline,
+        open_edges / outline,
+        n["wide"] / area,
+        area / _boxes(graph.node_maxima)[:, 2],
+        area / _octagons(graph.node_maxima),
+        area / area.sum(),
+    ]
+    return np.stack(columns, axis=1)

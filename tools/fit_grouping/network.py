@@ -1,0 +1,81 @@
+"""The network that tells whether neighboring cells are in different rooms (PyTorch), and its ONNX file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import torch
+from torch import Tensor, nn
+
+from fit_grouping.plan_rasters import OUTPUTS
+
+CHANNELS = (16, 28, 40, 56, 72)
+"""Channels at 0.2, 0.4, 0.8, 1.6 and 3.2 m a cell."""
+INPUTS = 4
+STRIDE = 32
+"""Inputs are padded to a multiple of this many cells."""
+
+
+def _layer(inputs: int, outputs: int, kernel: int = 3, stride: int = 1) -> nn.Sequential:
+    padding = (kernel - stride + 1) // 2
+    return nn.Sequential(
+        nn.Conv2d(inputs, outputs, kernel, stride, padding, bias=False), nn.BatchNorm2d(outputs), nn.ReLU()
+    )
+
+
+class RoomNetwork(nn.Module):  # type: ignore[misc]
+    """A U-shaped network: a map of 0.1 m cells in, an answer for each pair of cells out (log odds)."""
+
+    def __init__(self, channels: tuple[int, ...] = CHANNELS) -> None:
+        super().__init__()
+        self.stem = _layer(INPUTS, channels[0], 6, 2)
+        self.down = nn.ModuleList(
+            nn.Sequential(_layer(channels[max(i - 1, 0)], c), _layer(c, c)) for i, c in enumerate(channels)
+        )
+        self.up = nn.ModuleList(
+            nn.Sequential(
+                _layer(channels[i + 1] + channels[i], channels[i]), _layer(channels[i], channels[i])
+            )
+            for i in range(len(channels) - 2, -1, -1)
+        )
+        self.answers = nn.Conv2d(channels[0], 4 * OUTPUTS, 1)
+        nn.init.constant_(self.answers.bias, -1.5)
+        self.fine = nn.PixelShuffle(2)
+
+    def forward(self, inputs: Tensor) -> Tensor:
+        """Log odds (B, OUTPUTS, H, W) from inputs (B, INPUTS, H, W)."""
+        x = self.stem(inputs)
+        levels = []
+        for i, block in enumerate(self.down):
+            x = block(x if i == 0 else nn.functional.max_pool2d(x, 2))
+            levels.append(x)
+        for block, skip in zip(self.up, reversed(levels[:-1]), strict=True):
+            x = nn.functional.interpolate(x, scale_factor=2.0, mode="nearest")
+            x = block(torch.cat([x, skip], 1))
+        out: Tensor = self.fine(self.answers(x))
+        return out
+
+
+class _Probabilities(nn.Module):  # type: ignore[misc]
+    def __init__(self, network: RoomNetwork) -> None:
+        super().__init__()
+        self.network = network
+
+    def forward(self, inputs: Tensor) -> Tensor:
+        return torch.sigmoid(self.network(inputs))
+
+
+def export_onnx(network: RoomNetwork, path: Path) -> None:
+    """Write the network as ONNX with its norms folded in; it answers with probabilities, at any size."""
+    model = _Probabilities(network).eval()
+    axes = {"map": {2: "rows", 3: "columns"}, "answers": {2: "rows", 3: "columns"}}
+    torch.onnx.export(
+        model,
+        (torch.zeros(1, INPUTS, 256, 256),),
+        str(path),
+        input_names=["map"],
+        output_names=["answers"],
+        dynamic_axes=axes,
+        opset_version=13,
+        dynamo=False,
+    )

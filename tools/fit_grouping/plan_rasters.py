@@ -1,0 +1,154 @@
+"""Maps on the plan frame: what the network sees of them, and what it is asked."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from fit_grouping.atoms import BoolArray, Labels, PlanFrame
+
+FloatImage = NDArray[np.float32]
+
+POINTS_PER_SIDE = 3
+"""A plan cell is looked at in this many points squared, so that walls of one map cell are met."""
+SHARE_STEPS = POINTS_PER_SIDE**2
+OFFSETS = ((0, 2), (2, 0), (0, 6), (6, 0), (0, 14), (14, 0))
+"""Pairs of cells that the network is asked about, rows and columns apart: 0.2, 0.6 and 1.4 m."""
+OUTPUTS = len(OFFSETS) + 1
+"""An answer for each pair, and one whether a cell is outside."""
+DISTANCE_MAX = 30
+"""Distances are told up to this many cells."""
+DIFFERENT_WEIGHT = (3.0, 2.0, 1.5)
+"""Pairs in different rooms are rarer than others, the nearer the more so."""
+
+
+@dataclass(frozen=True, eq=False)
+class PlanRaster:
+    """A map on its plan frame.
+
+    Attributes
+    ----------
+    wall, free : (H, W) uint8
+        Points of each cell, of `SHARE_STEPS`, that are occupied and free.
+    truths : tuple of (H, W) uint16
+        True room of each cell, 0 where none; empty for maps without truth.
+    """
+
+    wall: NDArray[np.uint8]
+    free: NDArray[np.uint8]
+    truths: tuple[NDArray[np.uint16], ...] = ()
+
+    @classmethod
+    def of(
+        cls, free: BoolArray, occupied: BoolArray, frame: PlanFrame, truths: tuple[Labels, ...] = ()
+    ) -> PlanRaster:
+        """Sample the masks and truths (H, W) of a map."""
+        steps = [
+            np.rint(frame.share(mask, POINTS_PER_SIDE) * SHARE_STEPS).astype(np.uint8)
+            for mask in (occupied, free)
+        ]
+        return cls(steps[0], steps[1], tuple(frame.sampled(t).astype(np.uint16) for t in truths))
+
+
+def network_input(wall: FloatImage, free: FloatImage) -> FloatImage:
+    """Channels (4, H, W): wall and free share, distances from walls and from what is not free."""
+    from_wall = cv2.distanceTransform((wall < 0.25).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_3)
+    from_rest = cv2.distanceTransform((free > 0.5).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_3)
+    scaled = [np.minimum(d, DISTANCE_MAX) / np.float32(DISTANCE_MAX) for d in (from_wall, from_rest)]
+    return np.stack([wall, free, *scaled]).astype(np.float32)
+
+
+def random_crop(
+    rng: np.random.Generator, raster: PlanRaster, size: int
+) -> tuple[FloatImage, FloatImage, FloatImage]:
+    """Cut a square of a map around a cell of a room, mirrored, turned by quarters, worn at times.
+
+    Returns
+    -------
+    inputs : (4, size, size) float32
+    targets, weights : (OUTPUTS, size, size) float32
+    """
+    rows, columns = np.nonzero(raster.truths[0])
+    at = rng.integers(len(rows))
+    low = np.array([rows[at], columns[at]]) - (rng.uniform(0.15, 0.85, 2) * size).astype(int)
+    turns, mirror = int(rng.integers(4)), bool(rng.integers(2))
+    images: list[Labels] = []
+    layers: list[NDArray[np.integer[Any]]] = [raster.wall, raster.free, *raster.truths]
+    for image in layers:
+        window = _window(image, low, size).astype(np.int32)
+        images.append(np.rot90(window[:, ::-1] if mirror else window, turns))
+    wall, free = shares_of(images[0]), shares_of(images[1])
+    if rng.random() < 0.3:
+        wall, free = _worn(rng, wall, free)
+    targets, weights = network_targets(free > 0.3, images[2:])
+    return network_input(wall, free), targets, weights
+
+
+def shares_of(steps: NDArray[np.integer[Any]]) -> FloatImage:
+    """Shares in [0, 1] from counts of points."""
+    return (steps / np.float32(SHARE_STEPS)).astype(np.float32)
+
+
+def _window(image: NDArray[np.integer[Any]], low: NDArray[np.int64], size: int) -> NDArray[np.integer[Any]]:
+    out = np.zeros((size, size), image.dtype)
+    (r0, c0), (h, w) = low, image.shape
+    ra, rb, ca, cb = max(r0, 0), min(r0 + size, h), max(c0, 0), min(c0 + size, w)
+    if ra < rb and ca < cb:
+        out[ra - r0 : rb - r0, ca - c0 : cb - c0] = image[ra:rb, ca:cb]
+    return out
+
+
+def _worn(rng: np.random.Generator, wall: FloatImage, free: FloatImage) -> tuple[FloatImage, FloatImage]:
+    """Thin walls out, sprinkle spots, or cut unknown holes."""
+    kind, size = rng.integers(3), wall.shape[0]
+    if kind == 0:
+        left = (rng.random(wall.shape) > rng.uniform(0, 0.3)).astype(np.float32)
+        return wall * left, free
+    wall, free = wall.copy(), free.copy()
+    if kind == 1:
+        spots = (rng.random(wall.shape) < rng.uniform(0, 0.006)) & (free > 0.5)
+        wall[spots], free[spots] = 0.6, 0.4
+        return wall, free
+    for _ in range(rng.integers(1, 4)):
+        row, column = rng.integers(0, size, 2)
+        height, width = rng.integers(3, 30, 2)
+        wall[row : row + height, column : column + width] = 0
+        free[row : row + height, column : column + width] = 0
+    return wall, free
+
+
+def network_targets(valid: BoolArray, truths: list[Labels]) -> tuple[FloatImage, FloatImage]:
+    """What the network is to answer, and how much each answer counts.
+
+    Cells beside a room without a label (in doorways, below noise) are not asked about; neither are pairs on
+    which two truths differ.
+
+    Parameters
+    ----------
+    valid : (H, W) bool
+        Free cells.
+    truths : list of (H, W) int32
+    """
+    shape = valid.shape
+    targets = np.zeros((OUTPUTS, *shape), np.float32)
+    weights = np.zeros((OUTPUTS, *shape), np.float32)
+    first = truths[0]
+    distance = cv2.distanceTransform((first == 0).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_3)
+    outside = valid & (first == 0) & (distance > 2.5)
+    valid = valid & ((first > 0) | outside)
+    for k, (down, right) in enumerate(OFFSETS):
+        here, there = np.s_[down:, right:], np.s_[: shape[0] - down, : shape[1] - right]
+        a, b = first[here], first[there]
+        different = a != b
+        counts = valid[here] & valid[there] & ((a > 0) | (b > 0))
+        for other in truths[1:]:
+            counts &= different == (other[here] != other[there])
+        targets[k][here] = different
+        weights[k][here] = counts * np.where(different, DIFFERENT_WEIGHT[k // 2], 1.0)
+    targets[-1] = outside
+    weights[-1] = valid * np.where(outside, 2.0, 1.0)
+    return targets, weights

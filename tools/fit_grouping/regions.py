@@ -1,0 +1,275 @@
+"""The graph of regions: sums from which every feature of a join follows, after any joins."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from fit_grouping.atoms import BoolArray, Labels
+from fit_grouping.plan_rasters import OFFSETS, PlanRaster
+
+FloatArray = NDArray[np.float64]
+
+GROW_M = 0.3
+"""Regions face one another across walls of this thickness."""
+LINE_WINDOWS_M = (1.5, 3.0, 6.0)
+"""Wall is looked for along the line of a border within windows of these lengths."""
+STRONG_SCORE = 0.6
+"""Structure score of walls that go on for more than half of a room's side."""
+WIDE_M = 0.5
+"""What is wider than this is open floor, not a ray."""
+SPECK_MAX_CELLS = 2
+"""Occupied pieces up to this size do not narrow the clearance."""
+
+NODE_SUMS = ("area", "wall_edges", "unknown_edges", "wide", "outside")
+NODE_MAXIMA = (
+    "clear",
+    "clear_strong",
+    "x_high",
+    "x_low",
+    "y_high",
+    "y_low",
+    "sum_high",
+    "sum_low",
+    "dif_high",
+    "dif_low",
+)
+"""Maxima: of the clearance, and of the coordinates and their negatives, so that boxes and octagons follow."""
+BORDER_SUMS = (
+    "upright", "level", "facing_wall", "facing_unknown", "clear", "on_face",
+    "line_0", "line_1", "line_2",
+    "different_0", "different_1", "different_2", "pairs_0", "pairs_1", "pairs_2",
+)  # fmt: skip
+BORDER_MAXIMA = ("saddle", "saddle_strong", "x_high", "x_low", "y_high", "y_low")
+
+
+@dataclass(eq=False)
+class RegionGraph:
+    """Regions and their borders.
+
+    Attributes
+    ----------
+    node_sums, node_maxima : (N, ...) float
+        Columns as in `NODE_SUMS`, `NODE_MAXIMA`; meters and square meters.
+    ends : (M, 2) int
+        The two regions of each border, the lower number first; each pair once. Pairs that do not touch but
+        are near are listed too, with a contact of 0.
+    border_sums, border_maxima : (M, ...) float
+        Columns as in `BORDER_SUMS`, `BORDER_MAXIMA`.
+    """
+
+    node_sums: FloatArray
+    node_maxima: FloatArray
+    ends: NDArray[np.int64]
+    border_sums: FloatArray
+    border_maxima: FloatArray
+
+    def joined(self, root: NDArray[np.int64]) -> tuple[RegionGraph, NDArray[np.int64]]:
+        """Join regions.
+
+        Parameters
+        ----------
+        root : (N,) int
+            New number 0..K-1 of each region; those with the same are joined.
+
+        Returns
+        -------
+        graph : RegionGraph
+        border : (M,) int
+            New number of each border, -1 for those that are gone.
+        """
+        count = int(root.max(initial=-1)) + 1
+        node_sums = _summed(self.node_sums, root, count)
+        node_maxima = np.full((count, self.node_maxima.shape[1]), -np.inf)
+        np.maximum.at(node_maxima, root, self.node_maxima)
+        ends = np.sort(root[self.ends], axis=1)
+        kept = ends[:, 0] != ends[:, 1]
+        key, index = np.unique(ends[kept, 0] * count + ends[kept, 1], return_inverse=True)
+        border = np.full(len(ends), -1, np.int64)
+        border[kept] = index
+        border_maxima = np.full((len(key), self.border_maxima.shape[1]), -np.inf)
+        np.maximum.at(border_maxima, index, self.border_maxima[kept])
+        graph = RegionGraph(
+            node_sums,
+            node_maxima,
+            np.column_stack(np.divmod(key, max(count, 1))),
+            _summed(self.border_sums[kept], index, len(key)),
+            border_maxima,
+        )
+        return graph, border
+
+
+def _summed(values: FloatArray, index: NDArray[np.int64], count: int) -> FloatArray:
+    columns = [np.bincount(index, column, minlength=count) for column in values.T]
+    return np.stack(columns, axis=1) if columns else np.zeros((count, 0))
+
+
+def build_graph(
+    atoms: Labels,
+    raster: PlanRaster,
+    strong: BoolArray,
+    faces: Labels,
+    answers: NDArray[np.float32] | None,
+    cell_m: float,
+    count: int,
+) -> RegionGraph:
+    """Measure atoms and their borders on the plan frame.
+
+    Parameters
+    ----------
+    atoms : (H, W) int32
+        Atom 1..N of each cell, 0 for none.
+    raster : PlanRaster
+    strong : (H, W) bool
+        Cells of walls that go on for long, see `STRONG_SCORE`.
+    faces : (H, W) int32
+    answers : (OUTPUTS, H, W) float32, optional
+        The network's.
+    cell_m : float
+    count : int
+        Number of atoms; those that no center of a plan cell meets are not in the image.
+    """
+    wall = raster.wall > 0
+    inside = (raster.free > 0) | (atoms > 0)
+    atoms = _over_gaps(atoms, inside, 1.5)
+    solid = _without_specks(wall)
+    clear, clear_strong = (_clearance(mask, cell_m) for mask in (solid, strong))
+    row, column = np.nonzero(atoms)
+    node = atoms[row, column].astype(np.int64) - 1
+    node_sums = np.zeros((count, len(NODE_SUMS)))
+    node_sums[:, 0] = np.bincount(node, minlength=count) * cell_m**2
+    kind = np.pad(np.where(wall, 1, np.where(atoms > 0, 0, 2)).astype(np.uint8), 1, constant_values=2)
+    for down, right in ((0, 1), (1, 0), (1, 2), (2, 1)):
+        beside = kind[row + down, column + right]
+        for which in (1, 2):
+            node_sums[:, which] += np.bincount(node[beside == which], minlength=count) * cell_m
+    width = 2 * round(WIDE_M / cell_m / 2) + 1
+    wide = cv2.morphologyEx(inside.astype(np.uint8), cv2.MORPH_OPEN, np.ones((width, width), np.uint8))
+    node_sums[:, 3] = np.bincount(node[wide[row, column] > 0], minlength=count) * cell_m**2
+    if answers is not None:
+        node_sums[:, 4] = np.bincount(node, answers[-1][row, column], minlength=count) * cell_m**2
+    node_maxima = np.full((count, len(NODE_MAXIMA)), -np.inf)
+    x, y = (column + 0.5) * cell_m, (row + 0.5) * cell_m
+    half = cell_m / 2
+    values = [clear[row, column], clear_strong[row, column], x + half, half - x, y + half, half - y]
+    values += [x + y + cell_m, cell_m - x - y, x - y + cell_m, cell_m - x + y]
+    _fill_maxima(node_maxima, node, values)
+    # An atom that no center of a plan cell meets.
+    missed = np.isinf(node_maxima[:, 0])
+    node_maxima[missed] = 0
+    node_sums[missed, 0] = cell_m**2
+    keys, sums, maxima = _border_records(atoms, wall, clear, clear_strong, faces, answers, cell_m, count)
+    key, index = np.unique(keys, return_inverse=True)
+    border_maxima = np.full((len(key), len(BORDER_MAXIMA)), -np.inf)
+    touching = np.isfinite(maxima[:, 0])
+    _fill_maxima(border_maxima, index[touching], list(maxima[touching].T))
+    ends = np.column_stack(np.divmod(key, max(count, 1)))
+    return RegionGraph(node_sums, node_maxima, ends, _summed(sums, index, len(key)), border_maxima)
+
+
+def _fill_maxima(out: FloatArray, index: NDArray[np.int64], values: list[NDArray[np.floating]]) -> None:
+    """Greatest of the values of each index, by sorting once."""
+    if len(index) == 0:
+        return
+    order = np.argsort(index, kind="stable")
+    first = np.flatnonzero(np.append(True, np.diff(index[order]) != 0))
+    which = index[order][first]
+    for column, value in enumerate(values):
+        out[which, column] = np.maximum.reduceat(np.asarray(value)[order], first)
+
+
+def _border_records(
+    atoms: Labels,
+    wall: BoolArray,
+    clear: NDArray[np.float32],
+    clear_strong: NDArray[np.float32],
+    faces: Labels,
+    answers: NDArray[np.float32] | None,
+    cell_m: float,
+    count: int,
+) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
+    """One row for each pair of cells beside one another (or asked about) that lie in two regions."""
+    grown = _over_gaps(atoms, np.ones(atoms.shape, bool), GROW_M / cell_m)
+    keys, sums, maxima = [], [], []
+    for upright, (one, other) in ((True, (np.s_[:, :-1], np.s_[:, 1:])), (False, (np.s_[:-1], np.s_[1:]))):
+        a, b = grown[one], grown[other]
+        row, column = np.nonzero((a != b) & (a > 0) & (b > 0))
+        row2, column2 = (row, column + 1) if upright else (row + 1, column)
+        open_contact = (atoms[row, column] > 0) & (atoms[row2, column2] > 0)
+        walled = wall[row, column] | wall[row2, column2]
+        record = np.zeros((len(row), len(BORDER_SUMS)))
+        record[:, 0 if upright else 1] = open_contact * cell_m
+        record[:, 2] = (~open_contact & walled) * cell_m
+        record[:, 3] = (~open_contact & ~walled) * cell_m
+        narrow = np.minimum(clear[row, column], clear[row2, column2])
+        record[:, 4] = open_contact * narrow * cell_m
+        record[:, 5] = (open_contact & (faces[row, column] != faces[row2, column2])) * cell_m
+        for k, length in enumerate(LINE_WINDOWS_M):
+            along = _wall_along(wall, upright, length, cell_m)
+            record[:, 6 + k] = open_contact * np.maximum(along[row, column], along[row2, column2]) * cell_m
+        extreme = np.full((len(row), len(BORDER_MAXIMA)), -np.inf)
+        x, y = (column + column2 + 1) / 2 * cell_m, (row + row2 + 1) / 2 * cell_m
+        half_x, half_y = (0.0, cell_m / 2) if upright else (cell_m / 2, 0.0)
+        narrow_strong = np.minimum(clear_strong[row, column], clear_strong[row2, column2])
+        for k, value in enumerate((narrow, narrow_strong, x + half_x, half_x - x, y + half_y, half_y - y)):
+            extreme[:, k] = np.where(open_contact, value, -np.inf)
+        keys.append(_pair_key(grown[row, column], grown[row2, column2], count))
+        sums.append(record)
+        maxima.append(extreme)
+    if answers is not None:
+        for k, (down, right) in enumerate(OFFSETS):
+            a = atoms[down:, right:]
+            b = atoms[: atoms.shape[0] - down, : atoms.shape[1] - right]
+            asked = (a != b) & (a > 0) & (b > 0)
+            key, index = np.unique(_pair_key(a[asked], b[asked], count), return_inverse=True)
+            record = np.zeros((len(key), len(BORDER_SUMS)))
+            record[:, 9 + k // 2] = np.bincount(index, answers[k][down:, right:][asked], minlength=len(key))
+            record[:, 12 + k // 2] = np.bincount(index, minlength=len(key))
+            keys.append(key)
+            sums.append(record)
+            maxima.append(np.full((len(key), len(BORDER_MAXIMA)), -np.inf))
+    return np.concatenate(keys), np.concatenate(sums), np.concatenate(maxima)
+
+
+def _pair_key(a: Labels, b: Labels, count: int) -> NDArray[np.int64]:
+    low, high = np.minimum(a, b).astype(np.int64) - 1, np.maximum(a, b).astype(np.int64) - 1
+    return low * count + high
+
+
+def _wall_along(wall: BoolArray, upright: bool, length_m: float, cell_m: float) -> NDArray[np.float32]:
+    """Share of a window along a line through each cell in which there is wall, a cell beside it counted."""
+    size = 2 * round(length_m / cell_m / 2) + 1
+    across = np.ones((1, 3), np.uint8) if upright else np.ones((3, 1), np.uint8)
+    near = cv2.dilate(wall.astype(np.uint8), across).astype(np.float32)
+    window = (1, size) if upright else (size, 1)
+    return cv2.blur(near, window, borderType=cv2.BORDER_CONSTANT).astype(np.float32)
+
+
+def _clearance(blocked: BoolArray, cell_m: float) -> NDArray[np.float32]:
+    distance = cv2.distanceTransform((~blocked).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
+    return (distance * np.float32(cell_m)).astype(np.float32)
+
+
+def _without_specks(wall: BoolArray) -> BoolArray:
+    _, piece, stats, _ = cv2.connectedComponentsWithStats(wall.astype(np.uint8), connectivity=8)
+    keep = np.maximum(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT]) > SPECK_MAX_CELLS
+    keep[0] = False
+    kept: BoolArray = keep[piece]
+    return kept
+
+
+def _over_gaps(labels: Labels, where: BoolArray, reach_cells: float) -> Labels:
+    """Labels over cells without one, from the nearest that has one, up to a distance."""
+    if not labels.any():
+        return labels
+    distance, nearest = cv2.distanceTransformWithLabels(
+        (labels == 0).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
+    )
+    of_nearest = np.zeros(int(nearest.max()) + 1, np.int32)
+    of_nearest[nearest[labels > 0]] = labels[labels > 0]
+    return np.where((distance <= reach_cells) & (where | (labels > 0)), of_nearest[nearest], 0).astype(
+        np.int32
+    )
