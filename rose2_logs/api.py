@@ -22,7 +22,7 @@ from rose2_logs.config.selection import Selection
 from rose2_logs.errors import InvalidMapError, ParameterError
 from rose2_logs.io import open_log as open_log_reader
 from rose2_logs.io.log import LogReader
-from rose2_logs.model.occupancy import UNKNOWN, GridGeometry, OccupancySnapshot, free_area_m2
+from rose2_logs.model.occupancy import GridGeometry, OccupancySnapshot, free_area_m2
 from rose2_logs.runs.run import Run
 from rose2_logs.runs.sink import Sink
 from rose2_logs.runs.stream import TrackedStream, start_workers
@@ -264,7 +264,7 @@ def _snapshot_of_array(array: ArrayLike, resolution_m: float | None) -> Occupanc
     if resolution_m is None:
         raise ParameterError("an array does not say how large its cells are; give resolution_m in meters")
     try:
-        cells = np.ma.filled(array, UNKNOWN) if isinstance(array, np.ma.MaskedArray) else np.asarray(array)
+        cells = np.asanyarray(array)  # a mask is kept: what it hides is unknown to the snapshot
     except ValueError as error:
         raise InvalidMapError("all rows of a map must have the same number of cells") from error
     geometry = GridGeometry(resolution_m, (0.0, 0.0), 0.0, "map", cells.shape)

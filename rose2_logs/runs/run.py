@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rose2_logs.model.occupancy import UNKNOWN, GridGeometry
-from rose2_logs.model.room_plan import RoomPlan
+from rose2_logs.model.room_plan import PlanMap, RoomPlan
 from rose2_logs.runs.stored_run import StoredRun
 from rose2_logs.runs.table import Table
 from rose2_logs.runs.tables import BACK_PROJECTED, Row
@@ -227,6 +227,10 @@ class RunSnapshot:
     def _row(self) -> Row:
         return self.run.row(self.number)
 
+    @cached_property
+    def _map(self) -> tuple[PlanMap, tuple[slice, slice]]:
+        return self.run.map(self.number)
+
     @property
     def coverage(self) -> float:
         """Known free area over that of the last map, in [0, 1]."""
@@ -250,7 +254,7 @@ class RunSnapshot:
     @cached_property
     def labels(self) -> NDArray[np.int32]:
         """Label image (H, W) on the map's grid: track of each cell's room, 0 for none. Row 0: origin."""
-        stored, window = self.run.map(self.number)
+        stored, window = self._map
         whole = np.zeros(self.geometry.shape, np.int32)
         whole[window] = stored.labels
         return whole
@@ -258,7 +262,7 @@ class RunSnapshot:
     @cached_property
     def cells(self) -> NDArray[np.int8]:
         """Classes (H, W) of the map's cells: -1 unknown, 0 free, 50 between the thresholds, 100 occupied."""
-        stored, window = self.run.map(self.number)
+        stored, window = self._map
         whole = np.full(self.geometry.shape, UNKNOWN, np.int8)
         whole[window] = stored.cells
         return whole
