@@ -22,6 +22,8 @@ OUTPUTS = len(OFFSETS) + 1
 """An answer for each pair, and one whether a cell is outside."""
 DISTANCE_MAX = 30
 """Distances are told up to this many cells."""
+WORN_SHARE = 0.45
+"""Share of the crops that are worn or furnished."""
 DIFFERENT_WEIGHT = (3.0, 2.0, 1.5)
 """Pairs in different rooms are rarer than others, the nearer the more so."""
 
@@ -82,7 +84,7 @@ def random_crop(
         window = _window(image, low, size).astype(np.int32)
         images.append(np.rot90(window[:, ::-1] if mirror else window, turns))
     wall, free = shares_of(images[0]), shares_of(images[1])
-    if rng.random() < 0.3:
+    if rng.random() < WORN_SHARE:
         wall, free = _worn(rng, wall, free)
     targets, weights = network_targets(free > 0.3, images[2:])
     return network_input(wall, free), targets, weights
@@ -103,8 +105,8 @@ def _window(image: NDArray[np.integer[Any]], low: NDArray[np.int64], size: int) 
 
 
 def _worn(rng: np.random.Generator, wall: FloatImage, free: FloatImage) -> tuple[FloatImage, FloatImage]:
-    """Thin walls out, sprinkle spots, or cut unknown holes."""
-    kind, size = rng.integers(3), wall.shape[0]
+    """Thin walls out, sprinkle spots, cut unknown holes, put furniture in, or leave a side unseen."""
+    kind, size = rng.integers(5), wall.shape[0]
     if kind == 0:
         left = (rng.random(wall.shape) > rng.uniform(0, 0.3)).astype(np.float32)
         return wall * left, free
@@ -112,13 +114,38 @@ def _worn(rng: np.random.Generator, wall: FloatImage, free: FloatImage) -> tuple
     if kind == 1:
         spots = (rng.random(wall.shape) < rng.uniform(0, 0.006)) & (free > 0.5)
         wall[spots], free[spots] = 0.6, 0.4
-        return wall, free
-    for _ in range(rng.integers(1, 4)):
-        row, column = rng.integers(0, size, 2)
-        height, width = rng.integers(3, 30, 2)
-        wall[row : row + height, column : column + width] = 0
-        free[row : row + height, column : column + width] = 0
+    elif kind == 2:
+        for _ in range(rng.integers(1, 4)):
+            row, column = rng.integers(0, size, 2)
+            height, width = rng.integers(3, 30, 2)
+            wall[row : row + height, column : column + width] = 0
+            free[row : row + height, column : column + width] = 0
+    elif kind == 3:
+        _furnish(rng, wall, free)
+    else:
+        angle, beyond = rng.uniform(0, 2 * np.pi), rng.uniform(0.1, 0.5) * size
+        y, x = np.mgrid[:size, :size] - size / 2
+        unseen = np.cos(angle) * x + np.sin(angle) * y > beyond
+        wall[unseen], free[unseen] = 0, 0
     return wall, free
+
+
+def _furnish(rng: np.random.Generator, wall: FloatImage, free: FloatImage) -> None:
+    """Put hollow boxes of 0.3 to 2.5 m where the floor is free."""
+    rows, columns = np.nonzero(free > 0.9)
+    if len(rows) == 0:
+        return
+    for _ in range(rng.integers(1, 9)):
+        at = rng.integers(len(rows))
+        height, width = rng.integers(3, 26), rng.integers(3, 12)
+        if rng.random() < 0.5:
+            height, width = width, height
+        box = np.s_[rows[at] : rows[at] + height, columns[at] : columns[at] + width]
+        if (free[box] < 0.9).any():
+            continue
+        wall[box], free[box] = 0.7, 0.2
+        inner = np.s_[rows[at] + 1 : rows[at] + height - 1, columns[at] + 1 : columns[at] + width - 1]
+        wall[inner], free[inner] = 0, 0
 
 
 def network_targets(valid: BoolArray, truths: list[Labels]) -> tuple[FloatImage, FloatImage]:
