@@ -29,6 +29,7 @@ _HOMES = {
     ),
     "io.log": ("LogReader",),
     "model.analysis": ("FloorPlan", "SnapshotAnalysis", "Structure", "Walls"),
+    "model.borders": ("Border",),
     "model.occupancy": ("GridGeometry", "OccupancySnapshot"),
     "model.room_plan": ("RoomPlan",),
     "model.rooms": ("Doorway", "RoomMap"),

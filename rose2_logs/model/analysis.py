@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
+from rose2_logs.model.borders import Border
 from rose2_logs.model.occupancy import BoolArray, CellValues, FloatArray, GridGeometry, OccupancySnapshot
 from rose2_logs.model.room_quality import RoomQuality
 from rose2_logs.model.rooms import Doorway, RoomMap
@@ -166,6 +167,10 @@ class SnapshotAnalysis:
         Time per stage.
     voronoi_m : (V, 4) float or None
         Lines x0, y0, x1, y1 of the free space's Voronoi graph, world meters, if it was requested.
+    borders : tuple of Border
+        What parts neighboring rooms, from the fitted grouping.
+    outside_m2 : float
+        Free area that the fitted grouping left out as outside the building.
 
     Examples
     --------
@@ -189,6 +194,8 @@ class SnapshotAnalysis:
     quality: RoomQuality
     seconds: dict[str, float]
     voronoi_m: FloatArray | None = None
+    borders: tuple[Border, ...] = ()
+    outside_m2: float = 0.0
 
     def __repr__(self) -> str:
         parts = [f"index={self.index}", repr(self.rooms)]

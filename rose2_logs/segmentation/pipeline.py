@@ -16,6 +16,7 @@ from rose2_logs.config.baselines import METHODS
 from rose2_logs.config.parameters import FloorPlanParameters, Parameters, TopologyParameters
 from rose2_logs.errors import ParameterError
 from rose2_logs.model.analysis import FloorPlan, SnapshotAnalysis, Structure, Walls
+from rose2_logs.model.borders import Border
 from rose2_logs.model.explored import ExploredPart
 from rose2_logs.model.labels import label_sizes
 from rose2_logs.model.occupancy import FloatArray, OccupancySnapshot
@@ -24,8 +25,14 @@ from rose2_logs.model.room_quality import room_quality
 from rose2_logs.model.rooms import Doorway, RoomMap
 from rose2_logs.segmentation.baselines.stage import segment_by_baseline
 from rose2_logs.segmentation.floor_plan.stage import FloorPlanResult, make_floor_plan
+from rose2_logs.segmentation.regions.stage import (
+    find_atoms,
+    find_rooms,
+    generous_floor_plan,
+    generous_walls,
+)
 from rose2_logs.segmentation.rooms.doorways import find_doorways
-from rose2_logs.segmentation.rooms.stage import make_rooms
+from rose2_logs.segmentation.rooms.stage import RoomsResult, finish_rooms, make_rooms
 from rose2_logs.segmentation.rose.stage import CleanMap, StructureResult, find_structure, make_clean_map
 from rose2_logs.segmentation.topology.splitting import split_rooms
 from rose2_logs.segmentation.topology.voronoi import voronoi_lines
@@ -90,6 +97,8 @@ def analyze(
         quality,
         watch.seconds,
         stages.voronoi_m,
+        stages.borders,
+        stages.outside_m2,
     )
 
 
@@ -103,13 +112,15 @@ class _Stages:
     walls: Walls | None = None
     floor_plan: FloorPlan | None = None
     voronoi_m: FloatArray | None = None
+    borders: tuple[Border, ...] = ()
+    outside_m2: float = 0.0
 
 
 def _analyze_by_rose2(
     explored: ExploredPart, parameters: Parameters, watch: _StopWatch, *, voronoi: bool
 ) -> _Stages:
     """Go through the stages of the paper."""
-    free, occupied, cell_m = explored.free, explored.occupied, explored.resolution_m
+    occupied, cell_m = explored.occupied, explored.resolution_m
 
     # A: dominant directions and clean map
     scored = find_structure(occupied, cell_m, parameters.spectrum)
@@ -121,19 +132,16 @@ def _analyze_by_rose2(
 
     # B: wall segments, wall clusters, representative lines
     built = find_walls(scored.supported, clean.cells, clean.attached, directions, cell_m, parameters.walls)
-    del scored, clean  # the stages to come need their memory
-    walls, lines_m = built.walls, built.lines.ends_m
+    walls = built.walls
     watch.lap("walls")
 
-    # C: faces between the lines, joined where no wall divides them
+    # C and D: rooms between the walls
     strongest = float(directions[0]) if len(directions) else 0.0
-    plan = make_floor_plan(lines_m, walls, free, strongest, cell_m, parameters.floor_plan)
-    watch.lap("floor_plan")
-
-    # D: rooms split at the narrow places of their Voronoi graph, with straight borders and doorways
-    split = split_rooms(plan.labels, walls, lines_m, directions, cell_m, parameters.topology)
-    watch.lap("topology")
-    finished = make_rooms(split, plan, free, cell_m, parameters.floor_plan)
+    by_borders = parameters.floor_plan.grouping == "fitted"
+    group = _rooms_by_borders if by_borders else _rooms_by_walls
+    grouped = group(explored, scored, built, strongest, parameters, watch)
+    del scored, clean  # the rest needs their memory
+    finished = grouped.rooms
     rooms = _room_map(finished.labels, finished.shapes, explored, parameters.topology)
     watch.lap("rooms")
 
@@ -143,8 +151,65 @@ def _analyze_by_rose2(
         inside = (finished.labels > 0) | (occupied & ~walls)
         graph = explored.segments(voronoi_lines(inside, walls, cell_m, parameters.topology))
         watch.lap("voronoi")
-    floor_plan = _floor_plan(plan, finished.room_of_face, explored, parameters.floor_plan)
-    return _Stages(cell_m, rooms, structure, _walls(built, explored), floor_plan, graph)
+    floor_plan = _floor_plan(grouped.plan, finished.room_of_face, explored, parameters.floor_plan)
+    return _Stages(
+        cell_m,
+        rooms,
+        structure,
+        _walls(built, explored),
+        floor_plan,
+        graph,
+        grouped.borders,
+        grouped.outside_m2,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Grouped:
+    """What stages C and D give in the grid frame."""
+
+    plan: FloorPlanResult
+    rooms: RoomsResult
+    borders: tuple[Border, ...] = ()
+    outside_m2: float = 0.0
+
+
+def _rooms_by_borders(
+    explored: ExploredPart,
+    scored: StructureResult,
+    built: WallResult,
+    strongest_rad: float,
+    parameters: Parameters,
+    watch: _StopWatch,
+) -> _Grouped:
+    """Faces and basins of the clearance, joined by the fitted strength of their borders."""
+    free, occupied, cell_m = explored.free, explored.occupied, explored.resolution_m
+    generous = generous_walls(scored, cell_m, parameters)
+    plan, faces = generous_floor_plan(generous, free, strongest_rad, cell_m, parameters)
+    watch.lap("floor_plan")
+    atoms = find_atoms(free, occupied, scored.score, faces, strongest_rad, cell_m, parameters.regions)
+    watch.lap("atoms")
+    found = find_rooms(atoms, free, cell_m, parameters.regions)
+    watch.lap("regions")
+    finished, borders = finish_rooms(found, plan, faces, free, cell_m, parameters)
+    return _Grouped(plan, finished, borders, found.outside_m2)
+
+
+def _rooms_by_walls(
+    explored: ExploredPart,
+    scored: StructureResult,
+    built: WallResult,
+    strongest_rad: float,
+    parameters: Parameters,
+    watch: _StopWatch,
+) -> _Grouped:
+    """Faces joined where no wall divides them, and rooms split at narrow places of their Voronoi graph."""
+    free, cell_m, lines_m = explored.free, explored.resolution_m, built.lines.ends_m
+    plan = make_floor_plan(lines_m, built.walls, free, strongest_rad, cell_m, parameters.floor_plan)
+    watch.lap("floor_plan")
+    split = split_rooms(plan.labels, built.walls, lines_m, scored.directions_rad, cell_m, parameters.topology)
+    watch.lap("topology")
+    return _Grouped(plan, make_rooms(split, plan, free, cell_m, parameters.floor_plan))
 
 
 def _analyze_by_baseline(

@@ -28,20 +28,21 @@ def two_rooms():
 
 @pytest.fixture(scope="module")
 def prepared(two_rooms):
-    from fit_grouping.atoms import AtomParameters
     from fit_grouping.maps_with_truth import TruthMap
     from fit_grouping.preparing import prepare
 
+    from rose2_logs.config.parameters import Parameters
+
     free, occupied, truth = two_rooms
     one = TruthMap("drawn", "two rooms", "two rooms", 0.05, free, occupied, (truth,))
-    return prepare(one, AtomParameters(), 0)
+    return prepare(one, Parameters(), 0)
 
 
 def answers_of(prepared):
-    from fit_grouping.plan_rasters import OUTPUTS
+    from rose2_logs.segmentation.regions.plan_raster import OUTPUTS
 
     rng = np.random.default_rng(0)
-    return rng.random((OUTPUTS, *prepared.atoms.shape)).astype(np.float32)
+    return rng.random((OUTPUTS, *prepared.atoms.on_plan.shape)).astype(np.float32)
 
 
 def test_atoms_of_two_rooms_do_not_cross_the_wall(prepared):
@@ -52,7 +53,7 @@ def test_atoms_of_two_rooms_do_not_cross_the_wall(prepared):
 
 
 def test_small_pieces_go_to_the_neighbor_that_they_touch_most():
-    from fit_grouping.atoms import absorb_small
+    from rose2_logs.segmentation.regions.atoms import absorb_small
 
     pieces = np.zeros((10, 30), np.int32)
     pieces[:, :14], pieces[:, 15:29], pieces[:6, 14], pieces[9, 29] = 1, 2, 3, 4
@@ -64,7 +65,7 @@ def test_small_pieces_go_to_the_neighbor_that_they_touch_most():
 
 @pytest.mark.parametrize("angle", [0.0, 0.4, -1.2])
 def test_plan_frame_keeps_areas_and_leads_back(angle):
-    from fit_grouping.atoms import PlanFrame
+    from rose2_logs.segmentation.regions.plan_frame import PlanFrame
 
     mask = np.zeros((120, 160), bool)
     mask[20:100, 30:140] = True
@@ -78,7 +79,7 @@ def test_plan_frame_keeps_areas_and_leads_back(angle):
 
 def test_sums_of_joined_regions_are_those_of_the_joined_atoms(prepared):
     """Whatever is joined, the graph is the one that is built from the joined regions."""
-    from fit_grouping.regions import build_graph
+    from rose2_logs.segmentation.regions.graph import build_graph
 
     answers = answers_of(prepared)
     count = len(prepared.tables[0]) - 1
@@ -86,9 +87,15 @@ def test_sums_of_joined_regions_are_those_of_the_joined_atoms(prepared):
     root = np.random.default_rng(1).integers(0, max(count // 2, 1), count)
     root = np.unique(root, return_inverse=True)[1]
     joined, border = graph.joined(root)
-    relabeled = np.concatenate([[0], root + 1])[prepared.atoms].astype(np.int32)
+    relabeled = np.concatenate([[0], root + 1])[prepared.atoms.on_plan].astype(np.int32)
     again = build_graph(
-        relabeled, prepared.raster, prepared.strong, prepared.faces, answers, prepared.cell_m, root.max() + 1
+        relabeled,
+        prepared.atoms.raster,
+        prepared.atoms.strong,
+        prepared.atoms.faces_on_plan,
+        answers,
+        prepared.atoms.frame.cell_m,
+        root.max() + 1,
     )
     assert np.array_equal(joined.ends, again.ends)
     np.testing.assert_allclose(joined.node_sums, again.node_sums, atol=1e-4)
@@ -99,7 +106,7 @@ def test_sums_of_joined_regions_are_those_of_the_joined_atoms(prepared):
 
 
 def test_features_are_finite(prepared):
-    from fit_grouping.features import FEATURES, join_features, joinable
+    from rose2_logs.segmentation.regions.features import FEATURES, join_features, joinable
 
     graph = prepared.graph(answers_of(prepared))
     which = np.flatnonzero(joinable(graph))
@@ -109,19 +116,19 @@ def test_features_are_finite(prepared):
 
 
 def test_a_lower_level_joins_more(prepared):
-    from fit_grouping.joining import join_regions
-    from fit_grouping.strengths import by_hand
+    from fit_grouping.sampling import by_hand
+
+    from rose2_logs.segmentation.regions.joining import join_regions
 
     graph = prepared.graph(None)
-    joins = join_regions(graph, by_hand)
-    counts = [joins.regions(len(graph.node_sums), level).max() + 1 for level in (-9, -1, 0, 1, 9)]
+    joins = join_regions(graph, by_hand, -10)
+    counts = [joins.regions(level).max() + 1 for level in (-9, -1, 0, 1, 9)]
     assert counts == sorted(counts)
     assert counts[0] == 1
 
 
 def test_samples_join_only_what_is_one_room(prepared):
-    from fit_grouping.joining import sample_joins
-    from fit_grouping.strengths import by_hand
+    from fit_grouping.sampling import by_hand, sample_joins
 
     graph = prepared.graph(None)
     samples = sample_joins(graph, tuple(t[1:] for t in prepared.tables), by_hand, 0.0, 0)
@@ -133,9 +140,10 @@ def test_samples_join_only_what_is_one_room(prepared):
 
 
 def test_trees_as_arrays_answer_as_the_fitted_model():
-    from fit_grouping.features import FEATURES
-    from fit_grouping.strengths import BoostedTrees
+    from fit_grouping.tree_files import trees_of
     from sklearn.ensemble import HistGradientBoostingClassifier
+
+    from rose2_logs.segmentation.regions.features import FEATURES
 
     rng = np.random.default_rng(0)
     features = rng.normal(size=(900, len(FEATURES)))
@@ -143,25 +151,26 @@ def test_trees_as_arrays_answer_as_the_fitted_model():
     columns = np.array([3, 5, 7])
     model = HistGradientBoostingClassifier(max_iter=9, max_leaf_nodes=6, random_state=0)
     model.fit(features[:, columns], right)
-    trees = BoostedTrees.of(model, columns)
+    trees = trees_of(model, columns)
     expected = model.decision_function(features[:, columns])
     np.testing.assert_allclose(trees(features), expected, atol=1e-6)
 
 
 def test_trees_of_one_kind_of_decision_are_refused():
-    from fit_grouping.strengths import BoostedTrees
+    from fit_grouping.tree_files import trees_of
     from sklearn.ensemble import HistGradientBoostingClassifier
 
     features = np.random.default_rng(0).normal(size=(50, 3))
     model = HistGradientBoostingClassifier(max_iter=2).fit(features, np.ones(50, bool))
     with pytest.raises(ValueError, match="one kind"):
-        BoostedTrees.of(model, np.arange(3))
+        trees_of(model, np.arange(3))
 
 
 def test_rule_fitted_without_anything_outside_keeps_every_room(prepared):
-    from fit_grouping.features import region_features
     from fit_grouping.fit_tree import examples_of
     from fit_grouping.outside import SURE_LOG_ODDS, fit_outside
+
+    from rose2_logs.segmentation.regions.features import region_features
 
     (example,) = examples_of([prepared], [None])
     rooms = prepared.tables[0][1:].argmax(1) > 1
@@ -170,29 +179,30 @@ def test_rule_fitted_without_anything_outside_keeps_every_room(prepared):
 
 
 def test_maps_without_free_floor_have_no_rooms():
-    from fit_grouping.atoms import AtomParameters
     from fit_grouping.fit_tree import examples_of, scores_at
     from fit_grouping.maps_with_truth import TruthMap
     from fit_grouping.preparing import prepare
-    from fit_grouping.strengths import by_hand
+    from fit_grouping.sampling import by_hand
+
+    from rose2_logs.config.parameters import Parameters
 
     occupied = np.zeros((40, 60), bool)
     occupied[20] = True
     nothing = np.zeros(occupied.shape, bool)
     one = TruthMap("drawn", "wall", "wall", 0.05, nothing, occupied, (nothing.astype(np.int32),))
-    map_without_floor = prepare(one, AtomParameters(), 0)
+    map_without_floor = prepare(one, Parameters(), 0)
     examples = examples_of([map_without_floor], [None])
     assert scores_at(examples, [by_hand], [0.0]).tolist() == [[0.0]]
 
 
 def test_strength_weighs_trees_and_answers():
-    from fit_grouping.features import FEATURES
-    from fit_grouping.strengths import DIFFERENT, JoinStrength
+    from rose2_logs.segmentation.regions.features import FEATURES
+    from rose2_logs.segmentation.regions.strengths import DIFFERENT, JoinStrength
 
     features = np.zeros((3, len(FEATURES)))
     features[:, DIFFERENT] = [0.0, 1.0, -1.0]
-    strength = JoinStrength(None, answer_weight=1.0, answer_scale=12.0, offset=1.0)
-    np.testing.assert_allclose(strength(features), [5.0, -7.0, -7.0])
+    strength = JoinStrength(None, answer_weight=1.0, answer_scale=12.0)
+    np.testing.assert_allclose(strength(features), [6.0, -6.0, -6.0])
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -219,7 +229,9 @@ def test_simulated_maps_come_back_from_their_file(tmp_path):
 
 
 def test_targets_ask_about_pairs_of_rooms_only_where_truths_agree():
-    from fit_grouping.plan_rasters import OFFSETS, network_targets
+    from fit_grouping.truth_rasters import network_targets
+
+    from rose2_logs.segmentation.regions.plan_raster import OFFSETS
 
     first = np.zeros((40, 40), np.int32)
     first[5:35, 5:20], first[5:35, 20:35] = 1, 2
@@ -246,9 +258,10 @@ def test_score_of_a_grouping_is_that_of_its_label_image(two_rooms, prepared):
 
 def test_network_answers_the_same_from_its_file(tmp_path, prepared):
     torch = pytest.importorskip("torch")
-    from fit_grouping.answers import AnsweringNetwork
     from fit_grouping.network import RoomNetwork, export_onnx
-    from fit_grouping.plan_rasters import OUTPUTS
+
+    from rose2_logs.segmentation.regions.answers import AnsweringNetwork
+    from rose2_logs.segmentation.regions.plan_raster import OUTPUTS
 
     torch.manual_seed(0)
     network = RoomNetwork((4, 6, 8, 8, 8)).eval()
@@ -263,8 +276,9 @@ def test_everything_is_fitted_by_one_command(tmp_path):
     """A tiny run: three maps in three folds, trained on for a second."""
     pytest.importorskip("torch", reason="the network is trained with torch, which is not installed")
     from fit_grouping.buildings.make_buildings import simulate
-    from fit_grouping.features import REGION_FEATURES
-    from fit_grouping.strengths import read_trees
+
+    from rose2_logs.segmentation.regions.features import REGION_FEATURES
+    from rose2_logs.segmentation.regions.strengths import read_trees
 
     cases = []
     for number, seed in enumerate((2, 3, 8)):

@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from fit_grouping.features import REGION_FEATURES, SHAPE_FEATURES
 from fit_grouping.figures import figures_table
 from fit_grouping.fit_tree import (
     Example,
@@ -33,19 +32,24 @@ from fit_grouping.fit_tree import (
     left_out_scores,
     scores_at,
 )
-from fit_grouping.joining import Samples, Strength, join_regions
 from fit_grouping.keeping import kept
 from fit_grouping.maps_with_truth import FOLDS, load_benchmark
-from fit_grouping.outside import fit_outside, rooms_of
+from fit_grouping.outside import fit_outside
 from fit_grouping.preparing import PreparedMap, answered, prepared_benchmark, prepared_simulated
+from fit_grouping.sampling import Samples, by_hand
 from fit_grouping.scores import best_iou_sym
-from fit_grouping.strengths import BoostedTrees, JoinStrength, by_hand, write_trees
+from fit_grouping.tree_files import write_trees
+from rose2_logs.config.parameters import RegionParameters
+from rose2_logs.segmentation.regions.features import REGION_FEATURES, SHAPE_FEATURES
+from rose2_logs.segmentation.regions.joining import Strength, join_regions
+from rose2_logs.segmentation.regions.outside import rooms_of
+from rose2_logs.segmentation.regions.strengths import BoostedTrees, JoinStrength
 
 HERE = Path(__file__).parent
 MAPS_PER_FILE = 400
 SIMULATED_WEIGHT = 0.15
 """Weight of a simulated map in the fit of the trees, beside 1 for a real building of one map."""
-ANSWER_WEIGHT = 1.0
+REGIONS = RegionParameters()
 LEVELS = tuple(np.arange(-1.5, 1.51, 0.5).tolist())
 
 
@@ -102,9 +106,20 @@ def fit_on(parts: Sequence[Sequence[Samples]], parameters: TreeParameters, seed:
     return fit_trees(samples, columns_of(SHAPE_FEATURES), parameters, seed)
 
 
+def summed(trees: BoostedTrees) -> JoinStrength:
+    """The strength as the package uses it."""
+    return JoinStrength(trees, REGIONS.answer_weight, REGIONS.answer_scale)
+
+
+def room_of_atoms(example: Example, region: NDArray[np.int64], rule: BoostedTrees) -> NDArray[np.int64]:
+    """Room 1.. of each atom, 0 for what is outside or too small."""
+    regions, _ = example.graph.joined(region)
+    return rooms_of(regions, rule, REGIONS)[0][region]
+
+
 def regions_of(examples: Sequence[Example], strength: Strength) -> list[NDArray[np.int64]]:
     """Region of each atom of each map, joined as long as that is more likely right than wrong."""
-    return [join_regions(e.graph, strength, 0.0).regions(len(e.graph.node_sums), 0.0) for e in examples]
+    return [join_regions(e.graph, strength, 0.0).regions(0.0) for e in examples]
 
 
 def main() -> None:
@@ -143,23 +158,23 @@ def main() -> None:
     ]
     rows = {}
     for name, strengths in (
-        ("network alone", [JoinStrength(None, 1.0)] * len(maps)),
+        ("network alone", [JoinStrength(None, 1.0, REGIONS.answer_scale)] * len(maps)),
         ("trees alone", [trees[f] for f in fold_of]),
-        ("sum", [JoinStrength(trees[f], ANSWER_WEIGHT) for f in fold_of]),
+        ("sum", [summed(trees[f]) for f in fold_of]),
     ):
         rows[name], _ = left_out_scores(maps, scores_at(real, strengths, LEVELS))
     rows["sum, rule for outside"] = np.zeros(len(maps))
     for fold in range(FOLDS):
-        regions = regions_of(real, JoinStrength(trees[fold], ANSWER_WEIGHT))
+        regions = regions_of(real, summed(trees[fold]))
         others = np.flatnonzero(fold_of != fold).tolist()
         rule = fit_outside([real[k] for k in others], [regions[k] for k in others], seed)
         for k in np.flatnonzero(fold_of == fold).tolist():
-            rooms = rooms_of(real[k], regions[k], rule, 0.0)
+            rooms = room_of_atoms(real[k], regions[k], rule)
             rows["sum, rule for outside"][k] = best_iou_sym(maps[k].tables, rooms)
     (work / "figures.md").write_text(figures_table(maps, rows) + "\n", encoding="utf-8")
     final = fit_on(parts + made_parts, parameters, seed)
     write_trees(work / "joins.npz", final)
-    regions = regions_of(real, JoinStrength(final, ANSWER_WEIGHT))
+    regions = regions_of(real, summed(final))
     write_trees(work / "outside.npz", fit_outside(real, regions, seed), REGION_FEATURES)
     (work / "borders.onnx").write_bytes(all_maps.read_bytes())
     print((work / "figures.md").read_text(encoding="utf-8"))

@@ -10,12 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 from sklearn.ensemble import HistGradientBoostingClassifier
 
-from fit_grouping.features import FEATURES
-from fit_grouping.joining import Joins, Samples, Strength, join_regions, sample_joins
 from fit_grouping.preparing import PreparedMap
-from fit_grouping.regions import RegionGraph
+from fit_grouping.sampling import Samples, by_hand, sample_joins
 from fit_grouping.scores import best_iou_sym
-from fit_grouping.strengths import BoostedTrees, by_hand
+from fit_grouping.tree_files import trees_of
+from rose2_logs.segmentation.regions.features import FEATURES
+from rose2_logs.segmentation.regions.graph import RegionGraph
+from rose2_logs.segmentation.regions.joining import Joins, Strength, join_regions
+from rose2_logs.segmentation.regions.strengths import BoostedTrees
 
 FloatArray = NDArray[np.float64]
 
@@ -95,7 +97,7 @@ def fit_trees(
     model.fit(
         samples.features[kept][:, columns], samples.right[kept], sample_weight=(weight / keep_share)[kept]
     )
-    return BoostedTrees.of(model, columns)
+    return trees_of(model, columns)
 
 
 def columns_of(names: Sequence[str]) -> NDArray[np.intp]:
@@ -123,8 +125,7 @@ def regions_at(example: Example, joins: Joins, least: float, outside_max: float 
 
     Where nearly all is outside, that answer is not believed.
     """
-    count = len(example.graph.node_sums)
-    region = joins.regions(count, least)
+    region = joins.regions(least)
     sums = np.stack([np.bincount(region, example.graph.node_sums[:, k]) for k in (0, 4)])
     outside = sums[1] / sums[0] > outside_max
     if sums[0][outside].sum() > 0.8 * sums[0].sum():

@@ -7,7 +7,7 @@ from pathlib import Path
 import torch
 from torch import Tensor, nn
 
-from fit_grouping.plan_rasters import OUTPUTS
+from rose2_logs.segmentation.regions.plan_raster import OUTPUTS
 
 CHANNELS = (16, 28, 40, 56, 72)
 """Channels at 0.2, 0.4, 0.8, 1.6 and 3.2 m a cell."""

@@ -8,18 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 from sklearn.ensemble import HistGradientBoostingClassifier
 
-from fit_grouping.features import region_features
 from fit_grouping.fit_tree import ROOM_MIN_M2, Example
-from fit_grouping.joining import Strength
-from fit_grouping.strengths import BoostedTrees
+from fit_grouping.tree_files import trees_of
+from rose2_logs.segmentation.regions.features import region_features
+from rose2_logs.segmentation.regions.strengths import BoostedTrees
 
 FloatArray = NDArray[np.float64]
 
 TREES, LEAVES, LEAST_SAMPLES = 60, 6, 40
 SURE_LOG_ODDS = 5.0
 """Answer of a rule that was fitted on maps without anything outside."""
-ALL_OUTSIDE_SHARE = 0.8
-"""Where more than this share of the map would be outside, the answer is not believed."""
 
 
 def region_samples(
@@ -48,18 +46,4 @@ def fit_outside(examples: Sequence[Example], regions: Sequence[NDArray[np.int64]
         l2_regularization=5.0, early_stopping=False, random_state=seed,
     )  # fmt: skip
     model.fit(features, room, sample_weight=weight / weight.mean())
-    return BoostedTrees.of(model, np.arange(features.shape[1]))
-
-
-def rooms_of(
-    example: Example, region: NDArray[np.int64], is_room: Strength, least: float
-) -> NDArray[np.int64]:
-    """Room 1.. of each atom, 0 for those in regions that are too small or outside."""
-    graph, _ = example.graph.joined(region)
-    area = graph.node_sums[:, 0]
-    inside = is_room(region_features(graph)) >= least
-    if area[~inside].sum() > ALL_OUTSIDE_SHARE * area.sum():
-        inside[:] = True
-    room = inside & (area >= ROOM_MIN_M2)
-    number: NDArray[np.int64] = np.where(room, np.cumsum(room), 0)[region]
-    return number
+    return trees_of(model, np.arange(features.shape[1]))

@@ -3,45 +3,39 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fit_grouping.answers import AnsweringNetwork
-from fit_grouping.atoms import (
-    AtomParameters,
-    BoolArray,
-    Labels,
-    PlanFrame,
-    cut_atoms,
-    find_generous_structure,
-)
 from fit_grouping.buildings.make_buildings import read_maps
 from fit_grouping.buildings.raster import CELL_M
 from fit_grouping.keeping import kept
 from fit_grouping.maps_with_truth import TruthMap
-from fit_grouping.plan_rasters import PlanRaster
-from fit_grouping.regions import STRONG_SCORE, RegionGraph, build_graph
 from fit_grouping.scores import overlap_table
+from rose2_logs.config.parameters import Parameters
+from rose2_logs.segmentation.regions.answers import AnsweringNetwork
+from rose2_logs.segmentation.regions.graph import RegionGraph
+from rose2_logs.segmentation.regions.stage import Atoms, find_atoms, generous_floor_plan, generous_walls
+from rose2_logs.segmentation.rose.stage import find_structure
 
 FloatArray = NDArray[np.float64]
+FREE_MIN_GRAY, OCCUPIED_MAX_GRAY = 230, 89
+"""What is free and occupied in simulated maps."""
 
 
 @dataclass(frozen=True, eq=False)
 class PreparedMap:
-    """What grouping needs of a map, on its plan frame.
+    """What grouping needs of a map.
 
     Attributes
     ----------
     group, name, building : str
     fold : int
         -1 for simulated maps.
-    raster : PlanRaster
-    atoms, faces : (H, W) int32
-    strong : (H, W) bool
-    cell_m : float
+    atoms : Atoms
+        Without `cells`.
     tables : tuple of (A + 1, T + 1) float
         Cells of the map that each atom shares with each true room; row and column 0 are none.
     """
@@ -50,42 +44,36 @@ class PreparedMap:
     name: str
     building: str
     fold: int
-    raster: PlanRaster
-    atoms: Labels
-    faces: Labels
-    strong: BoolArray
-    cell_m: float
+    atoms: Atoms
     tables: tuple[FloatArray, ...]
 
     def graph(self, answers: NDArray[np.float32] | None) -> RegionGraph:
         """The graph of the atoms, with a network's answers."""
-        count = len(self.tables[0]) - 1
-        return build_graph(self.atoms, self.raster, self.strong, self.faces, answers, self.cell_m, count)
+        return self.atoms.graph(answers)
 
 
-def prepare(one: TruthMap, parameters: AtomParameters, fold: int) -> PreparedMap:
-    """Cut a map into atoms."""
-    free, occupied, resolution = one.free, one.occupied, one.resolution_m
-    structure = find_generous_structure(free, occupied, resolution, parameters)
-    frame = PlanFrame.of(free | occupied, structure.direction_rad, resolution, parameters.plan_cell_m)
-    atoms = cut_atoms(free, occupied, structure.faces, frame, resolution, parameters)
-    return PreparedMap(
-        one.group,
-        one.name,
-        one.building,
-        fold,
-        PlanRaster.of(free, occupied, frame),
-        frame.sampled(atoms),
-        frame.sampled(structure.faces),
-        frame.share(structure.score >= STRONG_SCORE) > 0,
-        frame.cell_m,
-        tuple(overlap_table(atoms, truth) for truth in one.truths),
+def atoms_of(one: TruthMap, parameters: Parameters) -> Atoms:
+    """Cut a map into atoms as the analysis does."""
+    scored = find_structure(one.occupied, one.resolution_m, parameters.spectrum)
+    direction = float(scored.directions_rad[0]) if len(scored.directions_rad) else 0.0
+    walls = generous_walls(scored, one.resolution_m, parameters)
+    _, faces = generous_floor_plan(walls, one.free, direction, one.resolution_m, parameters)
+    return find_atoms(
+        one.free, one.occupied, scored.score, faces, direction, one.resolution_m, parameters.regions
     )
+
+
+def prepare(one: TruthMap, parameters: Parameters, fold: int) -> PreparedMap:
+    """Cut a map into atoms and look up their rooms."""
+    atoms = atoms_of(one, parameters)
+    tables = tuple(overlap_table(atoms.cells, truth) for truth in one.truths)
+    atoms = replace(atoms, cells=np.zeros((0, 0), np.int32))  # large, and not needed any more
+    return PreparedMap(one.group, one.name, one.building, fold, atoms, tables)
 
 
 def prepared_benchmark(maps: Iterable[TruthMap], keep: Path) -> list[PreparedMap]:
     """Prepare the maps of a benchmark, or read them from `keep`."""
-    return kept(keep, lambda: [prepare(one, AtomParameters(), one.fold) for one in maps])
+    return kept(keep, lambda: [prepare(one, Parameters(), one.fold) for one in maps])
 
 
 def prepared_simulated(path: Path, keep: Path) -> list[PreparedMap]:
@@ -94,9 +82,10 @@ def prepared_simulated(path: Path, keep: Path) -> list[PreparedMap]:
     def made() -> list[PreparedMap]:
         maps = []
         for number, sim in enumerate(read_maps(path)):
-            name, free, occupied = f"{path.stem}_{number}", sim.gray > 229, sim.gray < 90
+            name, free = f"{path.stem}_{number}", sim.gray >= FREE_MIN_GRAY
+            occupied = sim.gray <= OCCUPIED_MAX_GRAY
             one = TruthMap(f"simulated/{sim.kind}", name, name, CELL_M, free, occupied, sim.truths)
-            maps.append(prepare(one, AtomParameters(), -1))
+            maps.append(prepare(one, Parameters(), -1))
         return maps
 
     return kept(keep, made)
@@ -105,4 +94,4 @@ def prepared_simulated(path: Path, keep: Path) -> list[PreparedMap]:
 def answered(maps: list[PreparedMap], network_of_fold: dict[int, Path]) -> list[NDArray[np.float32]]:
     """Answers for each map, of the network that did not see its fold."""
     networks = {path: AnsweringNetwork(path) for path in set(network_of_fold.values())}
-    return [networks[network_of_fold[one.fold]](one.raster) for one in maps]
+    return [networks[network_of_fold[one.fold]](one.atoms.raster) for one in maps]

@@ -26,13 +26,16 @@ from torch import Tensor, nn
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from fit_grouping.atoms import AtomParameters, BoolArray, PlanFrame, find_generous_structure
 from fit_grouping.buildings.make_buildings import read_maps
 from fit_grouping.buildings.raster import CELL_M
 from fit_grouping.keeping import kept
 from fit_grouping.maps_with_truth import TruthMap, load_benchmark
 from fit_grouping.network import RoomNetwork, export_onnx
-from fit_grouping.plan_rasters import PlanRaster, random_crop
+from fit_grouping.truth_rasters import TruthRaster, random_crop
+from rose2_logs.config.parameters import SpectrumParameters
+from rose2_logs.model.occupancy import BoolArray
+from rose2_logs.segmentation.regions.plan_frame import PLAN_CELL_M, PlanFrame
+from rose2_logs.segmentation.rose.stage import find_structure
 from rose2_logs.system.files import replacing
 
 CROP_CELLS = 160
@@ -46,7 +49,6 @@ MEAN_DECAY = 0.998
 """Decay of the running mean of the weights, which is what is shipped."""
 GRADIENT_MAX = 1.0
 CHECKPOINT_EVERY_S = 240.0
-PLAN_CELL_M = 0.1
 HELD_OUT_MAX, HELD_OUT_SHARE = 40, 0.1
 """So many of the simulated maps, but no more than this share, are not trained on but watched."""
 VARIANTS = 3
@@ -61,7 +63,7 @@ def varied_frame(
     return PlanFrame.of(known, direction_rad + rng.normal(0, 0.012), resolution_m, PLAN_CELL_M * scale)
 
 
-def simulated_rasters(folder: Path, seed: int) -> tuple[list[PlanRaster], list[PlanRaster]]:
+def simulated_rasters(folder: Path, seed: int) -> tuple[list[TruthRaster], list[TruthRaster]]:
     """Simulated maps of all files of a folder for training, and the last ones for watching it."""
     rng = np.random.default_rng(seed)
     rasters = []
@@ -69,30 +71,30 @@ def simulated_rasters(folder: Path, seed: int) -> tuple[list[PlanRaster], list[P
         for made in read_maps(path):
             free, occupied = made.gray > 229, made.gray < 90
             frame = varied_frame(rng, free | occupied, 0.0, CELL_M)
-            rasters.append(PlanRaster.of(free, occupied, frame, made.truths))
+            rasters.append(TruthRaster.of(free, occupied, frame, made.truths))
     rasters = [r for r in rasters if r.truths[0].any()]
     held_out = max(1, min(HELD_OUT_MAX, int(HELD_OUT_SHARE * len(rasters))))
     return rasters[:-held_out], rasters[-held_out:]
 
 
-def real_rasters(maps: Iterable[TruthMap], seed: int, variants: int) -> dict[str, list[PlanRaster]]:
+def real_rasters(maps: Iterable[TruthMap], seed: int, variants: int) -> dict[str, list[TruthRaster]]:
     """Rasters of real maps by building."""
     rng = np.random.default_rng(seed)
-    parameters = AtomParameters()
-    rasters: dict[str, list[PlanRaster]] = {}
+    rasters: dict[str, list[TruthRaster]] = {}
     for one in maps:
-        structure = find_generous_structure(one.free, one.occupied, one.resolution_m, parameters)
+        found = find_structure(one.occupied, one.resolution_m, SpectrumParameters()).directions_rad
+        direction = float(found[0]) if len(found) else 0.0
         known = one.free | one.occupied
         for variant in range(variants):
-            frame = PlanFrame.of(known, structure.direction_rad, one.resolution_m, PLAN_CELL_M)
+            frame = PlanFrame.of(known, direction, one.resolution_m)
             if variant:
-                frame = varied_frame(rng, known, structure.direction_rad, one.resolution_m)
-            raster = PlanRaster.of(one.free, one.occupied, frame, one.truths)
+                frame = varied_frame(rng, known, direction, one.resolution_m)
+            raster = TruthRaster.of(one.free, one.occupied, frame, one.truths)
             rasters.setdefault(one.building, []).append(raster)
     return rasters
 
 
-def _real_maps(cases: Path, seed: int) -> tuple[dict[str, list[PlanRaster]], dict[str, list[PlanRaster]]]:
+def _real_maps(cases: Path, seed: int) -> tuple[dict[str, list[TruthRaster]], dict[str, list[TruthRaster]]]:
     """Varied and exact rasters of all buildings."""
     maps = load_benchmark(cases)
     return real_rasters(maps, seed, VARIANTS), real_rasters(maps, seed, 1)
@@ -102,7 +104,7 @@ class Batches:
     """Random crops: of simulated maps, and with a share of real ones, each building as often."""
 
     def __init__(
-        self, simulated: list[PlanRaster], real: dict[str, list[PlanRaster]], real_share: float, seed: int
+        self, simulated: list[TruthRaster], real: dict[str, list[TruthRaster]], real_share: float, seed: int
     ) -> None:
         self.simulated, self.real, self.real_share = simulated, real, real_share if real else 0.0
         self.rng = np.random.default_rng(seed)
@@ -165,7 +167,7 @@ def main() -> None:
     simulated, held_out = kept(
         keep and keep / "simulated.pkl", lambda: simulated_rasters(arguments.simulated, arguments.seed)
     )
-    real: dict[str, list[PlanRaster]] = {}
+    real: dict[str, list[TruthRaster]] = {}
     watched = {"simulated": held_out}
     if arguments.cases:
         maps, exact = kept(keep and keep / "real.pkl", lambda: _real_maps(arguments.cases, arguments.seed))

@@ -41,6 +41,31 @@ def rooms_of_faces(labels: NDArray[np.int32], plan: FloorPlanResult) -> NDArray[
     return room_of_face
 
 
+def most_seen_rooms(
+    labels: NDArray[np.int32], faces: NDArray[np.int32], face_count: int
+) -> NDArray[np.int32]:
+    """Room (F,) that holds most of the labeled cells of each face, 0 for none.
+
+    Parameters
+    ----------
+    labels : (H, W) int32
+        Rooms 1.. of the free cells.
+    faces : (H, W) int32
+        Face 1..F of each cell, 0 for none.
+    face_count : int
+        F.
+    """
+    rooms = int(labels.max(initial=0)) + 1
+    inside = (labels > 0) & (faces > 0)
+    key = (faces[inside].astype(np.int64) - 1) * rooms + labels[inside]
+    pair, cells = np.unique(key, return_counts=True)
+    face, room = np.divmod(pair, rooms)
+    order = np.lexsort((-room, cells))
+    of_face = np.zeros(face_count, np.int32)
+    of_face[face[order]] = room[order]
+    return of_face
+
+
 def room_shapes(
     labels: NDArray[np.int32],
     plan: FloorPlanResult,

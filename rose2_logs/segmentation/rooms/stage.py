@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from rose2_logs.config.parameters import FloorPlanParameters
+from rose2_logs.config.parameters import FloorPlanParameters, Parameters
+from rose2_logs.model.borders import Border
 from rose2_logs.model.labels import number_rooms, renumber_in_place
 from rose2_logs.model.occupancy import BoolArray
 from rose2_logs.segmentation.floor_plan.stage import FloorPlanResult
+from rose2_logs.segmentation.regions.stage import RegionsResult
 from rose2_logs.segmentation.rooms.borders import adopt_left_out, settle_borders
-from rose2_logs.segmentation.rooms.shapes import room_shapes, rooms_of_faces
+from rose2_logs.segmentation.rooms.pieces import rooms_in_one_piece
+from rose2_logs.segmentation.rooms.shapes import most_seen_rooms, room_shapes, rooms_of_faces
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,3 +67,61 @@ def make_rooms(
     room_of_face = rooms_of_faces(renumber_in_place(whole, number), plan)
     shapes = room_shapes(settled, plan, room_of_face, resolution_m, parameters.shape_min_seen)
     return RoomsResult(settled, shapes, room_of_face)
+
+
+def finish_rooms(
+    found: RegionsResult,
+    plan: FloorPlanResult,
+    faces: NDArray[np.int32],
+    free: BoolArray,
+    resolution_m: float,
+    parameters: Parameters,
+) -> tuple[RoomsResult, tuple[Border, ...]]:
+    """Finish rooms by fitted borders: in one piece, with straight borders, numbers, and predicted shapes.
+
+    Parameters
+    ----------
+    found : RegionsResult
+        Rooms of the free cells, and their borders.
+    plan : FloorPlanResult
+        The faces.
+    faces : (H, W) int32
+        Face 1.. of each cell.
+    free : (H, W) bool
+        Free cells.
+    resolution_m : float
+        Side of a cell.
+    parameters : Parameters
+
+    Returns
+    -------
+    rooms : RoomsResult
+    borders : tuple of Border
+        Of those of `found` whose rooms are left, by the new numbers.
+    """
+    of_regions = parameters.regions
+    settled = settle_borders(found.labels, resolution_m, parameters.floor_plan.border_strip_m)
+    pieces, room_of_piece = rooms_in_one_piece(
+        settled, resolution_m, of_regions.piece_gap_m, of_regions.room_min_area_m2
+    )
+    number = number_rooms(pieces, len(room_of_piece) - 1, of_regions.room_min_area_m2, resolution_m)
+    labels = renumber_in_place(pieces, number)
+    room_of_face = most_seen_rooms(labels, faces, len(plan.graph.polygons))
+    shapes = room_shapes(labels, plan, room_of_face, resolution_m, parameters.floor_plan.shape_min_seen)
+    return RoomsResult(labels, shapes, room_of_face), _renumbered(found.borders, room_of_piece, number)
+
+
+def _renumbered(
+    borders: tuple[Border, ...], room_of_piece: NDArray[np.int32], number: NDArray[np.int32]
+) -> tuple[Border, ...]:
+    """Borders by the numbers of the first piece of each room."""
+    first = np.zeros(int(room_of_piece.max(initial=0)) + 1, np.int64)
+    first[room_of_piece[::-1]] = np.arange(len(room_of_piece))[::-1]
+    new = number[first]
+    new[0] = 0
+    kept = []
+    for border in borders:
+        one, other = sorted(int(new[room]) if room < len(new) else 0 for room in border.rooms)
+        if one:
+            kept.append(replace(border, rooms=(one, other)))
+    return tuple(sorted(kept, key=lambda border: border.rooms))

@@ -1,4 +1,4 @@
-"""Maps on the plan frame: what the network sees of them, and what it is asked."""
+"""Maps on the plan frame with their true rooms, and crops of them to train the network on."""
 
 from __future__ import annotations
 
@@ -9,19 +9,17 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from fit_grouping.atoms import BoolArray, Labels, PlanFrame
+from rose2_logs.model.occupancy import BoolArray
+from rose2_logs.segmentation.regions.plan_frame import Labels, PlanFrame
+from rose2_logs.segmentation.regions.plan_raster import (
+    OFFSETS,
+    OUTPUTS,
+    FloatImage,
+    PlanRaster,
+    network_input,
+    shares_of,
+)
 
-FloatImage = NDArray[np.float32]
-
-POINTS_PER_SIDE = 3
-"""A plan cell is looked at in this many points squared, so that walls of one map cell are met."""
-SHARE_STEPS = POINTS_PER_SIDE**2
-OFFSETS = ((0, 2), (2, 0), (0, 6), (6, 0), (0, 14), (14, 0))
-"""Pairs of cells that the network is asked about, rows and columns apart: 0.2, 0.6 and 1.4 m."""
-OUTPUTS = len(OFFSETS) + 1
-"""An answer for each pair, and one whether a cell is outside."""
-DISTANCE_MAX = 30
-"""Distances are told up to this many cells."""
 WORN_SHARE = 0.45
 """Share of the crops that are worn or furnished."""
 DIFFERENT_WEIGHT = (3.0, 2.0, 1.5)
@@ -29,43 +27,30 @@ DIFFERENT_WEIGHT = (3.0, 2.0, 1.5)
 
 
 @dataclass(frozen=True, eq=False)
-class PlanRaster:
-    """A map on its plan frame.
+class TruthRaster:
+    """A map on a plan frame, and its true rooms.
 
     Attributes
     ----------
-    wall, free : (H, W) uint8
-        Points of each cell, of `SHARE_STEPS`, that are occupied and free.
+    raster : PlanRaster
     truths : tuple of (H, W) uint16
-        True room of each cell, 0 where none; empty for maps without truth.
+        True room of each cell, 0 where none.
     """
 
-    wall: NDArray[np.uint8]
-    free: NDArray[np.uint8]
-    truths: tuple[NDArray[np.uint16], ...] = ()
+    raster: PlanRaster
+    truths: tuple[NDArray[np.uint16], ...]
 
     @classmethod
     def of(
-        cls, free: BoolArray, occupied: BoolArray, frame: PlanFrame, truths: tuple[Labels, ...] = ()
-    ) -> PlanRaster:
+        cls, free: BoolArray, occupied: BoolArray, frame: PlanFrame, truths: tuple[Labels, ...]
+    ) -> TruthRaster:
         """Sample the masks and truths (H, W) of a map."""
-        steps = [
-            np.rint(frame.share(mask, POINTS_PER_SIDE) * SHARE_STEPS).astype(np.uint8)
-            for mask in (occupied, free)
-        ]
-        return cls(steps[0], steps[1], tuple(frame.sampled(t).astype(np.uint16) for t in truths))
-
-
-def network_input(wall: FloatImage, free: FloatImage) -> FloatImage:
-    """Channels (4, H, W): wall and free share, distances from walls and from what is not free."""
-    from_wall = cv2.distanceTransform((wall < 0.25).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_3)
-    from_rest = cv2.distanceTransform((free > 0.5).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_3)
-    scaled = [np.minimum(d, DISTANCE_MAX) / np.float32(DISTANCE_MAX) for d in (from_wall, from_rest)]
-    return np.stack([wall, free, *scaled]).astype(np.float32)
+        sampled = tuple(frame.sampled(truth).astype(np.uint16) for truth in truths)
+        return cls(PlanRaster.of(free, occupied, frame), sampled)
 
 
 def random_crop(
-    rng: np.random.Generator, raster: PlanRaster, size: int
+    rng: np.random.Generator, one: TruthRaster, size: int
 ) -> tuple[FloatImage, FloatImage, FloatImage]:
     """Cut a square of a map around a cell of a room, mirrored, turned by quarters, worn at times.
 
@@ -74,12 +59,12 @@ def random_crop(
     inputs : (4, size, size) float32
     targets, weights : (OUTPUTS, size, size) float32
     """
-    rows, columns = np.nonzero(raster.truths[0])
+    rows, columns = np.nonzero(one.truths[0])
     at = rng.integers(len(rows))
     low = np.array([rows[at], columns[at]]) - (rng.uniform(0.15, 0.85, 2) * size).astype(int)
     turns, mirror = int(rng.integers(4)), bool(rng.integers(2))
     images: list[Labels] = []
-    layers: list[NDArray[np.integer[Any]]] = [raster.wall, raster.free, *raster.truths]
+    layers: list[NDArray[np.integer[Any]]] = [one.raster.wall, one.raster.free, *one.truths]
     for image in layers:
         window = _window(image, low, size).astype(np.int32)
         images.append(np.rot90(window[:, ::-1] if mirror else window, turns))
@@ -88,11 +73,6 @@ def random_crop(
         wall, free = _worn(rng, wall, free)
     targets, weights = network_targets(free > 0.3, images[2:])
     return network_input(wall, free), targets, weights
-
-
-def shares_of(steps: NDArray[np.integer[Any]]) -> FloatImage:
-    """Shares in [0, 1] from counts of points."""
-    return (steps / np.float32(SHARE_STEPS)).astype(np.float32)
 
 
 def _window(image: NDArray[np.integer[Any]], low: NDArray[np.int64], size: int) -> NDArray[np.integer[Any]]:

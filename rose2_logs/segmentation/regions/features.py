@@ -5,9 +5,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fit_grouping.regions import BORDER_MAXIMA, BORDER_SUMS, NODE_MAXIMA, NODE_SUMS, RegionGraph
-
-FloatArray = NDArray[np.float64]
+from rose2_logs.model.occupancy import FloatArray
+from rose2_logs.segmentation.regions.graph import (
+    BORDER_MAXIMA,
+    BORDER_SUMS,
+    NODE_MAXIMA,
+    NODE_SUMS,
+    RegionGraph,
+)
 
 SHAPE_FEATURES = (
     "log_contact", "contact_per_outline_small", "contact_per_outline_large", "contact_per_side_small",

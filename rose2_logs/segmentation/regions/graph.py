@@ -8,10 +8,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from fit_grouping.atoms import BoolArray, Labels
-from fit_grouping.plan_rasters import OFFSETS, PlanRaster
-
-FloatArray = NDArray[np.float64]
+from rose2_logs.model.occupancy import BoolArray, FloatArray
+from rose2_logs.segmentation.regions.plan_frame import Labels, grown_labels, without_specks
+from rose2_logs.segmentation.regions.plan_raster import OFFSETS, PlanRaster
 
 GROW_M = 0.3
 """Regions face one another across walls of this thickness."""
@@ -21,8 +20,10 @@ STRONG_SCORE = 0.6
 """Structure score of walls that go on for more than half of a room's side."""
 WIDE_M = 0.5
 """What is wider than this is open floor, not a ray."""
-SPECK_MAX_CELLS = 2
-"""Occupied pieces up to this size do not narrow the clearance."""
+WALL_MIN_CELLS = 3
+"""Occupied pieces below this size do not narrow the clearance."""
+ATOM_REACH_CELLS = 1.5
+"""Atoms are taken to reach over gaps of noise this wide."""
 
 NODE_SUMS = ("area", "wall_edges", "unknown_edges", "wide", "outside")
 NODE_MAXIMA = (
@@ -134,8 +135,8 @@ def build_graph(
     """
     wall = raster.wall > 0
     inside = (raster.free > 0) | (atoms > 0)
-    atoms = _over_gaps(atoms, inside, 1.5)
-    solid = _without_specks(wall)
+    atoms = np.where(inside, grown_labels(atoms, ATOM_REACH_CELLS), 0).astype(np.int32)
+    solid = without_specks(wall, WALL_MIN_CELLS)
     clear, clear_strong = (_clearance(mask, cell_m) for mask in (solid, strong))
     row, column = np.nonzero(atoms)
     node = atoms[row, column].astype(np.int64) - 1
@@ -192,7 +193,7 @@ def _border_records(
     count: int,
 ) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
     """One row for each pair of cells beside one another (or asked about) that lie in two regions."""
-    grown = _over_gaps(atoms, np.ones(atoms.shape, bool), GROW_M / cell_m)
+    grown = grown_labels(atoms, GROW_M / cell_m)
     keys, sums, maxima = [], [], []
     for upright, (one, other) in ((True, (np.s_[:, :-1], np.s_[:, 1:])), (False, (np.s_[:-1], np.s_[1:]))):
         a, b = grown[one], grown[other]
@@ -251,25 +252,3 @@ def _wall_along(wall: BoolArray, upright: bool, length_m: float, cell_m: float) 
 def _clearance(blocked: BoolArray, cell_m: float) -> NDArray[np.float32]:
     distance = cv2.distanceTransform((~blocked).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
     return (distance * np.float32(cell_m)).astype(np.float32)
-
-
-def _without_specks(wall: BoolArray) -> BoolArray:
-    _, piece, stats, _ = cv2.connectedComponentsWithStats(wall.astype(np.uint8), connectivity=8)
-    keep = np.maximum(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT]) > SPECK_MAX_CELLS
-    keep[0] = False
-    kept: BoolArray = keep[piece]
-    return kept
-
-
-def _over_gaps(labels: Labels, where: BoolArray, reach_cells: float) -> Labels:
-    """Labels over cells without one, from the nearest that has one, up to a distance."""
-    if not labels.any():
-        return labels
-    distance, nearest = cv2.distanceTransformWithLabels(
-        (labels == 0).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
-    )
-    of_nearest = np.zeros(int(nearest.max()) + 1, np.int32)
-    of_nearest[nearest[labels > 0]] = labels[labels > 0]
-    return np.where((distance <= reach_cells) & (where | (labels > 0)), of_nearest[nearest], 0).astype(
-        np.int32
-    )

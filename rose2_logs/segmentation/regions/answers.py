@@ -1,0 +1,58 @@
+"""The network's answers: which pairs of cells are in different rooms, and which cells are outside."""
+
+from __future__ import annotations
+
+from itertools import product
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from rose2_logs.segmentation.regions.plan_raster import OUTPUTS, PlanRaster, network_input, shares_of
+
+STRIDE = 32
+"""Inputs are padded to a multiple of this many cells, the coarsest step of the network."""
+ANSWER_STEPS = 1000
+"""Answers are rounded to this many steps, so that they are the same whatever instructions a CPU has."""
+TILE_CELLS = 1536
+"""Larger plans are looked at in tiles of this side, so that memory does not grow with the map."""
+OVERLAP_CELLS = 128
+"""Tiles see this far beyond what they answer for; what lies further hardly matters to an answer."""
+
+
+class AnsweringNetwork:
+    """A network from an ONNX file, run by OpenCV."""
+
+    def __init__(self, path: Path) -> None:
+        self._network = cv2.dnn.readNetFromONNX(str(path))
+
+    def __call__(self, raster: PlanRaster) -> NDArray[np.float32]:
+        """Answers (OUTPUTS, H, W) in [0, 1] for a raster (H, W)."""
+        height, width = raster.wall.shape
+        if max(height, width) <= TILE_CELLS:
+            return self._answers(raster)
+        answers = np.zeros((OUTPUTS, height, width), np.float32)
+        step = TILE_CELLS - 2 * OVERLAP_CELLS
+        for top, left in product(range(0, height, step), range(0, width, step)):
+            low = max(top - OVERLAP_CELLS, 0), max(left - OVERLAP_CELLS, 0)
+            seen = np.s_[low[0] : top + step + OVERLAP_CELLS, low[1] : left + step + OVERLAP_CELLS]
+            tile = PlanRaster(raster.wall[seen], raster.free[seen])
+            if tile.free.any():
+                own = np.s_[:, top - low[0] : top - low[0] + step, left - low[1] : left - low[1] + step]
+                answers[:, top : top + step, left : left + step] = self._answers(tile)[own]
+        return answers
+
+    def _answers(self, raster: PlanRaster) -> NDArray[np.float32]:
+        height, width = raster.wall.shape
+        rows, columns = (-(-side // STRIDE) * STRIDE for side in (height, width))
+        # Half of the padding on each side, but a whole number of pairs of cells.
+        top, left = (rows - height) // 4 * 2, (columns - width) // 4 * 2
+        pad = ((top, rows - height - top), (left, columns - width - left))
+        inputs = network_input(shares_of(np.pad(raster.wall, pad)), shares_of(np.pad(raster.free, pad)))
+        self._network.setInput(np.ascontiguousarray(inputs[None]))
+        out = self._network.forward()[0][:, top : top + height, left : left + width]
+        rounded: NDArray[np.float32] = np.rint(out * ANSWER_STEPS).astype(np.float32) / np.float32(
+            ANSWER_STEPS
+        )
+        return rounded

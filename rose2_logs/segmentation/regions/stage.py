@@ -1,0 +1,183 @@
+"""Stage C with fitted borders in one call: from the scored map to rooms."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from rose2_logs.config.parameters import Parameters, RegionParameters
+from rose2_logs.model.borders import Border
+from rose2_logs.model.occupancy import BoolArray
+from rose2_logs.segmentation.floor_plan.edge_weights import edge_evidence
+from rose2_logs.segmentation.floor_plan.faces import build_faces, free_area, label_faces
+from rose2_logs.segmentation.floor_plan.stage import FloorPlanResult, frame_along
+from rose2_logs.segmentation.regions import fitted
+from rose2_logs.segmentation.regions.atoms import cut_atoms
+from rose2_logs.segmentation.regions.borders import borders_of
+from rose2_logs.segmentation.regions.graph import STRONG_SCORE, RegionGraph, build_graph
+from rose2_logs.segmentation.regions.joining import join_regions
+from rose2_logs.segmentation.regions.outside import rooms_of
+from rose2_logs.segmentation.regions.plan_frame import Labels, PlanFrame
+from rose2_logs.segmentation.regions.plan_raster import PlanRaster
+from rose2_logs.segmentation.regions.strengths import JoinStrength
+from rose2_logs.segmentation.rose.clean_map import attached_cells
+from rose2_logs.segmentation.rose.stage import StructureResult
+from rose2_logs.segmentation.walls.stage import WallResult, find_walls
+
+
+@dataclass(frozen=True, eq=False)
+class Atoms:
+    """The floor of a map cut into atoms.
+
+    Attributes
+    ----------
+    count : int
+        Number of atoms, N.
+    cells : (H, W) int32
+        Atom 1..N of each free cell of the map, 0 elsewhere and on loose cells.
+    frame : PlanFrame
+    raster : PlanRaster
+    on_plan, faces_on_plan : (P, Q) int32
+        Atoms and faces on the plan frame.
+    strong : (P, Q) bool
+        Plan cells with walls that go on for long.
+    """
+
+    count: int
+    cells: Labels
+    frame: PlanFrame
+    raster: PlanRaster
+    on_plan: Labels
+    faces_on_plan: Labels
+    strong: BoolArray
+
+    def graph(self, answers: NDArray[np.float32] | None) -> RegionGraph:
+        """The graph of the atoms, with a network's answers (OUTPUTS, P, Q)."""
+        return build_graph(
+            self.on_plan, self.raster, self.strong, self.faces_on_plan, answers, self.frame.cell_m, self.count
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class RegionsResult:
+    """Rooms by fitted borders.
+
+    Attributes
+    ----------
+    labels : (H, W) int32
+        Room 1.. of the free cells, 0 for none.
+    borders : tuple of Border
+        By the numbers of `labels`.
+    outside_m2 : float
+        Free area that was left out as outside the building.
+    """
+
+    labels: Labels
+    borders: tuple[Border, ...]
+    outside_m2: float
+
+
+def generous_walls(scored: StructureResult, resolution_m: float, parameters: Parameters) -> WallResult:
+    """Walls of a clean map that keeps every wall, by one low threshold.
+
+    Where faces are no rooms but what rooms are joined from, a wall too many does no harm: the threshold needs
+    no search, and no budget of walls.
+    """
+    least = parameters.regions.clean_min_score
+    clean = scored.supported & (scored.score >= least)
+    candidates = scored.supported & (scored.score >= parameters.spectrum.attached_share * least)
+    attached = attached_cells(clean, candidates)
+    return find_walls(
+        scored.supported, clean, attached, scored.directions_rad, resolution_m, parameters.walls
+    )
+
+
+def generous_floor_plan(
+    built: WallResult, free: BoolArray, direction_rad: float, resolution_m: float, parameters: Parameters
+) -> tuple[FloorPlanResult, Labels]:
+    """Faces between the lines of `generous_walls`, and the face 1.. of each cell (H, W).
+
+    The faces know the weights of their edges, but are in no group yet.
+    """
+    lines_m, walls = built.lines.ends_m, built.walls
+    margin_m = parameters.floor_plan.frame_margin_m
+    graph = build_faces(lines_m, frame_along(free | walls, direction_rad, resolution_m, margin_m))
+    count = len(graph.polygons)
+    evidence = edge_evidence(graph.edges_m, lines_m, walls, free, resolution_m, parameters.floor_plan)
+    face_of_cell = label_faces(graph, (free.shape[0], free.shape[1]), resolution_m)
+    area = free_area(face_of_cell, free, count, resolution_m)
+    seen = area / np.maximum(shapely.area(graph.polygons), 1e-12)
+    nothing = np.zeros(count, np.int32)
+    return FloorPlanResult(graph, evidence, seen, nothing, np.zeros(free.shape, np.int32)), face_of_cell
+
+
+def find_atoms(
+    free: BoolArray,
+    occupied: BoolArray,
+    score: NDArray[np.float32],
+    faces: Labels,
+    direction_rad: float,
+    resolution_m: float,
+    parameters: RegionParameters,
+) -> Atoms:
+    """Cut a map (H, W) into atoms, and look at it along its strongest direction."""
+    frame = PlanFrame.of(free | occupied, direction_rad, resolution_m)
+    cells = cut_atoms(free, occupied, faces, frame, resolution_m, parameters)
+    return Atoms(
+        int(cells.max(initial=0)),
+        cells,
+        frame,
+        PlanRaster.of(free, occupied, frame),
+        frame.sampled(cells),
+        frame.sampled(faces),
+        frame.share(score >= STRONG_SCORE) > 0,
+    )
+
+
+def find_rooms(
+    atoms: Atoms, free: BoolArray, resolution_m: float, parameters: RegionParameters
+) -> RegionsResult:
+    """Join atoms to rooms by the fitted strength of their borders."""
+    if not atoms.count:
+        return RegionsResult(np.zeros(free.shape, np.int32), (), 0.0)
+    graph = atoms.graph(fitted.answering_network()(atoms.raster))
+    strength = JoinStrength(fitted.join_trees(), parameters.answer_weight, parameters.answer_scale)
+    region = join_regions(graph, strength, parameters.detail).regions(parameters.detail)
+    regions, _ = graph.joined(region)
+    room, outside_m2 = rooms_of(regions, fitted.outside_trees(), parameters)
+    labels = room_labels(atoms.cells, room[region], free, resolution_m, parameters.loose_reach_m)
+    return RegionsResult(labels, borders_of(regions, room, strength, parameters), outside_m2)
+
+
+def room_labels(
+    atoms: Labels, room_of_atom: NDArray[np.integer], free: BoolArray, resolution_m: float, reach_m: float
+) -> Labels:
+    """Room 1.. of each free cell (H, W), 0 for none.
+
+    Parameters
+    ----------
+    atoms : (H, W) int32
+        Atom 1..A of each cell, 0 for none.
+    room_of_atom : (A,) int
+        Room 1.. of each atom, 0 for those outside.
+    free : (H, W) bool
+    resolution_m : float
+    reach_m : float
+        Free cells of pieces that are too small for an atom belong to the room this near.
+    """
+    labels = np.concatenate([[0], room_of_atom])[atoms].astype(np.int32)
+    loose = free & (atoms == 0)
+    if not loose.any() or not labels.any():
+        return labels
+    distance, nearest = cv2.distanceTransformWithLabels(
+        (labels == 0).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
+    )
+    of_nearest = np.zeros(int(nearest.max()) + 1, np.int32)
+    of_nearest[nearest[labels > 0]] = labels[labels > 0]
+    near = loose & (distance * resolution_m <= reach_m)
+    labels[near] = of_nearest[nearest[near]]
+    return labels

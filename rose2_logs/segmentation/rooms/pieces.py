@@ -1,0 +1,57 @@
+"""Rooms in one piece: what does not hang together is not one room."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from rose2_logs.model.labels import label_sizes
+
+
+def rooms_in_one_piece(
+    labels: NDArray[np.int32], resolution_m: float, gap_m: float, piece_min_m2: float
+) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Make rooms of their own of the pieces of a room that do not hang together.
+
+    Parameters
+    ----------
+    labels : (H, W) int32
+        Rooms 1.. of the free cells, 0 elsewhere.
+    resolution_m : float
+        Side of a cell.
+    gap_m : float
+        Pieces hang together across gaps up to this wide: noise, the legs of furniture.
+    piece_min_m2 : float
+        Smaller pieces stay with the largest one of their room.
+
+    Returns
+    -------
+    pieces : (H, W) int32
+        The largest piece of each room and what is small have the number of the room, others new ones.
+    room_of_piece : (P,) int32
+        Room of each of these numbers, 0 first.
+    """
+    count = int(labels.max(initial=0))
+    pieces = labels.copy()
+    rooms = list(range(count + 1))
+    reach = max(0, round(gap_m / resolution_m / 2))
+    kernel = np.ones((2 * reach + 1, 2 * reach + 1), np.uint8)
+    for room, box in enumerate(ndimage.find_objects(labels, max_label=count), start=1):
+        if box is None:
+            continue
+        inside = labels[box] == room
+        grown = cv2.dilate(np.pad(inside.astype(np.uint8), reach), kernel)
+        number, components = cv2.connectedComponents(grown, connectivity=4)
+        if number <= 2:
+            continue
+        within = np.s_[reach : reach + inside.shape[0], reach : reach + inside.shape[1]]
+        piece: NDArray[np.int32] = np.where(inside, components[within], 0).astype(np.int32)
+        cells = label_sizes(piece, number - 1)
+        cells[0] = 0
+        large = np.flatnonzero(cells * resolution_m**2 >= piece_min_m2)
+        for other in large[large != cells.argmax()].tolist():
+            pieces[box][piece == other] = len(rooms)
+            rooms.append(room)
+    return pieces, np.array(rooms, np.int32)
