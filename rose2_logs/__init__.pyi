@@ -70,6 +70,7 @@ from rose2_logs.model.analysis import (
 from rose2_logs.model.analysis import (
     Walls as Walls,
 )
+from rose2_logs.model.borders import Border as Border
 from rose2_logs.model.occupancy import GridGeometry as GridGeometry
 from rose2_logs.model.occupancy import OccupancySnapshot as OccupancySnapshot
 from rose2_logs.model.room_plan import RoomPlan as RoomPlan

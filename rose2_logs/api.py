@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from rose2_logs.comparison.layouts import LayoutComparison
 from rose2_logs.config.parameters import Parameters
-from rose2_logs.config.run_options import RunOptions, check_option, options_of
+from rose2_logs.config.run_options import RunOptions, check_option, options_of, with_detail
 from rose2_logs.config.selection import Selection
 from rose2_logs.errors import InvalidMapError, ParameterError
 from rose2_logs.io import open_log as open_log_reader
@@ -131,6 +131,7 @@ def track(
     *,
     parameters: GivenParameters = None,
     method: str = "rose2",
+    detail: float | None = None,
     workers: int = 1,
     topic: str | None = None,
 ) -> Iterator[TrackedSnapshot]:
@@ -145,6 +146,8 @@ def track(
         As for `analyze`.
     method : str
         The segmentation method.
+    detail : float, optional
+        As for `analyze`.
     workers : int
         Processes; what is yielded does not depend on it.
     topic : str, optional
@@ -170,7 +173,9 @@ def track(
     1.00 19 [1, 2, 3, 4]
     """
     # What cannot be used is refused by the call, not when the first map is asked for.
-    options = _options(parameters, {"method": method, "workers": workers, "topic": topic})
+    options = _options(
+        parameters, {"method": method, "detail": detail, "workers": workers, "topic": topic}
+    )
     if isinstance(log, LogReader) or (isinstance(log, Iterable) and not isinstance(log, str | bytes)):
         return _tracked(log, options)
     return _tracked_and_closed(open_log(log, topic=topic, parameters=options.parameters), options)
@@ -203,6 +208,7 @@ def segment(
     *,
     resolution_m: float | None = None,
     method: str = "rose2",
+    detail: float | None = None,
     parameters: GivenParameters = None,
     voronoi: bool = False,
 ) -> Segmentation:
@@ -217,6 +223,8 @@ def segment(
         Side of a cell in meters, for an array or an image without a ``.yaml`` next to it.
     method : str
         ``rose2``, or one of the classical methods ``morphological``, ``distance``, ``voronoi``.
+    detail : float, optional
+        As for `analyze`; `Segmentation.at_detail` changes it later.
     parameters : Parameters or mapping, optional
         As for `analyze`.
     voronoi : bool
@@ -253,9 +261,8 @@ def segment(
         snapshot = _snapshot_of_array(map_, resolution_m)
     if not snapshot.cells.size:
         raise InvalidMapError("the map has no cells")
-    return segment_snapshot(
-        snapshot, Parameters.from_any(parameters), method, name=snapshot.topic, voronoi=voronoi
-    )
+    used = with_detail(Parameters.from_any(parameters), detail, method)
+    return segment_snapshot(snapshot, used, method, name=snapshot.topic, voronoi=voronoi)
 
 
 def _snapshot_of_array(array: ArrayLike, resolution_m: float | None) -> OccupancySnapshot:
@@ -425,6 +432,7 @@ def evaluate(
     cases: str | Path,
     *,
     method: str = "rose2",
+    detail: float | None = None,
     parameters: GivenParameters = None,
     group: str | None = None,
     along: bool = False,
@@ -438,6 +446,8 @@ def evaluate(
         A JSON file that lists the maps with their true rooms, see `rose2_logs.evaluation.cases`.
     method : str
         The segmentation method.
+    detail : float, optional
+        As for `analyze`.
     parameters : Parameters or mapping, optional
         As for `analyze`.
     group : str, optional
@@ -469,7 +479,7 @@ def evaluate(
     return evaluate_method(
         _path(cases, "cases"),
         method=method,
-        parameters=Parameters.from_any(parameters),
+        parameters=with_detail(Parameters.from_any(parameters), detail, method),
         group=group,
         along=along,
         workers=workers,

@@ -28,6 +28,10 @@ from rose2_logs.errors import ParameterError
 from rose2_logs.system.files import reason_of
 
 
+DETAIL_MOST = 20.0
+"""Greatest and, negative, least detail, log odds: surer than any answer."""
+
+
 @dataclass(frozen=True, repr=False)
 class ReadingParameters(ParameterBlock):
     """How much a log may claim before it is refused as damaged or hostile; real ones stay far below."""
@@ -316,8 +320,8 @@ class RegionParameters(ParameterBlock):
         "log odds",
         "Regions are joined if that is likelier right than wrong; more detail asks for surer joins and gives "
         "more and smaller rooms, less gives fewer.",
-        -20,
-        20,
+        -DETAIL_MOST,
+        DETAIL_MOST,
     )
     room_min_log_odds: float = number(
         0.0, "log odds", "Regions are rooms rather than outside from even odds on.", -20, 20

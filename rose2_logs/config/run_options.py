@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from rose2_logs.config.baselines import METHODS
 from rose2_logs.config.fields import changed_text
-from rose2_logs.config.parameters import Parameters
+from rose2_logs.config.parameters import DETAIL_MOST, Parameters
 from rose2_logs.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -180,6 +180,24 @@ def layers_named(text: str) -> tuple[str, ...]:
     return tuple(name for name in RECORDING_LAYERS if name in asked)
 
 
+def with_detail(parameters: Parameters, detail: float | None, method: str = METHODS[0]) -> Parameters:
+    """Set the parameter `regions.detail` to what was asked for; None leaves it as it is.
+
+    Raises
+    ------
+    ParameterError
+        If it is out of bounds, or the rooms do not depend on it.
+    """
+    if detail is None:
+        return parameters
+    check_option(RunOptions, "detail", detail)
+    if method != METHODS[0] or parameters.floor_plan.grouping != "fitted":
+        raise ParameterError(
+            f"detail={detail:g}: only rooms of method={METHODS[0]!r} with floor_plan.grouping='fitted' have it"
+        )
+    return parameters.replaced({"regions.detail": float(detail)})
+
+
 @explained
 @dataclass(frozen=True)
 class RunOptions:
@@ -273,6 +291,17 @@ class RunOptions:
     parameters: Parameters = option(  # noqa: RUF009 (it calls `field`)
         Parameters, "Parameters of all stages.", panel=METHOD, decides=True
     )
+    detail: float | None = option(
+        None,
+        "How finely to divide open floor into rooms. 0, the default, parts what is likelier two rooms than one; "
+        "positive gives more and smaller rooms, negative fewer and larger ones. In log odds: 2 is a clear "
+        "change, 5 a strong one.",
+        panel=METHOD,
+        commands=BOTH,
+        metavar="X",
+        low=-DETAIL_MOST,
+        high=DETAIL_MOST,
+    )
     workers: int = option(
         1,
         "Number of processes that analyze maps at the same time, at most two for each processor. Results do "
@@ -349,6 +378,8 @@ class RunOptions:
         layers: Any = self.layers
         layers = layers_named(layers if isinstance(layers, str) else ",".join(layers) or "none")
         object.__setattr__(self, "layers", layers)
+        parameters = with_detail(self.parameters, self.detail, self.method)
+        object.__setattr__(self, "parameters", parameters)
         if self.bag and not self.annotated_log:
             raise ParameterError(
                 "bag=True makes a ROS 2 bag of the annotated MCAP, which annotated_log=False leaves out"

@@ -20,6 +20,8 @@ WHITE, INK = (255, 255, 255), (25, 25, 25)
 OUTLINE_SHADE, HATCH_SHADE = 0.6, 0.8
 """Shares of the brightness of a room's color."""
 DOORWAY_COLOR: Color = (205, 45, 20)
+UNSURE_COLOR: Color = (150, 40, 200)
+"""Of doorways through borders that are unsure."""
 HOLE_MIN = 60.0
 """Holes in a room's shape are drawn from this area on, square units of the page: no single cells."""
 TALLEST = 1.3

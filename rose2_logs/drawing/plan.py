@@ -15,6 +15,7 @@ from rose2_logs.drawing.hatching import hatching
 from rose2_logs.drawing.map_painter import (
     DOORWAY_COLOR,
     INK,
+    UNSURE_COLOR,
     WHITE,
     Bounds,
     MapPainter,
@@ -129,8 +130,9 @@ def draw_plan(
         painter.outline(shape, colors[number], style.line)
     if style.has_walls and plan.walls_m is not None:
         painter.lines(plan.walls_m, WALL_COLOR, 1.5 * style.line)
-    doors = np.array([door.ends_m for door in plan.doorways]).reshape(-1, 2, 2)
-    painter.lines(doors, DOORWAY_COLOR, 2.4 * style.line, rim=0.8 * style.line)
+    for doors, color in ((plan.doorways, DOORWAY_COLOR), (plan.unsure_doorways, UNSURE_COLOR)):
+        ends_m = np.array([door.ends_m for door in doors]).reshape(-1, 2, 2)
+        painter.lines(ends_m, color, 2.4 * style.line, rim=0.8 * style.line)
     if style.tells:
         # Nothing to be seen, but under the pointer they say what they are.
         for room in plan.rooms:
@@ -239,6 +241,8 @@ def _add_legend(painter: MapPainter, plan: RoomPlan, style: PlanStyle, *, has_pr
         keys.append(Key("predicted, unseen", color, "hatched", PREDICTED_OPACITY))
     if plan.doorways:
         keys.append(Key("doorway", DOORWAY_COLOR, "line"))
+    if plan.unsure_doorways:
+        keys.append(Key("unsure border", UNSURE_COLOR, "line"))
     if style.has_walls and plan.walls_m is not None and len(plan.walls_m):
         keys.append(Key("wall segment", WALL_COLOR, "line"))
     if any(room.is_unsure for room in plan.rooms):

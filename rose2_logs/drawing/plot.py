@@ -12,6 +12,7 @@ from rose2_logs.drawing.map_painter import (
     INK,
     OUTLINE_SHADE,
     UNKNOWN_GRAY,
+    UNSURE_COLOR,
     WHITE,
     tinted_cells,
 )
@@ -68,10 +69,12 @@ def plot_plan(plan: RoomPlan, ax: Axes | None = None) -> Axes:
     predicted = predicted_parts(plan)
     for room in plan.rooms:
         _show_room(ax, room, predicted.get(room.number, shapely.Polygon()), is_tinted=room.number in tinted)
+    unsure = plan.unsure_doorways
     for doorway in plan.doorways:
         x, y = doorway.ends_m.reshape(2, 2).T
+        color = _unit(UNSURE_COLOR if doorway in unsure else DOORWAY_COLOR)
         ax.plot(
-            x, y, color=_unit(DOORWAY_COLOR), linewidth=DOOR_LINE, solid_capstyle="butt", zorder=LAYER_DOORS
+            x, y, color=color, linewidth=DOOR_LINE, solid_capstyle="butt", zorder=LAYER_DOORS
         )
     x0, y0, x1, y1 = plan.bounds_m
     ax.set(

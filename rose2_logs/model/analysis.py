@@ -9,11 +9,15 @@ from numpy.typing import NDArray
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
-from rose2_logs.model.borders import Border
+from rose2_logs.model.borders import Border, unsure_of
 from rose2_logs.model.occupancy import BoolArray, CellValues, FloatArray, GridGeometry, OccupancySnapshot
 from rose2_logs.model.room_quality import RoomQuality
 from rose2_logs.model.rooms import Doorway, RoomMap
-from rose2_logs.system.text import counted
+from rose2_logs.system.text import counted, percent
+
+LEFT_OUT_TOLD = 0.1
+"""From this share of the free area on it is told that floor was left out as outside; less is the rays and the
+white around a building that are on most maps."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,6 +229,11 @@ class SnapshotAnalysis:
         """Passages between rooms."""
         return self.rooms.doorways
 
+    @property
+    def unsure_doorways(self) -> tuple[Doorway, ...]:
+        """Doorways between rooms that may well be read as one."""
+        return unsure_of(self.rooms.doorways, self.borders)
+
     def again_for(self, snapshot: OccupancySnapshot) -> SnapshotAnalysis:
         """Return the same for another snapshot of the same free and occupied cells at the same place."""
         return replace(
@@ -234,3 +243,13 @@ class SnapshotAnalysis:
             stamp_ns=snapshot.stamp_ns,
             seconds=dict.fromkeys(self.seconds, 0.0),
         )
+
+
+def left_out_note(outside_m2: float, free_area_m2: float) -> str | None:
+    """Say that much of a map's free floor was left out as outside the building; None if it was not."""
+    if outside_m2 < LEFT_OUT_TOLD * free_area_m2 or not outside_m2:
+        return None
+    return (
+        f"{outside_m2:.0f} m2 of free floor, {percent(outside_m2 / free_area_m2)}, are taken to be outside the "
+        "building and in no room; regions.outside_max_share=0 keeps all of it"
+    )

@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
+from rose2_logs.model.rooms import Doorway
+
+UNSURE_BORDER_BELOW = 0.8
+"""Borders of less strength are marked as unsure. A matter of display: no stored result depends on it."""
 BORDER_KINDS = ("wall", "door", "opening")
 
 
@@ -16,11 +21,11 @@ class Border:
     rooms : (int, int)
         The two room numbers, the smaller one first.
     kind : str
-        ``wall``: nothing is known to be open between them; ``door``; ``opening``: wider than a door.
+        ``wall``: no doorway is known between them; ``door``; ``opening``: a doorway wider than a door.
     width_m : float
-        Distance between the ends of what is open, 0 for a wall.
+        Clear width of the widest doorway between them, 0 for a wall.
     strength : float
-        Probability that the two are different rooms, by the fitted strength; 1 for a wall.
+        Probability that the two are different rooms, by the fitted strength; 1 where nothing is open.
 
     Examples
     --------
@@ -33,3 +38,14 @@ class Border:
     kind: str
     width_m: float
     strength: float
+
+    @property
+    def is_unsure(self) -> bool:
+        """Whether the two rooms may well be read as one."""
+        return self.strength < UNSURE_BORDER_BELOW
+
+
+def unsure_of(doorways: Iterable[Doorway], borders: Iterable[Border]) -> tuple[Doorway, ...]:
+    """Return the doorways through borders that are unsure."""
+    unsure = {border.rooms for border in borders if border.is_unsure}
+    return tuple(door for door in doorways if door.rooms in unsure)

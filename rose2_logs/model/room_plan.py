@@ -11,6 +11,7 @@ from shapely.geometry.base import BaseGeometry
 
 from rose2_logs.config.parameters import OccupancyParameters
 from rose2_logs.model.analysis import SnapshotAnalysis
+from rose2_logs.model.borders import Border, unsure_of
 from rose2_logs.model.labels import known_window
 from rose2_logs.model.occupancy import UNKNOWN, BoolArray, FloatArray, GridGeometry, OccupancySnapshot
 from rose2_logs.model.outlines import outline
@@ -129,6 +130,8 @@ class RoomPlan:
         Ends of the wall segments, None where they are not known.
     map : PlanMap or None
         None where only shapes are known.
+    borders : tuple of Border
+        Between rooms of these numbers, where they have a strength.
 
     Examples
     --------
@@ -145,6 +148,12 @@ class RoomPlan:
     doorways: tuple[Doorway, ...]
     walls_m: FloatArray | None = None
     map: PlanMap | None = None
+    borders: tuple[Border, ...] = ()
+
+    @property
+    def unsure_doorways(self) -> tuple[Doorway, ...]:
+        """Doorways between rooms that may well be read as one."""
+        return unsure_of(self.doorways, self.borders)
 
     @property
     def bounds_m(self) -> tuple[float, float, float, float]:
@@ -189,7 +198,7 @@ def plan_of_analysis(
         )
     walls = None if analysis.walls is None else analysis.walls.segments_m.reshape(-1, 2, 2)
     below = PlanMap(snapshot.geometry, snapshot.cells, found.labels, occupancy)
-    return RoomPlan(title, snapshot.geometry.frame_id, tuple(rooms), found.doorways, walls, below)
+    return RoomPlan(title, snapshot.geometry.frame_id, tuple(rooms), found.doorways, walls, below, analysis.borders)
 
 
 def predicted_parts(plan: RoomPlan) -> dict[int, BaseGeometry]:

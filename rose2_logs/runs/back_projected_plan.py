@@ -63,9 +63,10 @@ def back_projected_plan(run: StoredRun, snapshot: int) -> RoomPlan:
         for door in last.doorways
         if set(door.rooms) <= set(shown)
     )
+    borders = tuple(border for border in last.borders if set(border.rooms) <= set(shown))
     below = replace(then.map, labels=np.append(np.int32(0), tracks)[found.labels])
     title = f"{then.title}, rooms of the last map"
-    return RoomPlan(title, then.frame_id, tuple(shown.values()), doorways, None, below)
+    return RoomPlan(title, then.frame_id, tuple(shown.values()), doorways, None, below, borders)
 
 
 def _snapshot(number: int, below: PlanMap) -> OccupancySnapshot:

@@ -52,6 +52,8 @@ class RunTotals:
         Maps with the free and occupied cells of the one before, whose analysis was taken over.
     rooms_last : int
         Rooms of the last map.
+    free_m2_last, outside_m2_last : float
+        Free area of the last map, and how much of it was left out as outside the building.
     tracks : int
         Rooms that ever had a number.
     coverage_first, coverage_last : float
@@ -72,6 +74,8 @@ class RunTotals:
     invalid: int = 0
     unchanged: int = 0
     rooms_last: int = 0
+    free_m2_last: float = 0.0
+    outside_m2_last: float = 0.0
     tracks: int = 0
     coverage_first: float = 0.0
     coverage_last: float = 0.0
@@ -93,6 +97,8 @@ class RunTotals:
         self.coverage_last = step.coverage
         self.snapshots += 1
         self.rooms_last = len(step.track_ids)
+        self.free_m2_last = step.analysis.free_area_m2
+        self.outside_m2_last = step.analysis.outside_m2
         self.tracks = max(self.tracks, *step.track_ids, 0)
         self.events.update(event.kind for event in step.events)
         if step.change is not None:

@@ -96,6 +96,11 @@ class Run(StoredRun, Sequence["RunSnapshot"]):
         return self._public("doorways")
 
     @property
+    def borders(self) -> Table:
+        """One row per pair of neighboring rooms and map: wall, door or opening, and how sure it is."""
+        return self._public("borders")
+
+    @property
     def walls(self) -> Table:
         """One row per wall segment and map."""
         return self._public("walls")
@@ -276,6 +281,11 @@ class RunSnapshot:
     def doorways(self) -> Table:
         """One row per doorway."""
         return Table("doorways", self.run.table("doorways", snapshot=self.number))
+
+    @cached_property
+    def borders(self) -> Table:
+        """One row per pair of neighboring rooms."""
+        return Table("borders", self.run.table("borders", snapshot=self.number))
 
     @cached_property
     def walls(self) -> Table:

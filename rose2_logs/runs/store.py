@@ -79,6 +79,7 @@ class RunStore:
             "rooms": tables.room_rows(step),
             "events": tables.event_rows(step),
             "doorways": tables.doorway_rows(step),
+            "borders": tables.border_rows(step),
             "walls": tables.wall_rows(step),
             "lines": tables.line_rows(step),
             "maps": [tables.map_row(step, self._parameters)],

@@ -20,6 +20,7 @@ from rose2_logs.config.parameters import OccupancyParameters, Parameters
 from rose2_logs.errors import InvalidMapError, ParameterError, ResultsError
 from rose2_logs.io.discovery import ANNOTATED_ENDING
 from rose2_logs.model.analysis import Walls
+from rose2_logs.model.borders import Border
 from rose2_logs.model.occupancy import GridGeometry
 from rose2_logs.model.room_plan import PlanMap, PlanRoom, RoomPlan
 from rose2_logs.model.rooms import Doorway
@@ -313,6 +314,7 @@ class StoredRun:
         shapes = self.shapes("rooms", [each["polygon_wkb"] for each in rows])
         rooms = [_room(each, shape) for each, shape in zip(rows, shapes, strict=True)]
         doorways = [_doorway(each) for each in self.table("doorways", snapshot=snapshot).to_pylist()]
+        borders = [_border(each) for each in self.table("borders", snapshot=snapshot).to_pylist()]
         walls = self.found_walls(snapshot) if with_walls else None
         return RoomPlan(
             f"{self.name}, snapshot {snapshot}, coverage {percent(float(row['coverage']))}",
@@ -321,6 +323,7 @@ class StoredRun:
             tuple(doorways),
             None if walls is None else walls.segments_m.reshape(-1, 2, 2),
             self.map(snapshot)[0] if with_map else None,
+            tuple(borders),
         )
 
 
@@ -401,3 +404,7 @@ def _room(row: Row, shape: BaseGeometry) -> PlanRoom:
 def _doorway(row: Row) -> Doorway:
     ends = np.array([[row["x0_m"], row["y0_m"]], [row["x1_m"], row["y1_m"]]])
     return Doorway((row["track_a"], row["track_b"]), ends)
+
+
+def _border(row: Row) -> Border:
+    return Border((row["track_a"], row["track_b"]), row["kind"], row["width_m"], row["strength"])

@@ -81,6 +81,7 @@ def write_summary(
             "coverage_first": totals.coverage_first,
             "coverage_last": totals.coverage_last,
             "rooms_last": totals.rooms_last,
+            "outside_m2_last": totals.outside_m2_last,
             "tracks": totals.tracks,
             "events": dict(sorted(totals.events.items())),
         },

@@ -62,6 +62,7 @@ _SNAPSHOTS_ALONG: dict[str, tuple[pa.DataType, str]] = {
     "time_s": (pa.float64(), "log time since the first snapshot, seconds"),
     "coverage": (pa.float64(), "known free area divided by that of the run's last map, in [0, 1]"),
     "free_area_m2": (pa.float64(), "known free area, square meters"),
+    "outside_m2": (pa.float64(), "free area left out as outside the building, square meters"),
     "rooms": (pa.int32(), "number of rooms"),
     "rooms_area_m2": (pa.float64(), "area seen of all rooms, square meters"),
     "rooms_predicted_area_m2": (
@@ -186,6 +187,24 @@ DOORWAYS = _table(
     }
 )
 
+BORDERS = _table(
+    {
+        **_SNAPSHOT,
+        "track_a": (pa.int32(), "track of the room on one side, the smaller number"),
+        "track_b": (pa.int32(), "track of the room on the other side"),
+        "kind": (
+            pa.string(),
+            "wall (no doorway is known between them), door, or opening (a doorway wider than a door)",
+        ),
+        "width_m": (pa.float64(), "clear width of the widest doorway between them, meters; 0 for a wall"),
+        "strength": (
+            pa.float64(),
+            "probability that they are different rooms, by the fitted strength; 1 where nothing is open",
+        ),
+    }
+)
+"""What lies between neighboring rooms."""
+
 BACK_PROJECTED = _table(
     {
         **_SNAPSHOT,
@@ -298,6 +317,7 @@ SCHEMAS = {
     "tracks": TRACKS,
     "events": EVENTS,
     "doorways": DOORWAYS,
+    "borders": BORDERS,
     "walls": WALLS,
     "lines": LINES,
     "maps": MAPS,

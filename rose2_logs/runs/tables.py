@@ -17,7 +17,7 @@ from rose2_logs.tracking.convergence import Convergence
 from rose2_logs.tracking.track_history import SnapshotRef, TrackHistory, quality_of
 from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot
 
-TABLES = ("snapshots", "rooms", "tracks", "events", "doorways", "walls", "lines", "maps")
+TABLES = ("snapshots", "rooms", "tracks", "events", "doorways", "borders", "walls", "lines", "maps")
 """The tables of every run, each a file ``<name>.parquet``."""
 BACK_PROJECTED = "back_projected"
 """The table that only a run has that projects its last layout back."""
@@ -48,6 +48,7 @@ def snapshot_row(step: TrackedSnapshot, ref: SnapshotRef) -> Row:
         "time_s": ref.time_s,
         "coverage": step.coverage,
         "free_area_m2": analysis.free_area_m2,
+        "outside_m2": analysis.outside_m2,
         "rooms": len(analysis.rooms),
         "rooms_area_m2": float(analysis.rooms.areas_m2.sum()),
         "rooms_predicted_area_m2": float(analysis.rooms.predicted_areas_m2.sum()),
@@ -138,6 +139,23 @@ def doorway_rows(step: TrackedSnapshot) -> list[Row]:
             }
         )
     return rows
+
+
+def border_rows(step: TrackedSnapshot) -> list[Row]:
+    """Give a row per pair of neighboring rooms, by their tracks."""
+    rows = []
+    for border in step.analysis.borders:
+        track_a, track_b = sorted(step.track_ids[room - 1] for room in border.rooms)
+        rows.append(
+            {
+                "track_a": track_a,
+                "track_b": track_b,
+                "kind": border.kind,
+                "width_m": border.width_m,
+                "strength": border.strength,
+            }
+        )
+    return sorted(rows, key=lambda row: (row["track_a"], row["track_b"]))
 
 
 def wall_rows(step: TrackedSnapshot) -> list[Row]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -26,19 +26,20 @@ from rose2_logs.model.rooms import Doorway, RoomMap
 from rose2_logs.segmentation.baselines.stage import segment_by_baseline
 from rose2_logs.segmentation.floor_plan.stage import FloorPlanResult, make_floor_plan
 from rose2_logs.segmentation.regions.stage import (
+    RegionTree,
     find_atoms,
-    find_rooms,
     generous_floor_plan,
     generous_walls,
+    region_tree,
 )
-from rose2_logs.segmentation.rooms.doorways import find_doorways
-from rose2_logs.segmentation.rooms.stage import RoomsResult, finish_rooms, make_rooms
+from rose2_logs.segmentation.rooms.doorways import borders_between, find_doorways
+from rose2_logs.segmentation.rooms.stage import finish_rooms, make_rooms
 from rose2_logs.segmentation.rose.stage import CleanMap, StructureResult, find_structure, make_clean_map
 from rose2_logs.segmentation.topology.splitting import split_rooms
 from rose2_logs.segmentation.topology.voronoi import voronoi_lines
 from rose2_logs.segmentation.walls.stage import WallCounter, WallResult, find_walls
 
-__all__ = ["METHODS", "analyze"]
+__all__ = ["METHODS", "RoomTree", "analyze", "analyze_with_tree"]
 
 
 def analyze(
@@ -71,6 +72,20 @@ def analyze(
     ParameterError
         If `method` is none of `METHODS`, or a parameter cannot be used.
     """
+    return analyze_with_tree(snapshot, parameters, method, voronoi=voronoi)[0]
+
+
+def analyze_with_tree(
+    snapshot: OccupancySnapshot,
+    parameters: Parameters | Mapping[str, Any] | None = None,
+    method: str = "rose2",
+    *,
+    voronoi: bool = False,
+) -> tuple[SnapshotAnalysis, RoomTree | None]:
+    """Segment one map as `analyze` does, and keep what gives its rooms at any other detail.
+
+    The tree is None where rooms do not come from fitted borders.
+    """
     parameters = Parameters.from_any(parameters)
     if method not in METHODS:
         raise ParameterError(f"method={method!r}: it must be one of {', '.join(METHODS)}")
@@ -83,7 +98,7 @@ def analyze(
         stages = _analyze_by_baseline(method, explored, parameters, watch)
     quality = room_quality(snapshot, explored, stages.rooms, parameters.quality)
     watch.lap("quality")
-    return SnapshotAnalysis(
+    analysis = SnapshotAnalysis(
         snapshot.index,
         snapshot.log_time_ns,
         snapshot.stamp_ns,
@@ -100,6 +115,7 @@ def analyze(
         stages.borders,
         stages.outside_m2,
     )
+    return analysis, stages.tree
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,6 +130,7 @@ class _Stages:
     voronoi_m: FloatArray | None = None
     borders: tuple[Border, ...] = ()
     outside_m2: float = 0.0
+    tree: RoomTree | None = None
 
 
 def _analyze_by_rose2(
@@ -138,61 +155,122 @@ def _analyze_by_rose2(
     # C and D: rooms between the walls
     strongest = float(directions[0]) if len(directions) else 0.0
     by_borders = parameters.floor_plan.grouping == "fitted"
-    group = _rooms_by_borders if by_borders else _rooms_by_walls
-    grouped = group(explored, scored, built, strongest, parameters, watch)
-    del scored, clean  # the rest needs their memory
-    finished = grouped.rooms
-    rooms = _room_map(finished.labels, finished.shapes, explored, parameters.topology)
+    tree = None
+    if by_borders:
+        tree = _grow_tree(explored, scored, strongest, parameters, watch)
+        del scored, clean  # the rest needs their memory
+        found = tree.rooms(parameters.regions.detail)
+    else:
+        found = _rooms_by_walls(explored, scored, built, strongest, parameters, watch)
+        del scored, clean
     watch.lap("rooms")
 
     graph = None
     if voronoi:
         # Clutter does not keep the free space apart.
-        inside = (finished.labels > 0) | (occupied & ~walls)
+        inside = (found.labels > 0) | (occupied & ~walls)
         graph = explored.segments(voronoi_lines(inside, walls, cell_m, parameters.topology))
         watch.lap("voronoi")
-    floor_plan = _floor_plan(grouped.plan, finished.room_of_face, explored, parameters.floor_plan)
     return _Stages(
         cell_m,
-        rooms,
+        found.rooms,
         structure,
         _walls(built, explored),
-        floor_plan,
+        found.floor_plan,
         graph,
-        grouped.borders,
-        grouped.outside_m2,
+        found.borders,
+        found.outside_m2,
+        tree,
     )
 
 
 @dataclass(frozen=True, eq=False)
-class _Grouped:
-    """What stages C and D give in the grid frame."""
+class _FoundRooms:
+    """What stages C and D give."""
 
-    plan: FloorPlanResult
-    rooms: RoomsResult
+    labels: NDArray[np.int32]
+    """On the analyzed cells."""
+    rooms: RoomMap
+    floor_plan: FloorPlan
     borders: tuple[Border, ...] = ()
     outside_m2: float = 0.0
 
 
-def _rooms_by_borders(
+@dataclass(frozen=True, eq=False)
+class RoomTree:
+    """A map whose atoms are judged, so that its rooms at any detail only take joining and finishing.
+
+    Attributes
+    ----------
+    explored : ExploredPart
+    plan : FloorPlanResult
+        The faces that the atoms were cut with, in no group.
+    faces : (H, W) int32
+        Face 1.. of each cell.
+    tree : RegionTree
+    parameters : Parameters
+    """
+
+    explored: ExploredPart
+    plan: FloorPlanResult
+    faces: NDArray[np.int32]
+    tree: RegionTree
+    parameters: Parameters
+
+    def rooms(self, detail: float) -> _FoundRooms:
+        """Join the atoms to rooms as far as a detail asks for, log odds, and finish these."""
+        explored, parameters = self.explored, self.parameters
+        found = self.tree.rooms(detail)
+        finished, found_as = finish_rooms(
+            found, self.plan, self.faces, explored.free, explored.resolution_m, parameters
+        )
+        rooms = _room_map(finished.labels, finished.shapes, explored, parameters.topology)
+        most_m = parameters.regions.door_max_width_m
+        return _FoundRooms(
+            finished.labels,
+            rooms,
+            _floor_plan(self.plan, finished.room_of_face, explored, parameters.floor_plan),
+            borders_between(rooms.doorways, found.strengths, found_as, rooms.areas_m2, most_m),
+            found.outside_m2,
+        )
+
+    def at_detail(
+        self, analysis: SnapshotAnalysis, snapshot: OccupancySnapshot, detail: float
+    ) -> SnapshotAnalysis:
+        """Give the analysis of a map with its rooms at another detail."""
+        watch = _StopWatch()
+        found = self.rooms(detail)
+        watch.lap("rooms")
+        quality = room_quality(snapshot, self.explored, found.rooms, self.parameters.quality)
+        watch.lap("quality")
+        return replace(
+            analysis,
+            rooms=found.rooms,
+            floor_plan=found.floor_plan,
+            quality=quality,
+            seconds=watch.seconds,
+            borders=found.borders,
+            outside_m2=found.outside_m2,
+        )
+
+
+def _grow_tree(
     explored: ExploredPart,
     scored: StructureResult,
-    built: WallResult,
     strongest_rad: float,
     parameters: Parameters,
     watch: _StopWatch,
-) -> _Grouped:
-    """Faces and basins of the clearance, joined by the fitted strength of their borders."""
+) -> RoomTree:
+    """Cut the floor into atoms, by faces and by basins of the clearance, and judge their borders."""
     free, occupied, cell_m = explored.free, explored.occupied, explored.resolution_m
     generous = generous_walls(scored, cell_m, parameters)
     plan, faces = generous_floor_plan(generous, free, strongest_rad, cell_m, parameters)
     watch.lap("floor_plan")
     atoms = find_atoms(free, occupied, scored.score, faces, strongest_rad, cell_m, parameters.regions)
     watch.lap("atoms")
-    found = find_rooms(atoms, free, cell_m, parameters.regions)
+    tree = region_tree(atoms, free, cell_m, parameters.regions)
     watch.lap("regions")
-    finished, borders = finish_rooms(found, plan, faces, free, cell_m, parameters)
-    return _Grouped(plan, finished, borders, found.outside_m2)
+    return RoomTree(explored, plan, faces, tree, parameters)
 
 
 def _rooms_by_walls(
@@ -202,14 +280,19 @@ def _rooms_by_walls(
     strongest_rad: float,
     parameters: Parameters,
     watch: _StopWatch,
-) -> _Grouped:
+) -> _FoundRooms:
     """Faces joined where no wall divides them, and rooms split at narrow places of their Voronoi graph."""
     free, cell_m, lines_m = explored.free, explored.resolution_m, built.lines.ends_m
     plan = make_floor_plan(lines_m, built.walls, free, strongest_rad, cell_m, parameters.floor_plan)
     watch.lap("floor_plan")
     split = split_rooms(plan.labels, built.walls, lines_m, scored.directions_rad, cell_m, parameters.topology)
     watch.lap("topology")
-    return _Grouped(plan, make_rooms(split, plan, free, cell_m, parameters.floor_plan))
+    finished = make_rooms(split, plan, free, cell_m, parameters.floor_plan)
+    return _FoundRooms(
+        finished.labels,
+        _room_map(finished.labels, finished.shapes, explored, parameters.topology),
+        _floor_plan(plan, finished.room_of_face, explored, parameters.floor_plan),
+    )
 
 
 def _analyze_by_baseline(

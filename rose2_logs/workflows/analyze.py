@@ -17,6 +17,7 @@ from rose2_logs.errors import InvalidMapError, OutputError, ParameterError
 from rose2_logs.io import open_log
 from rose2_logs.io.discovery import stem_of
 from rose2_logs.io.log import LogReader
+from rose2_logs.model.analysis import left_out_note
 from rose2_logs.outputs.mcap.viewer_layouts import bag_metadata_path, foxglove_path, rviz_path
 from rose2_logs.runs.history import RunHistory, RunSummary
 from rose2_logs.runs.journal import JournaledWorkers
@@ -211,6 +212,9 @@ def _follow(
             raise InvalidMapError(f"{info.log_path}: none of its {stream.invalid} maps can be analyzed")
         history.totals.invalid, history.totals.unchanged = stream.invalid, stream.unchanged
         _project_back(reader, history, store, sinks)
+        note = left_out_note(history.totals.outside_m2_last, history.totals.free_m2_last)
+        if note is not None:
+            logger.warning("%s: in the last map, %s", info.origin or info.log_path, note)
         summary = store.finish(history)
         for sink in sinks:
             sink.finish(summary)

@@ -6,13 +6,14 @@ import logging
 import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from rose2_logs.config.parameters import Parameters, ReadingParameters
+from rose2_logs.config.run_options import with_detail
 from rose2_logs.drawing.drawing import Drawing
 from rose2_logs.drawing.image_files import write_label_image
 from rose2_logs.drawing.plan import draw_segmentation
@@ -22,7 +23,8 @@ from rose2_logs.io import open_log
 from rose2_logs.io.discovery import IMAGE_ENDINGS
 from rose2_logs.io.opening import DEFAULT_LIMITS
 from rose2_logs.io.saved_maps import MapFilesSource
-from rose2_logs.model.analysis import SnapshotAnalysis
+from rose2_logs.model.analysis import SnapshotAnalysis, left_out_note
+from rose2_logs.model.borders import Border
 from rose2_logs.model.explored import coarser_for_its_size
 from rose2_logs.model.occupancy import OccupancySnapshot
 from rose2_logs.model.room_plan import RoomPlan, plan_of_analysis
@@ -30,7 +32,7 @@ from rose2_logs.model.rooms import RoomMap
 from rose2_logs.outputs.exports.formats import planned_files, write_plan
 from rose2_logs.outputs.exports.geojson import plan_geojson
 from rose2_logs.runs.summary import write_json
-from rose2_logs.segmentation.pipeline import analyze
+from rose2_logs.segmentation.pipeline import RoomTree, analyze_with_tree
 from rose2_logs.system.files import refuse_existing, require_utf8
 
 logger = logging.getLogger(__name__)
@@ -61,6 +63,44 @@ class Segmentation(SnapshotAnalysis):
     snapshot: OccupancySnapshot = field(kw_only=True)
     parameters: Parameters = field(kw_only=True)
     name: str = "map"
+    _tree: RoomTree | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        # The tree is worth its memory while one looks at a map, but not a way between processes.
+        return self.__dict__ | {"_tree": None}
+
+    def at_detail(self, detail: float) -> Segmentation:
+        """Divide the same map into more or fewer rooms, without analyzing it again.
+
+        More detail never joins what less detail parts. The result is that of `segment` with this detail,
+        but for the Voronoi graph, which stays as it is.
+
+        Parameters
+        ----------
+        detail : float
+            Log odds: 0 parts what is likelier two rooms than one; positive gives more and smaller rooms,
+            negative fewer and larger ones.
+
+        Raises
+        ------
+        ParameterError
+            If it is out of bounds, or the rooms do not come from borders with a fitted strength.
+
+        Examples
+        --------
+        >>> import rose2_logs as rl
+        >>> with rl.open_log("sample_logs/office.mcap") as reader:
+        ...     found = rl.segment(reader.last())
+        >>> len(found.at_detail(-5).rooms) <= len(found.rooms) <= len(found.at_detail(5).rooms)
+        True
+        """
+        parameters = with_detail(self.parameters, detail, "rose2" if self.walls is not None else "other")
+        if self._tree is None:
+            return segment_snapshot(
+                self.snapshot, parameters, name=self.name, voronoi=self.voronoi_m is not None
+            )
+        found = self._tree.at_detail(self, self.snapshot, detail)
+        return replace(found, parameters=parameters)
 
     def plan(self) -> RoomPlan:
         """Return the floor plan: rooms by their numbers, doorways, walls and the map."""
@@ -96,6 +136,7 @@ class StaticMapResult:
     """What `segment_map` found and wrote."""
 
     rooms: RoomMap
+    borders: tuple[Border, ...]
     folder: Path
     files: tuple[Path, ...]
 
@@ -109,12 +150,13 @@ def segment_snapshot(
     voronoi: bool = False,
 ) -> Segmentation:
     """Segment a single map; warn if it is so large that it was analyzed in coarser cells."""
-    found = analyze(snapshot, parameters, method, voronoi=voronoi)
-    note = coarser_for_its_size(snapshot.geometry, found.resolution_m, parameters.occupancy)
-    if note is not None:
-        logger.warning("%s: %s", name, note)
+    found, tree = analyze_with_tree(snapshot, parameters, method, voronoi=voronoi)
+    coarser = coarser_for_its_size(snapshot.geometry, found.resolution_m, parameters.occupancy)
+    for note in (coarser, left_out_note(found.outside_m2, found.free_area_m2)):
+        if note is not None:
+            logger.warning("%s: %s", name, note)
     stages = {each.name: getattr(found, each.name) for each in fields(found)}
-    return Segmentation(**stages, snapshot=snapshot, parameters=parameters, name=name)
+    return Segmentation(**stages, snapshot=snapshot, parameters=parameters, name=name, _tree=tree)
 
 
 def segment_map(
@@ -167,7 +209,7 @@ def segment_map(
     write_json(files[1], plan_geojson(plan, found.walls))
     found.figure().save(files[2])
     more = write_plan(plan, [each for each in formats if each != "geojson"], folder, name)
-    return StaticMapResult(found.rooms, folder, (*files, *more))
+    return StaticMapResult(found.rooms, found.borders, folder, (*files, *more))
 
 
 def read_static_map(

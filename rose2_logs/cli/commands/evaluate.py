@@ -13,6 +13,7 @@ from rich.markup import escape
 from rose2_logs.cli.options import option_of
 from rose2_logs.cli.printing import print_line, print_table, progress_bar
 from rose2_logs.config.parameters import Parameters
+from rose2_logs.config.run_options import with_detail
 
 if TYPE_CHECKING:
     from rose2_logs.evaluation.benchmark import CaseResult
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
 EXAMPLE = "Example: [bold]rose2-logs evaluate cases.json --pictures pictures --json figures.json[/bold]"
 ALONG_FIGURES = ("iou_seg", "iou_gt", "iou_sym")
-METHOD, WORKERS = option_of("method"), option_of("workers")
+METHOD, DETAIL, WORKERS = option_of("method"), option_of("detail"), option_of("workers")
 
 
 def evaluate(
@@ -66,6 +67,7 @@ def evaluate(
     ] = False,
     workers: int = WORKERS,
     method: str = METHOD,
+    detail: float | None = DETAIL,
 ) -> None:
     """Segment maps whose true rooms are known, and print how well the rooms agree."""
     from rose2_logs.runs.summary import write_json
@@ -77,7 +79,7 @@ def evaluate(
         found = evaluate_method(
             cases,
             method=method,
-            parameters=parameters,
+            parameters=with_detail(parameters, detail, method),
             group=group,
             along=along,
             workers=workers,

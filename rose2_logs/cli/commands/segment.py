@@ -11,12 +11,13 @@ from rich.markup import escape
 from rose2_logs.cli.options import option_of
 from rose2_logs.cli.printing import print_line, print_table
 from rose2_logs.config.parameters import Parameters
+from rose2_logs.config.run_options import with_detail
 
 if TYPE_CHECKING:
     from rose2_logs.workflows.segment import StaticMapResult
 
 EXAMPLE = "Example: [bold]rose2-logs segment map.png --resolution 0.05 -o rooms[/bold]"
-METHOD = option_of("method")
+METHOD, DETAIL = option_of("method"), option_of("detail")
 
 
 def segment(
@@ -43,13 +44,15 @@ def segment(
         ),
     ] = None,
     method: str = METHOD,
+    detail: float | None = DETAIL,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace files that exist already.")] = False,
 ) -> None:
     """Segment one map: label image, floor plan as GeoJSON, picture."""
     from rose2_logs.workflows.segment import segment_map
 
+    used = with_detail(parameters, detail, method)
     result = segment_map(
-        map_file, out, parameters, method, formats=formats or (), resolution_m=resolution, overwrite=overwrite
+        map_file, out, used, method, formats=formats or (), resolution_m=resolution, overwrite=overwrite
     )
     print_static_map(result)
 
@@ -66,6 +69,10 @@ def print_static_map(result: StaticMapResult) -> None:
         neighbors = ", ".join(str(other) for other in rooms.neighbors(number))
         table.add_row(str(number), f"{area:.1f}", f"{predicted:.1f}", neighbors)
     print_table(table)
+    for border in sorted(result.borders, key=lambda border: border.strength):
+        if border.is_unsure:
+            one, other = border.rooms
+            print_line(f"rooms {one} and {other} may be one ({border.kind}, {border.strength:.0%} sure)")
     print_line(f"results in [bold]{escape(str(result.folder))}[/]")
     for file in result.files:
         print_line(f"  {escape(file.name)}")

@@ -74,6 +74,12 @@ class Joins:
                 parent[root(parent, b)] = root(parent, a)
         return np.unique([root(parent, n) for n in range(self.count)], return_inverse=True)[1]
 
+    def then(self, later: Joins) -> Joins:
+        """Add joins of the regions that all of these give."""
+        first_atom = np.unique(self.regions(-np.inf), return_index=True)[1]
+        pairs = np.concatenate([self.pairs, first_atom[later.pairs]])
+        return Joins(self.count, pairs, np.concatenate([self.strength, later.strength]))
+
 
 def join_regions(graph: RegionGraph, strength: Strength, least: float, judge: Judge | None = None) -> Joins:
     """Join until no border is stronger than `least`.

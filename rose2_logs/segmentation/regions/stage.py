@@ -3,23 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import cv2
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from rose2_logs.config.parameters import Parameters, RegionParameters
-from rose2_logs.model.borders import Border
+from rose2_logs.config.parameters import DETAIL_MOST, Parameters, RegionParameters
 from rose2_logs.model.occupancy import BoolArray
 from rose2_logs.segmentation.floor_plan.edge_weights import edge_evidence
 from rose2_logs.segmentation.floor_plan.faces import build_faces, free_area, label_faces
 from rose2_logs.segmentation.floor_plan.stage import FloorPlanResult, frame_along
 from rose2_logs.segmentation.regions import fitted
 from rose2_logs.segmentation.regions.atoms import cut_atoms
-from rose2_logs.segmentation.regions.borders import borders_of
+from rose2_logs.segmentation.regions.borders import border_strengths
 from rose2_logs.segmentation.regions.graph import STRONG_SCORE, RegionGraph, build_graph
-from rose2_logs.segmentation.regions.joining import join_regions
+from rose2_logs.segmentation.regions.joining import Joins, Strength, join_regions
 from rose2_logs.segmentation.regions.outside import rooms_of
 from rose2_logs.segmentation.regions.plan_frame import Labels, PlanFrame
 from rose2_logs.segmentation.regions.plan_raster import PlanRaster
@@ -27,6 +27,10 @@ from rose2_logs.segmentation.regions.strengths import JoinStrength
 from rose2_logs.segmentation.rose.clean_map import attached_cells
 from rose2_logs.segmentation.rose.stage import StructureResult
 from rose2_logs.segmentation.walls.stage import WallResult, find_walls
+
+
+EVEN_ODDS = 0.0
+"""Log odds of what is as likely one room as two."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,15 +74,66 @@ class RegionsResult:
     ----------
     labels : (H, W) int32
         Room 1.. of the free cells, 0 for none.
-    borders : tuple of Border
-        By the numbers of `labels`.
+    strengths : dict of (int, int) to float
+        Of the border of each two neighboring rooms, the smaller number first, see `border_strengths`.
     outside_m2 : float
         Free area that was left out as outside the building.
     """
 
     labels: Labels
-    borders: tuple[Border, ...]
+    strengths: dict[tuple[int, int], float]
     outside_m2: float
+
+
+@dataclass(frozen=True, eq=False)
+class RegionTree:
+    """The atoms of a map and the order in which they are joined: from it follow the rooms at any detail.
+
+    There is one tree for all details, so that more detail never joins what less detail parts: joins down to
+    even odds, and, where less detail is asked for, those that follow on them.
+
+    Attributes
+    ----------
+    cells : (H, W) int32
+        Atom 1..N of each free cell of the map, 0 for none.
+    free : (H, W) bool
+    resolution_m : float
+    graph : RegionGraph
+        Of the atoms.
+    strength : callable
+        Log odds that two regions are one room.
+    parameters : RegionParameters
+    """
+
+    cells: Labels
+    free: BoolArray
+    resolution_m: float
+    graph: RegionGraph
+    strength: Strength
+    parameters: RegionParameters
+
+    @cached_property
+    def _to_even_odds(self) -> Joins:
+        return join_regions(self.graph, self.strength, EVEN_ODDS)
+
+    @cached_property
+    def _to_the_end(self) -> Joins:
+        joins = self._to_even_odds
+        regions, _ = self.graph.joined(joins.regions(EVEN_ODDS))
+        return joins.then(join_regions(regions, self.strength, -DETAIL_MOST))
+
+    def rooms(self, detail: float) -> RegionsResult:
+        """Join the atoms as far as a detail asks for, log odds; 0 for even odds, more for more rooms."""
+        if not len(self.graph.node_sums):
+            return RegionsResult(np.zeros(self.free.shape, np.int32), {}, 0.0)
+        joins = self._to_even_odds if detail >= EVEN_ODDS else self._to_the_end
+        region = joins.regions(detail)
+        regions, _ = self.graph.joined(region)
+        room, outside_m2 = rooms_of(regions, fitted.outside_trees(), self.parameters)
+        labels = room_labels(
+            self.cells, room[region], self.free, self.resolution_m, self.parameters.loose_reach_m
+        )
+        return RegionsResult(labels, border_strengths(regions, room, self.strength), outside_m2)
 
 
 def generous_walls(scored: StructureResult, resolution_m: float, parameters: Parameters) -> WallResult:
@@ -138,19 +193,13 @@ def find_atoms(
     )
 
 
-def find_rooms(
+def region_tree(
     atoms: Atoms, free: BoolArray, resolution_m: float, parameters: RegionParameters
-) -> RegionsResult:
-    """Join atoms to rooms by the fitted strength of their borders."""
-    if not atoms.count:
-        return RegionsResult(np.zeros(free.shape, np.int32), (), 0.0)
-    graph = atoms.graph(fitted.answering_network()(atoms.raster))
+) -> RegionTree:
+    """Judge the borders of atoms, to join these to rooms."""
+    graph = atoms.graph(fitted.answering_network()(atoms.raster) if atoms.count else None)
     strength = JoinStrength(fitted.join_trees(), parameters.answer_weight, parameters.answer_scale)
-    region = join_regions(graph, strength, parameters.detail).regions(parameters.detail)
-    regions, _ = graph.joined(region)
-    room, outside_m2 = rooms_of(regions, fitted.outside_trees(), parameters)
-    labels = room_labels(atoms.cells, room[region], free, resolution_m, parameters.loose_reach_m)
-    return RegionsResult(labels, borders_of(regions, room, strength, parameters), outside_m2)
+    return RegionTree(atoms.cells, free, resolution_m, graph, strength, parameters)
 
 
 def room_labels(

@@ -1,8 +1,9 @@
-"""Doorways: where free space of two rooms is connected."""
+"""Doorways: where free space of two rooms is connected; borders: what lies between neighboring rooms."""
 
 from __future__ import annotations
 
 import itertools
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,8 +12,10 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from rose2_logs.config.parameters import TopologyParameters
+from rose2_logs.model.borders import Border
 from rose2_logs.model.labels import contacts
 from rose2_logs.model.occupancy import FloatArray
+from rose2_logs.model.rooms import Doorway
 
 
 def find_doorways(
@@ -55,6 +58,45 @@ def find_doorways(
         if np.linalg.norm(ends[1] - ends[0]) + resolution_m >= parameters.doorway_min_width_m:
             doorways.append((pairs[pair[members[0]]], ends))
     return sorted(doorways, key=lambda item: (item[0], item[1].tolist()))
+
+
+def borders_between(
+    doorways: Sequence[Doorway],
+    strengths: Mapping[tuple[int, int], float],
+    region_of_room: NDArray[np.int32],
+    areas_m2: FloatArray,
+    door_max_width_m: float,
+) -> tuple[Border, ...]:
+    """Say what lies between each two neighboring rooms, in the order of their numbers.
+
+    Parameters
+    ----------
+    doorways : sequence of Doorway
+        Between the rooms.
+    strengths : mapping of (int, int) to float
+        Probability that two neighboring regions are different rooms, the smaller number first.
+    region_of_room : (R + 1,) int32
+        Region that each room is a piece of, 0 first; the largest one stands for the region where a border has
+        no doorway.
+    areas_m2 : (R,) float
+        Of the rooms.
+    door_max_width_m : float
+        Wider doorways are openings.
+    """
+    by_area = np.argsort(areas_m2, kind="stable") + 1
+    largest = dict(zip(region_of_room[by_area].tolist(), by_area.tolist(), strict=True))
+    found = {}
+    for pair, strength in strengths.items():
+        if pair[0] in largest and pair[1] in largest:
+            one, other = sorted((largest[pair[0]], largest[pair[1]]))
+            found[one, other] = Border((one, other), "wall", 0.0, strength)
+    for doorway in doorways:
+        one, other = sorted(region_of_room[list(doorway.rooms)].tolist())
+        known, width_m = found.get(doorway.rooms), doorway.width_m
+        if known is None or width_m > known.width_m:
+            kind = "door" if width_m <= door_max_width_m else "opening"
+            found[doorway.rooms] = Border(doorway.rooms, kind, width_m, strengths.get((one, other), 1.0))
+    return tuple(found[pair] for pair in sorted(found))
 
 
 def _extremes(points: FloatArray) -> FloatArray:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from rose2_logs.config.parameters import FloorPlanParameters, Parameters
-from rose2_logs.model.borders import Border
 from rose2_logs.model.labels import number_rooms, renumber_in_place
 from rose2_logs.model.occupancy import BoolArray
 from rose2_logs.segmentation.floor_plan.stage import FloorPlanResult
@@ -76,13 +75,13 @@ def finish_rooms(
     free: BoolArray,
     resolution_m: float,
     parameters: Parameters,
-) -> tuple[RoomsResult, tuple[Border, ...]]:
+) -> tuple[RoomsResult, NDArray[np.int32]]:
     """Finish rooms by fitted borders: in one piece, with straight borders, numbers, and predicted shapes.
 
     Parameters
     ----------
     found : RegionsResult
-        Rooms of the free cells, and their borders.
+        Rooms of the free cells.
     plan : FloorPlanResult
         The faces.
     faces : (H, W) int32
@@ -96,8 +95,8 @@ def finish_rooms(
     Returns
     -------
     rooms : RoomsResult
-    borders : tuple of Border
-        Of those of `found` whose rooms are left, by the new numbers.
+    found_as : (R + 1,) int32
+        Number that each room, or what it is a piece of, has in `found`, 0 first.
     """
     of_regions = parameters.regions
     settled = settle_borders(found.labels, resolution_m, parameters.floor_plan.border_strip_m)
@@ -108,20 +107,6 @@ def finish_rooms(
     labels = renumber_in_place(pieces, number)
     room_of_face = most_seen_rooms(labels, faces, len(plan.graph.polygons))
     shapes = room_shapes(labels, plan, room_of_face, resolution_m, parameters.floor_plan.shape_min_seen)
-    return RoomsResult(labels, shapes, room_of_face), _renumbered(found.borders, room_of_piece, number)
-
-
-def _renumbered(
-    borders: tuple[Border, ...], room_of_piece: NDArray[np.int32], number: NDArray[np.int32]
-) -> tuple[Border, ...]:
-    """Borders by the numbers of the first piece of each room."""
-    first = np.zeros(int(room_of_piece.max(initial=0)) + 1, np.int64)
-    first[room_of_piece[::-1]] = np.arange(len(room_of_piece))[::-1]
-    new = number[first]
-    new[0] = 0
-    kept = []
-    for border in borders:
-        one, other = sorted(int(new[room]) if room < len(new) else 0 for room in border.rooms)
-        if one:
-            kept.append(replace(border, rooms=(one, other)))
-    return tuple(sorted(kept, key=lambda border: border.rooms))
+    found_as = np.zeros(int(number.max(initial=0)) + 1, np.int32)
+    found_as[number] = np.where(number > 0, room_of_piece, 0)
+    return RoomsResult(labels, shapes, room_of_face), found_as
