@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 RECORDING_LAYERS = (
     "predicted",
+    "borders",
     "path",
     "clean_map",
     "score",

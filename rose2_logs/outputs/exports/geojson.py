@@ -38,6 +38,7 @@ def plan_geojson(plan: RoomPlan, walls: Walls | None = None) -> dict[str, Any]:
     dict
         A GeoJSON FeatureCollection, ready for `json.dump`.
     """
+    strengths = {border.rooms: border.strength for border in plan.borders}
     features = [
         _feature(
             room.shape,
@@ -64,6 +65,7 @@ def plan_geojson(plan: RoomPlan, walls: Walls | None = None) -> dict[str, Any]:
             kind="doorway",
             rooms=list(door.rooms),
             width_m=door.width_m,
+            strength=strengths.get(door.rooms),
         )
         for number, door in enumerate(plan.doorways, start=1)
     ]

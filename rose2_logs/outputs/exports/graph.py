@@ -33,6 +33,7 @@ def plan_graph(plan: RoomPlan) -> dict[str, Any]:
                 "y_m": y,
             }
         )
+    strengths = {border.rooms: border.strength for border in plan.borders}
     edges: list[dict[str, Any]] = []
     doors_between: dict[tuple[int, int], int] = {}
     for door in plan.doorways:
@@ -45,6 +46,7 @@ def plan_graph(plan: RoomPlan) -> dict[str, Any]:
             "target": target,
             "key": number,
             "width_m": door.width_m,
+            "strength": strengths.get(door.rooms),
             "x_m": x,
             "y_m": y,
         }

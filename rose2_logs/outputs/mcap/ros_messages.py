@@ -45,7 +45,7 @@ FILL_OPACITY = 0.45
 LABEL_HEIGHT_M = 0.5
 OUTLINE_WIDTH_M = 0.06
 LINE_WIDTH_M = 0.03
-MARKER_LAYERS = ("rooms", "lines", "walls", "outlines", "doorways", "labels")
+MARKER_LAYERS = ("rooms", "lines", "walls", "outlines", "doorways", "unsure_borders", "labels")
 """Namespaces of markers, the lowest first."""
 LAYER_STEP_M = 0.01
 DEFAULT_OCCUPANCY = OccupancyParameters()
@@ -201,8 +201,12 @@ class MessageMaker:
             walls, lines = analysis.walls.segments_m.reshape(-1, 2), analysis.walls.lines_m.reshape(-1, 2)
             markers.append(Marker("walls", 0, LINE_LIST, walls, (0.1, 0.1, 0.1, 1.0), OUTLINE_WIDTH_M))
             markers.append(Marker("lines", 0, LINE_LIST, lines, (0.2, 0.4, 0.9, 0.35), LINE_WIDTH_M))
-        doors = np.array([door.ends_m for door in rooms.doorways]).reshape(-1, 2)
-        markers.append(Marker("doorways", 0, LINE_LIST, doors, (0.9, 0.3, 0.1, 1.0), OUTLINE_WIDTH_M))
+        for name, doors, color in (
+            ("doorways", rooms.doorways, (0.9, 0.3, 0.1, 1.0)),
+            ("unsure_borders", analysis.unsure_doorways, (0.6, 0.15, 0.8, 1.0)),
+        ):
+            ends = np.array([door.ends_m for door in doors]).reshape(-1, 2)
+            markers.append(Marker(name, 0, LINE_LIST, ends, color, OUTLINE_WIDTH_M))
         # At different heights, so that layers do not flicker through each other or through the map.
         heights = {name: LAYER_STEP_M * (layer + 1) for layer, name in enumerate(MARKER_LAYERS)}
         message = CdrWriter()

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from rose2_logs.model.analysis import left_out_note
 from rose2_logs.model.room_plan import RoomPlan
 from rose2_logs.outputs.report.words import MISSING, date_of, duration, size
 from rose2_logs.runs.run import Run
@@ -107,11 +108,15 @@ def notes(results: Run, plan: RoomPlan) -> list[Note]:
     if found["snapshots"] > 1:
         found_notes += _layout_notes(summary.get("layout", {}), results.choose())
     found_notes += _room_notes(plan)
+    found_notes += _border_notes(plan)
     found_notes += _shift_notes(results)
     if messages.get("skipped"):
         taken = f"{messages['skipped']} of {messages['messages']} map messages were skipped, as requested."
         found_notes.append(Note(taken, is_warning=False))
     row = results.row(results.choose())
+    left_out = left_out_note(float(row["outside_m2"]), float(row["free_area_m2"]))
+    if left_out is not None:
+        found_notes.append(Note(f"In the last map, {left_out}."))
     if row["analyzed_resolution_m"] > row["resolution_m"] * 1.001:
         cells = f"{row['analyzed_resolution_m']:g} m instead of {row['resolution_m']:g} m"
         coarse = f"The maps were analyzed in cells of {cells}."
@@ -174,6 +179,14 @@ def _room_notes(plan: RoomPlan) -> list[Note]:
             )
         )
     return found_notes
+
+
+def _border_notes(plan: RoomPlan) -> list[Note]:
+    unsure = sorted((border.strength, border.rooms) for border in plan.borders if border.is_unsure)
+    if not unsure:
+        return []
+    names = _listed([f"{one} and {other} ({percent(strength)})" for strength, (one, other) in unsure])
+    return [Note(f"Rooms that may be one, with how sure their border is: {names}.", is_warning=False)]
 
 
 def _shift_notes(results: Run) -> list[Note]:

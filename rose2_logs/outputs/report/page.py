@@ -13,6 +13,7 @@ from rose2_logs import __version__
 from rose2_logs.drawing.map_painter import Bounds
 from rose2_logs.drawing.plan import FIGURE, PANEL, draw_plan
 from rose2_logs.drawing.svg import as_svg
+from rose2_logs.model.borders import UNSURE_BORDER_BELOW
 from rose2_logs.model.room_plan import RoomPlan
 from rose2_logs.outputs.report import PANELS, facts, tables
 from rose2_logs.outputs.report.charts import run_charts, run_marks
@@ -129,6 +130,8 @@ def _content(results: Run, panels: int, *, is_beside: bool) -> dict[str, Any]:
         "marks": {kind for _, _, kind in run_marks(results)},
         "rooms": tables.room_table(results, plan),
         "doorways": tables.doorway_table(results, plan),
+        "unsure_borders": tables.unsure_border_table(plan),
+        "sure_from": percent(UNSURE_BORDER_BELOW),
         "events": tables.event_table(results),
         "parameters": parameters,
         "changed": tables.changed_parameters(parameters),

@@ -117,6 +117,30 @@ def doorway_table(results: Run, plan: RoomPlan) -> Table:
     return Table("Doorways", headings, tuple(rows), _cut(len(doors), len(rows), "doorways.parquet"))
 
 
+def unsure_border_table(plan: RoomPlan) -> Table:
+    """Borders of the last map that may be read otherwise, the least sure ones first."""
+    unsure = sorted((each.strength, each.rooms, each) for each in plan.borders if each.is_unsure)
+    rows = [
+        (
+            room(border.rooms[0]),
+            room(border.rooms[1]),
+            Cell(border.kind),
+            number(border.width_m, 2),
+            share(border.strength),
+        )
+        for _, _, border in unsure[:ROWS_MOST]
+    ]
+    headings = (
+        Column("room", is_number=False),
+        Column("and room", is_number=False),
+        Column("border", "wall: no doorway is known between them; opening: wider than a door", is_number=False),
+        Column("width, m", "clear width of the widest doorway between them"),
+        Column("strength", "probability that they are different rooms"),
+    )
+    name = "Borders that may be read otherwise"
+    return Table(name, headings, tuple(rows), _cut(len(unsure), len(rows), "borders.parquet"))
+
+
 def event_table(results: Run) -> Table:
     """What happened to the rooms, without their mere going on."""
     import pyarrow.compute as pc

@@ -13,6 +13,7 @@ from rose2_logs.model.occupancy import FloatArray
 from rose2_logs.outputs.rerun.back_projected import BACK_PROJECTED, SEEN_SHARE
 from rose2_logs.outputs.rerun.lanes import FINAL_IOU, FINAL_SHARE, LANES, SHIFTS
 from rose2_logs.outputs.rerun.world import (
+    BORDERS,
     CLEAN,
     DOORWAYS,
     FACES,
@@ -34,7 +35,7 @@ EYE_HEIGHT = 1.02
 """Height of the eye over the side of the map that fills the view: the viewer sees 1.04 times its height."""
 MAP_ASPECT = 1.3
 """Width over height of the view of the map in a window of usual shape."""
-SWITCHED = (CLEAN, SCORE, SEGMENTS, LINES, FACES, VORONOI)
+SWITCHED = (BORDERS, CLEAN, SCORE, SEGMENTS, LINES, FACES, VORONOI)
 """Layers of the map's view that are off at first and can be switched on."""
 TIMELINES = ("message_log_time", "ros2_timestamp", "snapshot", "coverage")
 Overrides = list[rrb.EntityBehavior | rrb.VisibleTimeRanges]
@@ -61,6 +62,7 @@ def make_blueprint(
     """
     stages = (
         ("Rooms", (), ()),
+        ("Borders", ("borders",), (BORDERS,)),
         ("Clean map", ("clean_map",), (CLEAN,)),
         ("Structure score", ("score",), (SCORE,)),
         ("Walls", ("segments", "lines"), (SEGMENTS, LINES)),

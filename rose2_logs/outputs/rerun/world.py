@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 from rose2_logs.drawing.hatching import hatch_unseen
 from rose2_logs.drawing.palette import track_color
 from rose2_logs.model.occupancy import FloatArray
+from rose2_logs.model.borders import UNSURE_BORDER_BELOW
 from rose2_logs.model.room_quality import UNSURE_SIGN, is_unsure
 from rose2_logs.outputs.rerun.columns import Label, Strips
 from rose2_logs.outputs.rerun.layers import Layers
 from rose2_logs.outputs.rerun.pictures import MapPictures, spectrum_picture
+from rose2_logs.system.text import percent
 from rose2_logs.tracking.track_history import quality_of
 from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot
 
@@ -27,6 +29,8 @@ LINE_COLOR, VORONOI_COLOR, DIRECTION_COLOR = (60, 110, 230), (150, 20, 150), (25
 UNCLUSTERED_COLOR = (130, 130, 130)
 STRONG_EDGE, WEAK_EDGE = (20, 20, 90), (80, 165, 235)
 """Edges that walls cover all along, and not at all; distinct also for those who do not see red and green."""
+SURE_BORDER, UNSURE_BORDER = (20, 20, 90), (190, 40, 230)
+"""Borders of strength 1, and those that are unsure; between them the color goes from half way on."""
 OUTLINE_SHADE, SEGMENT_SHADE = 0.6, 0.75
 """Share of the color of a fill that its outline has, and of a track's that a wall's segments have."""
 PATH_GAP_M = 2.0
@@ -36,15 +40,17 @@ ROBOT_LENGTH_M, ROBOT_WIDTH_M = 0.7, 0.45
 MARKS = (0.8, 0.98)
 """Where the marks of the directions begin and end, from the center of the spectrum's picture to its rim."""
 DIRECTION_NAME = "walls at {angle:.1f}°"
+BORDER_NAME = "{one} | {other}: {strength}"
 NAMED_SHARE = 0.004
 """Rooms with less of the area of a square view get a number only: number and area are about 65 of the usual
 1000 points wide, the side of a room of this share."""
 MAP, ROOMS, DOORWAYS = "/world/map", "/world/rooms", "/world/doorways"
+BORDERS = "/world/borders"
 FILLS, CLEAN, SCORE = "/world/room_fills", "/world/clean_map", "/world/structure_score"
 PREDICTED, PATH, ROBOT = "/world/predicted", "/world/path", "/world/robot"
 SEGMENTS, LINES, FACES, VORONOI = "/world/segments", "/world/lines", "/world/faces", "/world/voronoi"
 SPECTRUM = "/spectrum"
-HEIGHTS = (MAP, CLEAN, SCORE, FILLS, PREDICTED, ROOMS, FACES, LINES, SEGMENTS, VORONOI, DOORWAYS, PATH, ROBOT)
+HEIGHTS = (MAP, CLEAN, SCORE, FILLS, PREDICTED, ROOMS, FACES, LINES, SEGMENTS, VORONOI, DOORWAYS, BORDERS, PATH, ROBOT)
 """From the lowest layer to the highest; labels are above them all."""
 Color = tuple[int, int, int]
 
@@ -69,10 +75,12 @@ class World:
         self._shown: set[int] = set()
         self._known: set[int] = set()
         self._named: set[int] = set()
+        self._begun: set[str] = set()
         self._pose: FloatArray | None = None
         recording.log("/world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
         for path, width, color in (
             (DOORWAYS, DOOR_POINTS, DOOR_COLOR),
+            (BORDERS, DOOR_POINTS, None),
             (PATH, PATH_POINTS, PATH_COLOR),
             (ROBOT, OUTLINE_POINTS, ROBOT_COLOR),
             (PREDICTED, THIN_POINTS, None),
@@ -90,6 +98,8 @@ class World:
         self._log_rooms(step, view_side_m)
         doors = np.array([door.ends_m for door in step.analysis.rooms.doorways]).reshape(-1, 4)
         self._log_lines(DOORWAYS, doors)
+        if "borders" in self._wanted:
+            self._log_borders(step)
         if "predicted" in self._wanted:
             lines, room = hatch_unseen(step)
             colors = np.array([track_color(track) for track in step.track_ids], float).reshape(-1, 3)
@@ -155,6 +165,29 @@ class World:
         red, green, blue = (int(OUTLINE_SHADE * value) for value in track_color(track))
         self._style_lines(f"{ROOMS}/{track}", OUTLINE_POINTS, (red, green, blue))
         self._style_label(f"{ROOMS}/{track}/label")
+
+    def _log_borders(self, step: TrackedSnapshot) -> None:
+        """Show how sure the borders are through which rooms are open to one another; name unsure ones."""
+        strength = {border.rooms: border.strength for border in step.analysis.borders}
+        doors = [door for door in step.analysis.rooms.doorways if door.rooms in strength]
+        sure = np.array([strength[door.rooms] for door in doors])
+        share = np.clip((sure - UNSURE_BORDER_BELOW) / (1 - UNSURE_BORDER_BELOW), 0, 1)[:, None]
+        share = np.where(sure[:, None] < UNSURE_BORDER_BELOW, 0, (1 + share) / 2)
+        colors = share * np.array(SURE_BORDER) + (1 - share) * np.array(UNSURE_BORDER)
+        ends_m = np.array([door.ends_m for door in doors]).reshape(-1, 4)
+        self._log_lines(BORDERS, ends_m, colors.astype(np.uint8))
+        unsure = [door for door in doors if strength[door.rooms] < UNSURE_BORDER_BELOW]
+        for number, door in enumerate(unsure):
+            path = f"{BORDERS}/unsure/{number}"
+            if path not in self._begun:
+                self._begun.add(path)
+                self._style_label(path)
+            x, y, z = lifted(door.ends_m.mean(0)[None], len(HEIGHTS))[0].tolist()
+            one, other = sorted(step.track_ids[room - 1] for room in door.rooms)
+            text = BORDER_NAME.format(one=one, other=other, strength=percent(strength[door.rooms]))
+            self._layers.show(path, Label((x, y, z), text))
+        for number in range(len(unsure), self._layers.count_below(f"{BORDERS}/unsure")):
+            self._layers.clear(f"{BORDERS}/unsure/{number}")
 
     def _log_structure(self, step: TrackedSnapshot) -> None:
         analysis = step.analysis
