@@ -173,9 +173,7 @@ def track(
     1.00 19 [1, 2, 3, 4]
     """
     # What cannot be used is refused by the call, not when the first map is asked for.
-    options = _options(
-        parameters, {"method": method, "detail": detail, "workers": workers, "topic": topic}
-    )
+    options = _options(parameters, {"method": method, "detail": detail, "workers": workers, "topic": topic})
     if isinstance(log, LogReader) or (isinstance(log, Iterable) and not isinstance(log, str | bytes)):
         return _tracked(log, options)
     return _tracked_and_closed(open_log(log, topic=topic, parameters=options.parameters), options)

@@ -36,6 +36,7 @@ TABLES = {
     "tracks.parquet": (table_schemas.TRACKS, "One row per room over the run."),
     "events.parquet": (table_schemas.EVENTS, "One row per event."),
     "doorways.parquet": (table_schemas.DOORWAYS, "One row per doorway and map."),
+    "borders.parquet": (table_schemas.BORDERS, "One row per pair of neighboring rooms and map."),
     "walls.parquet": (table_schemas.WALLS, "One row per wall segment and map."),
     "lines.parquet": (table_schemas.LINES, "One row per representative line and map."),
     "maps.parquet": (table_schemas.MAPS, "One row per map: its explored window and its label image."),

@@ -27,7 +27,6 @@ from rose2_logs.config.tracking import QualityParameters, TrackingParameters
 from rose2_logs.errors import ParameterError
 from rose2_logs.system.files import reason_of
 
-
 DETAIL_MOST = 20.0
 """Greatest and, negative, least detail, log odds: surer than any answer."""
 

@@ -194,7 +194,7 @@ def with_detail(parameters: Parameters, detail: float | None, method: str = METH
     check_option(RunOptions, "detail", detail)
     if method != METHODS[0] or parameters.floor_plan.grouping != "fitted":
         raise ParameterError(
-            f"detail={detail:g}: only rooms of method={METHODS[0]!r} with floor_plan.grouping='fitted' have it"
+            f"detail={detail:g}: only method={METHODS[0]!r} with floor_plan.grouping='fitted' has it"
         )
     return parameters.replaced({"regions.detail": float(detail)})
 
@@ -294,9 +294,9 @@ class RunOptions:
     )
     detail: float | None = option(
         None,
-        "How finely to divide open floor into rooms. 0, the default, parts what is likelier two rooms than one; "
-        "positive gives more and smaller rooms, negative fewer and larger ones. In log odds: 2 is a clear "
-        "change, 5 a strong one.",
+        "How finely to divide open floor into rooms. 0, the default, parts what is likelier two rooms than "
+        "one; positive gives more and smaller rooms, negative fewer and larger ones. In log odds: 2 is a "
+        "clear change, 5 a strong one.",
         panel=METHOD,
         commands=BOTH,
         metavar="X",

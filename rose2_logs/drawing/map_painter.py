@@ -94,6 +94,8 @@ class MapPainter:
 
     def lines(self, ends_m: FloatArray, color: Color, width: float, rim: float = 0.0) -> None:
         """Draw straight lines of the world (N, 2, 2), meters, with a pale rim on both sides."""
+        if not len(ends_m):
+            return
         shape = self.on_page(shapely.multilinestrings(shapely.linestrings(ends_m.reshape(-1, 2, 2))))
         if rim:
             self.drawing.add(Lines(shape, WHITE, width + 2 * rim))

@@ -73,9 +73,7 @@ def plot_plan(plan: RoomPlan, ax: Axes | None = None) -> Axes:
     for doorway in plan.doorways:
         x, y = doorway.ends_m.reshape(2, 2).T
         color = _unit(UNSURE_COLOR if doorway in unsure else DOORWAY_COLOR)
-        ax.plot(
-            x, y, color=color, linewidth=DOOR_LINE, solid_capstyle="butt", zorder=LAYER_DOORS
-        )
+        ax.plot(x, y, color=color, linewidth=DOOR_LINE, solid_capstyle="butt", zorder=LAYER_DOORS)
     x0, y0, x1, y1 = plan.bounds_m
     ax.set(
         xlim=(x0 - MARGIN_M, x1 + MARGIN_M),

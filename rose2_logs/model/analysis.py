@@ -250,6 +250,6 @@ def left_out_note(outside_m2: float, free_area_m2: float) -> str | None:
     if outside_m2 < LEFT_OUT_TOLD * free_area_m2 or not outside_m2:
         return None
     return (
-        f"{outside_m2:.0f} m2 of free floor, {percent(outside_m2 / free_area_m2)}, are taken to be outside the "
-        "building and in no room; regions.outside_max_share=0 keeps all of it"
+        f"{outside_m2:.0f} m2 of free floor, {percent(outside_m2 / free_area_m2)}, are taken to be outside "
+        "the building and in no room; regions.outside_max_share=0 keeps all of it"
     )

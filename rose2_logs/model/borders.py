@@ -25,7 +25,8 @@ class Border:
     width_m : float
         Clear width of the widest doorway between them, 0 for a wall.
     strength : float
-        Probability that the two are different rooms, by the fitted strength; 1 where nothing is open.
+        Probability that the two are different rooms, by the fitted strength; 1 where all between
+        them is wall.
 
     Examples
     --------

@@ -198,7 +198,9 @@ def plan_of_analysis(
         )
     walls = None if analysis.walls is None else analysis.walls.segments_m.reshape(-1, 2, 2)
     below = PlanMap(snapshot.geometry, snapshot.cells, found.labels, occupancy)
-    return RoomPlan(title, snapshot.geometry.frame_id, tuple(rooms), found.doorways, walls, below, analysis.borders)
+    return RoomPlan(
+        title, snapshot.geometry.frame_id, tuple(rooms), found.doorways, walls, below, analysis.borders
+    )
 
 
 def predicted_parts(plan: RoomPlan) -> dict[int, BaseGeometry]:

@@ -199,7 +199,8 @@ BORDERS = _table(
         "width_m": (pa.float64(), "clear width of the widest doorway between them, meters; 0 for a wall"),
         "strength": (
             pa.float64(),
-            "probability that they are different rooms, by the fitted strength; 1 where nothing is open",
+            "probability that they are different rooms, by the fitted strength; 1 where all between "
+            "them is wall",
         ),
     }
 )

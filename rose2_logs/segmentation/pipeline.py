@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import shapely
@@ -38,6 +38,8 @@ from rose2_logs.segmentation.rose.stage import CleanMap, StructureResult, find_s
 from rose2_logs.segmentation.topology.splitting import split_rooms
 from rose2_logs.segmentation.topology.voronoi import voronoi_lines
 from rose2_logs.segmentation.walls.stage import WallCounter, WallResult, find_walls
+
+Analysis = TypeVar("Analysis", bound=SnapshotAnalysis)
 
 __all__ = ["METHODS", "RoomTree", "analyze", "analyze_with_tree"]
 
@@ -234,9 +236,7 @@ class RoomTree:
             found.outside_m2,
         )
 
-    def at_detail(
-        self, analysis: SnapshotAnalysis, snapshot: OccupancySnapshot, detail: float
-    ) -> SnapshotAnalysis:
+    def at_detail(self, analysis: Analysis, snapshot: OccupancySnapshot, detail: float) -> Analysis:
         """Give the analysis of a map with its rooms at another detail."""
         watch = _StopWatch()
         found = self.rooms(detail)

@@ -9,6 +9,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 from finished_runs import SAMPLE_LOGS
 from PIL import Image
@@ -78,6 +79,40 @@ def test_analyze_writes_a_folder_named_after_the_log(cli, maps: Path, tmp_path: 
     assert "2 (2 over the run)" in out
     summary = json.loads((tmp_path / "out" / "maps" / "summary.json").read_text())
     assert summary["parameters"]["tracking"]["match_min_iou"] == 0.3
+
+
+def test_detail_gives_more_or_fewer_rooms(cli, tmp_path: Path):
+    """The option is the parameter, and wins over it."""
+    log = SAMPLE_LOGS / "office.mcap"
+    rooms = {}
+    for detail in ("-20", "0", "20"):
+        options = ("--max-snapshots", 1, "--no-rrd", "--no-mcap", "--set", "regions.detail=3")
+        code, _, _ = cli("analyze", log, "-o", tmp_path / detail, "--detail", detail, *options)
+        assert code == 0
+        summary = json.loads((tmp_path / detail / "office" / "summary.json").read_text())
+        assert summary["parameters"]["regions"]["detail"] == float(detail)
+        rooms[detail] = summary["results"]["rooms_last"]
+    assert rooms["-20"] < rooms["0"] < rooms["20"]
+
+
+def test_a_detail_that_the_method_does_not_have_is_refused(cli, maps: Path, tmp_path: Path):
+    code, _, err = cli("analyze", maps, "-o", tmp_path, "--detail", 1, "--method", "voronoi")
+    assert code == 2
+    assert "--detail" in err
+    assert len(err.splitlines()) == 1
+
+
+def test_what_was_left_out_as_outside_is_told_once(cli, maps: Path, tmp_path: Path):
+    """With the remedy; here all of every map is taken to be outside."""
+    outside = ("--set", "regions.room_min_log_odds=20", "--set", "regions.outside_max_share=1")
+    code, _, err = cli("analyze", maps, "-o", tmp_path / "out", "--no-rrd", "--no-mcap", *outside)
+    assert code == 0
+    assert err.count("outside the building") == 1
+    assert "regions.outside_max_share=0" in err
+    summary = json.loads((tmp_path / "out" / "maps" / "summary.json").read_text())
+    free_m2 = pq.read_table(tmp_path / "out" / "maps" / "snapshots.parquet")["free_area_m2"].to_pylist()[-1]
+    assert summary["results"]["outside_m2_last"] == pytest.approx(free_m2)
+    assert summary["warnings"]["count"] == 1
 
 
 def test_analyze_goes_on_after_a_bad_log_and_ends_non_zero(cli, maps: Path, tmp_path: Path):

@@ -16,7 +16,7 @@ from PIL import Image
 
 from rose2_logs.drawing.drawing import Drawing
 from rose2_logs.drawing.fonts import text_width
-from rose2_logs.drawing.map_painter import FREE_GRAY, OCCUPIED_GRAY, UNKNOWN_GRAY, tinted_cells
+from rose2_logs.drawing.map_painter import FREE_GRAY, OCCUPIED_GRAY, UNKNOWN_GRAY, UNSURE_COLOR, tinted_cells
 from rose2_logs.drawing.palette import track_color
 from rose2_logs.drawing.pixels import as_pixels
 from rose2_logs.drawing.plan import (
@@ -30,6 +30,7 @@ from rose2_logs.drawing.plan import (
 )
 from rose2_logs.drawing.shapes import Area, Lines, Picture, Text
 from rose2_logs.drawing.svg import as_svg
+from rose2_logs.model.borders import UNSURE_BORDER_BELOW, Border
 from rose2_logs.model.room_plan import PlanRoom, RoomPlan
 from rose2_logs.model.rooms import Doorway
 
@@ -95,6 +96,24 @@ def test_unsure_rooms_are_marked_and_the_legend_says_so():
     assert {f"{LEFT}?", f"{RIGHT}?"} <= set(texts(unsure, PANEL))
     assert {f"Room {LEFT}?", "unsure, little wall around"} <= set(texts(unsure, FIGURE))
     assert not any("?" in text or "unsure" in text for text in texts(sure, PANEL) + texts(sure, FIGURE))
+
+
+def test_an_unsure_border_is_marked_at_its_doorway():
+    """From the named strength on it is an ordinary doorway; without one it has no place to be marked."""
+    plan = two_rooms_plan()
+
+    def with_border(strength: float, rooms: tuple[int, int] = (LEFT, RIGHT)) -> Drawing:
+        return draw_plan(dataclasses.replace(plan, borders=(Border(rooms, "door", 1.0, strength),)), FIGURE)
+
+    def marked(drawing: Drawing) -> int:
+        return sum(isinstance(each, Lines) and each.color == UNSURE_COLOR for each in drawing.shapes)
+
+    below, above = UNSURE_BORDER_BELOW - 0.01, UNSURE_BORDER_BELOW
+    unsure, sure, elsewhere = with_border(below), with_border(above), with_border(below, (LEFT, LEFT + 1))
+    assert marked(unsure) == 2  # the line and that of the legend
+    assert marked(sure) == marked(elsewhere) == 0
+    words = {each.text for each in unsure.shapes if isinstance(each, Text)}
+    assert "unsure border" in words
 
 
 def strip_of(drawing: Drawing) -> float:

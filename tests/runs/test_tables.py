@@ -16,6 +16,7 @@ from drawn_rooms import drawn, rows
 from rose2_logs.config.parameters import OccupancyParameters, Parameters
 from rose2_logs.config.tracking import TrackingParameters
 from rose2_logs.errors import OutputError
+from rose2_logs.model.borders import Border
 from rose2_logs.model.rooms import Doorway
 from rose2_logs.runs import parquet_table
 from rose2_logs.runs.history import RunHistory
@@ -98,6 +99,36 @@ def test_doorways_name_the_tracks_on_both_sides(tmp_path: Path):
     table = write(tmp_path)["doorways"]
     assert [(row["snapshot"], row["track_a"], row["track_b"]) for row in table] == [(0, 1, 2), (2, 1, 2)]
     assert table[0]["width_m"] == pytest.approx(0.9)
+
+
+def test_borders_name_the_tracks_on_both_sides_and_come_back_as_they_were(tmp_path: Path):
+    """One row per pair of neighbors and map, by track, whatever the labels; a plan has them again."""
+    border = Border((1, 2), "door", 0.9, 0.61)
+    first, second, third = steps()
+    with_border = [
+        dataclasses.replace(step, analysis=dataclasses.replace(step.analysis, borders=(border,)))
+        for step in (first, third)
+    ]
+    store_run(tmp_path, [with_border[0], second, with_border[1]])
+    told = pq.read_table(tmp_path / "borders.parquet").to_pylist()
+    assert [(row["snapshot"], row["log_time_ns"]) for row in told] == [(0, 10**9), (2, 3 * 10**9)]
+    for row in told:
+        assert (row["track_a"], row["track_b"], row["kind"]) == (1, 2, "door")
+        assert (row["width_m"], row["strength"]) == (0.9, 0.61)
+
+
+def test_what_was_left_out_stands_with_each_map(tmp_path: Path):
+    """And the last map's in the totals."""
+    history = RunHistory(Parameters())
+    left_out = [
+        dataclasses.replace(step, analysis=dataclasses.replace(step.analysis, outside_m2=outside_m2))
+        for step, outside_m2 in zip(steps(), (3.5, 0.0, 1.25), strict=True)
+    ]
+    store_run(tmp_path, left_out)
+    for step in left_out:
+        history.add(step)
+    assert pq.read_table(tmp_path / "snapshots.parquet")["outside_m2"].to_pylist() == [3.5, 0.0, 1.25]
+    assert (history.totals.outside_m2_last, history.totals.free_m2_last) == (1.25, 8.0)
 
 
 def test_tracks_have_one_row_a_room_over_the_run(tmp_path: Path):

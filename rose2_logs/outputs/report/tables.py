@@ -133,7 +133,9 @@ def unsure_border_table(plan: RoomPlan) -> Table:
     headings = (
         Column("room", is_number=False),
         Column("and room", is_number=False),
-        Column("border", "wall: no doorway is known between them; opening: wider than a door", is_number=False),
+        Column(
+            "border", "wall: no doorway is known between them; opening: wider than a door", is_number=False
+        ),
         Column("width, m", "clear width of the widest doorway between them"),
         Column("strength", "probability that they are different rooms"),
     )

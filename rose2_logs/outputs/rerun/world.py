@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from rose2_logs.drawing.hatching import hatch_unseen
 from rose2_logs.drawing.palette import track_color
-from rose2_logs.model.occupancy import FloatArray
 from rose2_logs.model.borders import UNSURE_BORDER_BELOW
+from rose2_logs.model.occupancy import FloatArray
 from rose2_logs.model.room_quality import UNSURE_SIGN, is_unsure
 from rose2_logs.outputs.rerun.columns import Label, Strips
 from rose2_logs.outputs.rerun.layers import Layers
@@ -50,7 +50,22 @@ FILLS, CLEAN, SCORE = "/world/room_fills", "/world/clean_map", "/world/structure
 PREDICTED, PATH, ROBOT = "/world/predicted", "/world/path", "/world/robot"
 SEGMENTS, LINES, FACES, VORONOI = "/world/segments", "/world/lines", "/world/faces", "/world/voronoi"
 SPECTRUM = "/spectrum"
-HEIGHTS = (MAP, CLEAN, SCORE, FILLS, PREDICTED, ROOMS, FACES, LINES, SEGMENTS, VORONOI, DOORWAYS, BORDERS, PATH, ROBOT)
+HEIGHTS = (
+    MAP,
+    CLEAN,
+    SCORE,
+    FILLS,
+    PREDICTED,
+    ROOMS,
+    FACES,
+    LINES,
+    SEGMENTS,
+    VORONOI,
+    DOORWAYS,
+    BORDERS,
+    PATH,
+    ROBOT,
+)
 """From the lowest layer to the highest; labels are above them all."""
 Color = tuple[int, int, int]
 

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rose2_logs.config.parameters import RegionParameters
+from rose2_logs.model.occupancy import BoolArray
 from rose2_logs.segmentation.regions.features import region_features
 from rose2_logs.segmentation.regions.graph import RegionGraph
 from rose2_logs.segmentation.regions.joining import Strength
@@ -13,7 +14,7 @@ from rose2_logs.segmentation.regions.joining import Strength
 
 def rooms_of(
     graph: RegionGraph, is_room: Strength, parameters: RegionParameters
-) -> tuple[NDArray[np.int64], float]:
+) -> tuple[NDArray[np.int64], BoolArray]:
     """Number the regions of a graph that are rooms.
 
     Parameters
@@ -28,8 +29,8 @@ def rooms_of(
     -------
     room : (N,) int64
         Room 1.. of each region, 0 for none.
-    outside_m2 : float
-        Area of the regions that are outside, not of those that are too small.
+    outside : (N,) bool
+        Regions that are outside; those that are too small are not.
     """
     area = graph.node_sums[:, 0]
     outside = is_room(region_features(graph)) < parameters.room_min_log_odds
@@ -37,4 +38,4 @@ def rooms_of(
     if area[outside].sum() > parameters.outside_max_share * area.sum():
         outside[:] = False
     room = ~outside & (area >= parameters.room_min_area_m2)
-    return np.where(room, np.cumsum(room), 0), float(area[outside].sum())
+    return np.where(room, np.cumsum(room), 0), outside

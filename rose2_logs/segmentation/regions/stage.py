@@ -11,6 +11,7 @@ import shapely
 from numpy.typing import NDArray
 
 from rose2_logs.config.parameters import DETAIL_MOST, Parameters, RegionParameters
+from rose2_logs.model.labels import label_sizes
 from rose2_logs.model.occupancy import BoolArray
 from rose2_logs.segmentation.floor_plan.edge_weights import edge_evidence
 from rose2_logs.segmentation.floor_plan.faces import build_faces, free_area, label_faces
@@ -27,7 +28,6 @@ from rose2_logs.segmentation.regions.strengths import JoinStrength
 from rose2_logs.segmentation.rose.clean_map import attached_cells
 from rose2_logs.segmentation.rose.stage import StructureResult
 from rose2_logs.segmentation.walls.stage import WallResult, find_walls
-
 
 EVEN_ODDS = 0.0
 """Log odds of what is as likely one room as two."""
@@ -129,7 +129,9 @@ class RegionTree:
         joins = self._to_even_odds if detail >= EVEN_ODDS else self._to_the_end
         region = joins.regions(detail)
         regions, _ = self.graph.joined(region)
-        room, outside_m2 = rooms_of(regions, fitted.outside_trees(), self.parameters)
+        room, outside = rooms_of(regions, fitted.outside_trees(), self.parameters)
+        cells_of_atom = label_sizes(self.cells, len(region))[1:]
+        outside_m2 = float(cells_of_atom[outside[region]].sum()) * self.resolution_m**2
         labels = room_labels(
             self.cells, room[region], self.free, self.resolution_m, self.parameters.loose_reach_m
         )

@@ -98,7 +98,9 @@ def test_foxgloves_packages_read_every_message_and_every_marker(tmp_path, node_p
                 rooms.append([[room.track, room.area, room.neighbors.tolist()] for room in message.rooms])
     assert found["profile"] == "ros2"
     assert found["messages"] == messages
-    assert set(found["markers"]) == {"", "rooms", "outlines", "labels", "walls", "lines", "doorways"}
+    assert set(found["markers"]) == {
+        *("", "rooms", "outlines", "labels", "walls", "lines", "doorways", "unsure_borders")
+    }
     for name, told in markers.items():
         assert found["markers"][name] == pytest.approx(told)
     assert found["rooms"] == rooms

@@ -11,15 +11,18 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from finished_runs import SAMPLE_LOGS, renamed_topic, run_of
 
+from rose2_logs.drawing.map_painter import UNSURE_COLOR
 from rose2_logs.errors import LogError, OutputError
 from rose2_logs.outputs.report import tables
 from rose2_logs.outputs.report.overview import write_reports
 from rose2_logs.outputs.report.page import along_coverage, write_report
-from rose2_logs.outputs.report.words import date_of, duration
+from rose2_logs.outputs.report.words import css, date_of, duration
+from rose2_logs.system.text import percent
 
 
 class Reader(HTMLParser):
@@ -156,6 +159,36 @@ def test_names_are_text_and_never_markup(tmp_path: Path):
     assert "img" not in told.tags
     assert "b" not in told.tags
     assert "<script>alert" not in text
+
+
+def test_borders_that_may_be_read_otherwise_are_listed_and_marked(office_results: Path, tmp_path: Path):
+    """Those of the last map that are unsure, the least sure one first; a page without any has no list."""
+    folder = shutil.copytree(office_results, tmp_path / "office")
+    borders = pq.read_table(folder / "borders.parquet").to_pandas()
+    doors = pq.read_table(folder / "doorways.parquet").to_pandas().query("snapshot == 5")
+    pairs = [(row.track_a, row.track_b) for row in doors.drop_duplicates(["track_a", "track_b"]).itertuples()]
+    schema = pq.read_schema(folder / "borders.parquet")
+
+    def page_with(strengths: dict[tuple[int, int], float]) -> Path:
+        changed = borders.copy()
+        keys = zip(changed["track_a"], changed["track_b"], strict=True)
+        changed["strength"] = [strengths.get(pair, 1.0) for pair in keys]
+        table = pa.Table.from_pandas(changed, schema, preserve_index=False)
+        pq.write_table(table, folder / "borders.parquet")
+        return write_report(folder, overwrite=True)
+
+    told = Reader(page := page_with({pairs[0]: 0.75, pairs[1]: 0.305}))
+    names = [tuple(f"Room {track}" for track in pair) for pair in pairs]
+    rows = told.rows("borders-table")
+    assert [tuple(row[:2]) for row in rows] == [names[1], names[0]]
+    assert [row[4] for row in rows] == [percent(0.305), percent(0.75)]
+    text = page.read_text(encoding="utf-8")
+    purple = css(UNSURE_COLOR)
+    assert "unsure border" in text
+    assert purple in text
+    text = page_with({}).read_text(encoding="utf-8")
+    assert "borders-table" not in text
+    assert purple not in text
 
 
 def test_an_earlier_page_stays_unless_it_may_be_replaced(office_results: Path, tmp_path: Path):

@@ -15,7 +15,9 @@ from looking import free_port, needs_vulkan
 from saved_maps import save_run
 
 from rose2_logs.errors import OutputError
+from rose2_logs.model.borders import UNSURE_BORDER_BELOW
 from rose2_logs.outputs.rerun.world import room_label
+from rose2_logs.system.text import percent
 from rose2_logs.tracking.registration import RigidMotion
 from rose2_logs.tracking.tracked_snapshot import MAP_TRACK, RoomEvent
 from rose2_logs.workflows.analyze import RunOptions, analyze_log
@@ -92,6 +94,32 @@ def test_layers_that_were_not_asked_for_are_not_written(tmp_path):
     world = {path.split("/")[2] for path in logged if path.startswith("/world/")}
     assert world == {"map", "room_fills", "rooms", "doorways", "path", "robot", "lines"}
     assert not any(path.startswith("/spectrum") for path in logged)
+
+
+def test_unsure_borders_are_named_in_their_layer(tmp_path):
+    """At the greatest detail all borders that would be joined are there."""
+    from rerun.chunk import RrdReader
+
+    options = RunOptions(max_snapshots=2, annotated_log=False, layers=("borders",), detail=20.0)
+    done = analyze_log(PROJECT / "sample_logs" / "office.mcap", tmp_path, options)
+    borders = pq.read_table(done.folder / "borders.parquet").to_pylist()
+    doors = pq.read_table(done.folder / "doorways.parquet").to_pylist()
+    strength = {(each["snapshot"], each["track_a"], each["track_b"]): each["strength"] for each in borders}
+    wanted = set()
+    for door in doors:
+        one, other = door["track_a"], door["track_b"]
+        sure = strength[door["snapshot"], one, other]
+        if sure < UNSURE_BORDER_BELOW:
+            wanted.add(f"{one} | {other}: {percent(sure)}")
+    named = set()
+    for chunk in RrdReader(str(done.folder / "office.rrd")).stream():
+        batch = chunk.to_record_batch()
+        if str(chunk.entity_path).startswith("/world/borders/unsure/") and (
+            "Points3D:labels" in batch.schema.names
+        ):
+            named |= {row[0] for row in batch.column("Points3D:labels").to_pylist() if row}
+    assert named == wanted
+    assert len(wanted) > 10
 
 
 def test_a_run_that_fails_leaves_no_recording(tmp_path):

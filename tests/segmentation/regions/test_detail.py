@@ -1,0 +1,95 @@
+"""One tree of joins gives the rooms at any detail; more detail never joins what less detail parts."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import pickle
+
+import numpy as np
+import pytest
+from drawn_maps import office, snapshot
+
+import rose2_logs as rl
+from rose2_logs.segmentation.pipeline import RoomTree, analyze_with_tree
+from rose2_logs.segmentation.regions.stage import RegionTree
+
+DETAILS = (-20.0, -6.0, -2.0, -0.5, 0.0, 0.5, 2.0, 6.0, 20.0)
+
+
+def erratic(features: np.ndarray) -> np.ndarray:
+    """Strengths that a join changes in both directions, by much."""
+    return 15 * np.sin(1e3 * features.sum(1))
+
+
+@pytest.fixture(scope="module")
+def grown() -> RoomTree:
+    """The tree of a drawn office with clutter, which makes many atoms."""
+    _, tree = analyze_with_tree(snapshot(office(clutter=25)[0]))
+    assert tree is not None
+    return tree
+
+
+@pytest.mark.parametrize("strength", [None, erratic], ids=["fitted", "erratic"])
+def test_more_detail_never_joins_what_less_detail_parts(grown: RoomTree, strength):
+    tree = grown.tree
+    if strength is not None:
+        tree = RegionTree(tree.cells, tree.free, tree.resolution_m, tree.graph, strength, tree.parameters)
+    found = [tree.rooms(detail).labels for detail in DETAILS]
+    of_atoms = tree.cells > 0
+    for coarse, fine in itertools.pairwise(found):
+        both = of_atoms & (coarse > 0) & (fine > 0)
+        pairs = np.unique(np.column_stack([fine[both], coarse[both]]), axis=0)
+        assert len(np.unique(pairs[:, 0])) == len(pairs)
+    assert found[0].max() < found[-1].max()
+
+
+def test_detail_parts_surer_joins_step_by_step(grown: RoomTree):
+    """At the least detail all that touches is joined, at the greatest no atom is."""
+    atoms = len(grown.tree.graph.node_sums)
+    parameters = dataclasses.replace(grown.tree.parameters, room_min_area_m2=0.0, outside_max_share=0.0)
+    tree = dataclasses.replace(grown.tree, strength=lambda features: np.zeros(len(features)) + 1.0)
+    tree = dataclasses.replace(tree, parameters=parameters)
+    assert tree.rooms(1.1).labels.max() == atoms
+    assert tree.rooms(0.9).labels.max() < atoms
+    doubtful = dataclasses.replace(tree, strength=lambda features: np.zeros(len(features)) - 1.0)
+    assert doubtful.rooms(-0.9).labels.max() == atoms
+    assert doubtful.rooms(-1.1).labels.max() < atoms
+
+
+@pytest.mark.parametrize("detail", [-3.0, 0.0, 4.0])
+def test_another_detail_of_a_segmented_map_is_as_if_it_was_segmented_so(detail: float):
+    """Also where the tree is gone, as after a way between processes."""
+    drawn = snapshot(office(clutter=25)[0])
+    found, wanted = rl.segment(drawn), rl.segment(drawn, detail=detail)
+    copied = pickle.loads(pickle.dumps(found))
+    for other in (found.at_detail(detail), copied.at_detail(detail), found.at_detail(9).at_detail(detail)):
+        assert np.array_equal(other.labels, wanted.labels)
+        assert other.borders == wanted.borders
+        assert other.parameters == wanted.parameters
+        assert np.array_equal(other.quality.wall_support, wanted.quality.wall_support, equal_nan=True)
+        assert np.array_equal(other.floor_plan.room_of_face, wanted.floor_plan.room_of_face)
+        assert other.outside_m2 == wanted.outside_m2
+
+
+@pytest.mark.parametrize(
+    ("options", "detail"),
+    [
+        ({"method": "voronoi"}, 1.0),
+        ({"parameters": {"floor_plan.grouping": "walls"}}, 1.0),
+        ({}, 20.1),
+        ({}, float("nan")),
+    ],
+)
+def test_a_detail_that_cannot_be_had_is_refused(options: dict[str, object], detail: float):
+    drawn = snapshot(office()[0])
+    with pytest.raises(rl.ParameterError, match="detail="):
+        rl.segment(drawn, detail=detail, **options)
+    with pytest.raises(rl.ParameterError, match="detail="):
+        rl.segment(drawn, **options).at_detail(detail)
+
+
+def test_a_pickled_segmentation_leaves_the_tree_behind():
+    found = rl.segment(snapshot(office()[0]))
+    assert pickle.loads(pickle.dumps(found))._tree is None
+    assert found._tree is not None
