@@ -16,11 +16,18 @@ FloatImage = NDArray[np.float32]
 
 KINDS = {"none": 0.62, "slant": 0.14, "arc": 0.06, "bend": 0.18}
 """Shares of the ways to bend a building."""
+OTHER_KINDS = {
+    "villa": {"none": 0.93, "slant": 0.04, "arc": 0.0, "bend": 0.03},
+    "hall": {"none": 0.5, "slant": 0.14, "arc": 0.16, "bend": 0.2},
+    "passage": {"none": 0.74, "slant": 0.1, "arc": 0.08, "bend": 0.08},
+}
+"""The same for kinds of plans that differ: the wings of grown houses are turned anyway, halls may lie in an arc."""
 
 
 def bent(rng: Generator, walled: WalledPlan, furniture: Mask) -> tuple[WalledPlan, Mask]:
     """Bend a building and what stands in it in a random way."""
-    kind = rng.choice(list(KINDS), p=list(KINDS.values()))
+    shares = OTHER_KINDS.get(walled.plan.kind, KINDS)
+    kind = rng.choice(list(shares), p=list(shares.values()))
     if kind == "none":
         return walled, furniture
     height, width = furniture.shape
