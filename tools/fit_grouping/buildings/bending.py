@@ -21,7 +21,7 @@ OTHER_KINDS = {
     "hall": {"none": 0.5, "slant": 0.14, "arc": 0.16, "bend": 0.2},
     "passage": {"none": 0.74, "slant": 0.1, "arc": 0.08, "bend": 0.08},
 }
-"""The same for kinds of plans that differ: the wings of grown houses are turned anyway, halls may lie in an arc."""
+"""The same for kinds of plans that differ: wings of villas are turned anyway, halls may lie in an arc."""
 
 
 def bent(rng: Generator, walled: WalledPlan, furniture: Mask) -> tuple[WalledPlan, Mask]:

@@ -165,7 +165,7 @@ class Furnisher:
         self._noise(drawn, min(area_m2, 300) / 30 * rng.random())
 
     def _stands(self, drawn: Mask, area_m2: float) -> None:
-        """Dozens of stands and screens at all angles, as in a museum: bars, angles and blocks, many hollow."""
+        """Dozens of stands and screens at all angles, as in a museum: blocks, bars and angles."""
         rng = self.rng
         per_stand_m2 = rng.uniform(7, 18)
         slants = not chance(rng, 0.25)
@@ -203,7 +203,7 @@ class Furnisher:
         """Desks, shelves or wardrobes side by side along most of a wall: the floor ends before it."""
         rng = self.rng
         image = np.rot90(drawn, int(rng.integers(4)))
-        height, width = image.shape
+        width = image.shape[1]
         at, end = int(width * rng.uniform(0, 0.4)), int(width * rng.uniform(0.6, 1.0))
         usual = rng.uniform(0.3, 0.9)
         while at < end:

@@ -536,7 +536,7 @@ def _path(rng: Generator, width: int) -> list[Rectangle]:
 
 
 def passage(rng: Generator) -> Plan:
-    """One long corridor with bays before its doors, straight or round corners, and few of the rooms beside it."""
+    """One long corridor with bays before its doors, round corners, and few of the rooms beside it."""
     width = between(rng, 1.5, 3.4)
     pieces = _path(rng, width)
     side = between(rng, 5, 9)

@@ -157,7 +157,7 @@ def _sensed(rng: Generator, walled: WalledPlan, solid: Mask) -> tuple[str, NDArr
     reach_m = float(rng.choice(REACHES_M, p=HOME_REACHES if walled.plan.kind in HOMES else USUAL_REACHES))
     numbers = list(neighbors)
     start = numbers[rng.integers(len(numbers))]
-    share = 1.0 if chance(rng, 0.75 if walled.plan.kind in HOMES else 0.55) else rng.uniform(0.15, 0.9)
+    share = 1.0 if chance(rng, 0.75 if walled.plan.kind in HOMES else 0.62) else rng.uniform(0.15, 0.9)
     order, queue, met = [], [start], {start}
     while queue:
         room = queue.pop(int(rng.integers(len(queue))))
@@ -166,7 +166,7 @@ def _sensed(rng: Generator, walled: WalledPlan, solid: Mask) -> tuple[str, NDArr
             if beside not in met:
                 met.add(beside)
                 queue.append(beside)
-    if len(order) < len(numbers) and chance(rng, 0.6):
+    if len(order) < len(numbers) and share == 1.0 and chance(rng, 0.8):
         order += [n for n in numbers if n not in met]
     order = order[: max(1, round(share * len(order)))]
     kind = "whole" if share == 1.0 else "part"
@@ -187,7 +187,9 @@ def _sensed(rng: Generator, walled: WalledPlan, solid: Mask) -> tuple[str, NDArr
             continue
         spread_m2 = max(per_view_m2, apart * reach_m**2) / rng.uniform(1, 2)
         count = int(np.ceil((high - low) * CELL_M**2 / spread_m2))
-        at = rng.integers(low, high, max(count, 4 if thorough else 2))
+        length = max(int(np.ptp(rows[low:high])), int(np.ptp(columns[low:high])))
+        count = max(count, 4 if thorough else 2, round(length / cells(0.7 * reach_m)))
+        at = low + _spread(rng, rows[low:high], columns[low:high], count)
         views += list(zip(rows[at].tolist(), columns[at].tolist(), strict=True))
     if not views:
         return kind, None
@@ -206,6 +208,15 @@ def _sensed(rng: Generator, walled: WalledPlan, solid: Mask) -> tuple[str, NDArr
     gray[free] = FREE
     gray[occupied] = OCCUPIED
     return kind, gray
+
+
+def _spread(
+    rng: Generator, rows: NDArray[np.intp], columns: NDArray[np.intp], count: int
+) -> NDArray[np.intp]:
+    """Random cells of a room, one in each of equal parts along its longer side."""
+    order = np.argsort(rows if np.ptp(rows) > np.ptp(columns) else columns, kind="stable")
+    place = (np.arange(count) + rng.random(count)) / count * len(order)
+    return order[place.astype(np.intp)]
 
 
 def _damaged(rng: Generator, gray: NDArray[np.uint8], usual: float) -> NDArray[np.uint8]:
@@ -241,7 +252,7 @@ def _doubled(rng: Generator, gray: NDArray[np.uint8]) -> None:
     low, high = np.sort(rng.integers(0, width, 2))
     center = float(low + high) / 2, height / 2
     turn = cv2.getRotationMatrix2D(center, rng.normal(0, 0.6), 1.0)
-    turn[:, 2] += rng.uniform(-3, 3, 2)
+    turn[:, 2] = turn[:, 2] + rng.uniform(-3, 3, 2)
     walls = (gray == OCCUPIED).astype(np.uint8)
     again = cv2.warpAffine(walls, turn, (width, height), flags=cv2.INTER_NEAREST) > 0
     again[:, :low] = again[:, high:] = False

@@ -1,4 +1,4 @@
-"""Houses and flats of organic outline: rooms attached to rooms, wings that turn, rounded and octagonal rooms."""
+"""Houses of organic outline: rooms attached to rooms, wings that turn, rounded and octagonal rooms."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ def villa(rng: Generator) -> Plan:
     angle = float(rng.choice([0.0, rng.normal(0, 0.05), rng.uniform(-0.8, 0.8)], p=[0.4, 0.45, 0.15]))
     block = Block(first, 1, center, _sides(rng, first), angle)
     start = _candidate(plan, block, _outline(rng, block), None)
-    blocks = []
+    blocks: list[Block] = []
     turning = rng.choice([0.0, 0.06, 0.25], p=[0.35, 0.45, 0.2])
     crowding = int(rng.choice([1, 3, 6], p=[0.25, 0.4, 0.35]))
     wanted = int(rng.integers(4, 23))
@@ -149,7 +149,7 @@ def _sides(rng: Generator, use: str) -> tuple[float, float]:
 def _attached(
     rng: Generator, plan: Plan, blocks: list[Block], turning: float, crowding: int
 ) -> Candidate | None:
-    """A new room beside one of the house: of several places the one that touches it most; None without any."""
+    """A new room of the house: of several places the one that touches it most; None without any."""
     names = list(USES)
     shares = np.array([USES[name].share for name in names])
     use = str(rng.choice(names, p=shares / shares.sum()))
@@ -168,7 +168,8 @@ def _beside(rng: Generator, parent: Block, use: str, number: int, turning: float
     """Place for a room at a side of another, at the same angle or turned against it."""
     sides = _sides(rng, use)
     turned = chance(rng, turning)
-    angle = parent.angle + (rng.choice([np.pi / 4, -np.pi / 4, rng.uniform(-0.7, 0.7)]) if turned else 0.0)
+    turn = rng.choice([np.pi / 4, -np.pi / 4, rng.uniform(-0.7, 0.7)]) if turned else 0.0
+    angle = parent.angle + turn
     side, sign = int(rng.integers(2)), int(rng.choice([-1, 1]))
     normal, tangent = sign * parent.axes()[side], parent.axes()[1 - side]
     deep, broad = sides[side], sides[1 - side]
@@ -182,7 +183,7 @@ def _beside(rng: Generator, parent: Block, use: str, number: int, turning: float
 
 
 def _candidate(plan: Plan, block: Block, outline: Points, beside: int | None) -> Candidate | None:
-    """A room of an outline on what is free of the ground; None where it does not fit, or not beside its parent."""
+    """A room of an outline on free ground; None where it does not fit or does not touch its parent."""
     corners = np.round(outline).astype(np.int32)
     low, high = corners.min(0) - 2, corners.max(0) + 3
     if low.min() < cells(1.0) or high.max() > len(plan.rooms) - cells(1.0):
@@ -208,7 +209,8 @@ def _largest_piece(mask: Mask) -> Mask:
     if count <= 2:
         return mask
     largest = 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA]))
-    return (pieces == largest).astype(np.uint8)
+    piece: Mask = (pieces == largest).astype(np.uint8)
+    return piece
 
 
 def _outline(rng: Generator, block: Block) -> Points:
@@ -218,18 +220,20 @@ def _outline(rng: Generator, block: Block) -> Points:
     if block.use not in BARE:
         shapes = (_rectangle, _ell, _chamfered, _round, _bay)
         shape = shapes[rng.choice(len(shapes), p=[0.52, 0.14, 0.13, 0.04, 0.17])]
-    return np.array(block.center) + shape(rng, half) @ block.axes()
+    outline: Points = np.array(block.center) + shape(rng, half) @ block.axes()
+    return outline
 
 
 def _rectangle(_: Generator, half: Points) -> Points:
-    return np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * half
+    return np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]) * half
 
 
 def _ell(rng: Generator, half: Points) -> Points:
     """A rectangle without one of its corners."""
     x, y = rng.uniform(-0.3, 0.6, 2)
     mirror = rng.choice([-1, 1], 2)
-    return np.array([[-1, -1], [1, -1], [1, y], [x, y], [x, 1], [-1, 1]]) * half * mirror
+    corners: Points = np.array([[-1, -1], [1, -1], [1, y], [x, y], [x, 1], [-1, 1]]) * half * mirror
+    return corners
 
 
 def _chamfered(rng: Generator, half: Points) -> Points:
@@ -249,7 +253,8 @@ def _round(rng: Generator, half: Points) -> Points:
     """A circle or a long ellipse."""
     angle = np.linspace(0, 2 * np.pi, 40, endpoint=False)
     radii = np.full(2, half.mean()) if chance(rng, 0.7) else half
-    return np.column_stack([np.cos(angle), np.sin(angle)]) * radii
+    circle: Points = np.column_stack([np.cos(angle), np.sin(angle)]) * radii
+    return circle
 
 
 def _bay(rng: Generator, half: Points) -> Points:
@@ -264,8 +269,9 @@ def _bay(rng: Generator, half: Points) -> Points:
     }[kind]
     low, high = half * [-1, -1], half * [1, 1]
     bay = np.array([0.0, high[1]]) + steps
-    points = np.vstack([[low], [[high[0], low[1]]], [high], bay[::-1], [[low[0], high[1]]]])
-    return points * rng.choice([-1, 1], 2)
+    points: Points = np.vstack([[low], [[high[0], low[1]]], [high], bay[::-1], [[low[0], high[1]]]])
+    points *= rng.choice([-1, 1], 2)
+    return points
 
 
 def _without_gaps(rooms: Labels) -> Labels:

@@ -123,7 +123,7 @@ class Stretch:
 
 
 def straight_stretch(rng: Generator, runs: list[Run]) -> Stretch:
-    """A straight piece of the border of two rooms: one along an axis where there is a long one, else at a slant."""
+    """A straight piece of a border: one along an axis where there is a long one, else at a slant."""
     lengths = np.array([r.length for r in runs], float)
     if lengths.max() >= cells(DOOR_PLACE_MIN_M):
         run = runs[rng.choice(len(lengths), p=lengths**2 / (lengths**2).sum())]
@@ -222,7 +222,7 @@ def _width_beside(rooms: Labels, stretch: Stretch, side: int) -> int:
     return int(last - first)
 
 
-def _only_taste_parts(rooms: Labels, stretch: Stretch) -> bool:
+def only_taste_parts(rooms: Labels, stretch: Stretch) -> bool:
     """Whether two rooms that meet without jambs are of the same width there."""
     widths = [_width_beside(rooms, stretch, side) for side in (-1, 1)]
     return max(widths) < stretch.length + cells(SHOULDER_MIN_M)
@@ -281,7 +281,7 @@ def build_walls(rng: Generator, plan: Plan) -> WalledPlan:
             continue
         kind = _opening_kind(rng, plan, a, b)
         low, high = _opening(rng, kind, stretch, thickness, usual_m)
-        if kind == "open" and (both_corridors or _only_taste_parts(rooms, stretch)):
+        if kind == "open" and (both_corridors or only_taste_parts(rooms, stretch)):
             taste.unite(a, b)
         _clear(walls, stretch, low, high, thickness)
         if kind == "door" and high - low < cells(1.3) and chance(rng, leaves):
