@@ -28,8 +28,9 @@ HALLS = {
 """What halls are full of, and how often."""
 KEEP_CLEAR_M = 0.55
 """Furniture stays this far from openings, most of the time."""
-FRONTS = {"home": 0.5, "office": 1.3, "dense": 1.4}
+FRONTS = {"home": 0.35, "office": 1.3, "dense": 1.4}
 """Fronts of furniture along the walls of a room of each style, on average."""
+ISLAND_FROM_WALL_M = 0.6
 FRONTS_MIN_M2 = 5.0
 FRAME_GAIN = 1.15
 """A room has a frame of its own where that is filled better by this factor than the box of its cells."""
@@ -240,7 +241,7 @@ class Furnisher:
         density = {"home": 1.2, "office": 1.2, "dense": 2.2}[self.style] * rng.uniform(0.3, 1.5)
         if chance(rng, 0.12):
             return
-        self._along_walls(drawn, density * min(area_m2, 60) / 4)
+        self._along_walls(drawn, density * min(area_m2, 60) / (6 if self.style == "home" else 4))
         for _ in range(rng.poisson(FRONTS[self.style] if area_m2 > FRONTS_MIN_M2 else 0)):
             self._front(drawn)
         for _ in range(rng.poisson(density * min(area_m2, 60) / 9)):
@@ -273,12 +274,10 @@ class Furnisher:
         """Sofas and islands in the middle, counters that stand out from a wall like a wall."""
         rng = self.rng
         height, width = drawn.shape
-        for _ in range(rng.poisson(1.2)):
-            long, deep = between(rng, 1.4, 3.0), between(rng, 0.6, 1.1)
-            if chance(rng, 0.5):
-                long, deep = deep, long
-            x, y = self._spot(drawn)
-            drawn[y : y + deep, x : x + long] = 1
+        for _ in range(rng.poisson(1.4)):
+            self._island(drawn)
+        if chance(rng, 0.45):
+            self._dining_table(drawn)
         for _ in range(rng.poisson(0.6)):
             reach, deep = between(rng, 1.2, 3.0), between(rng, 0.5, 0.8)
             side = rng.integers(4)
@@ -290,6 +289,39 @@ class Furnisher:
                 x = int(rng.integers(max(1, width - deep)))
                 y = 0 if side == 2 else max(0, height - reach)
                 drawn[y : y + reach, x : x + deep] = 1
+
+    def _island(self, drawn: Mask) -> None:
+        """A sofa, counter or bed that can be walked around, at a slant at times."""
+        rng = self.rng
+        height, width = drawn.shape
+        rim = cells(ISLAND_FROM_WALL_M)
+        long, deep = between(rng, 1.0, 3.0), between(rng, 0.5, 1.2)
+        if chance(rng, 0.5):
+            long, deep = deep, long
+        if width < long + 2 * rim or height < deep + 2 * rim:
+            return
+        x = float(rng.integers(rim + long // 2, width - rim - long // 2 + 1))
+        y = float(rng.integers(rim + deep // 2, height - rim - deep // 2 + 1))
+        angle = rng.uniform(-40, 40) if chance(rng, 0.25) else 0.0
+        corners = cv2.boxPoints(((x, y), (long, deep), angle)).astype(np.int32)
+        cv2.fillPoly(drawn, [corners], 1)
+
+    def _dining_table(self, drawn: Mask) -> None:
+        """Rows of chairs, four dots each, at both sides of a table of which the legs or all can be seen."""
+        rng = self.rng
+        step, chairs = cells(rng.uniform(0.5, 0.75)), int(rng.integers(2, 6))
+        half = cells(rng.uniform(0.4, 0.75))
+        image = drawn if chance(rng, 0.5) else drawn.T
+        x, y = self._spot(image)
+        for number in range(chairs):
+            for side in (-1, 1):
+                seat = (x + number * step, y + side * (half + cells(0.15)))
+                for corner in cv2.boxPoints((seat, (cells(0.35), cells(0.35)), rng.normal(0, 15))):
+                    column, row = int(corner[0]), int(corner[1])
+                    if 0 <= row < image.shape[0] and 0 <= column < image.shape[1]:
+                        image[row, column] = 1
+        if chance(rng, 0.3):
+            image[max(0, y - half // 2) : max(0, y + half // 2), x : x + (chairs - 1) * step] = 1
 
     def _spot(self, drawn: Mask) -> tuple[int, int]:
         return int(self.rng.integers(drawn.shape[1])), int(self.rng.integers(drawn.shape[0]))

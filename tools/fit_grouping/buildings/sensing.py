@@ -17,7 +17,7 @@ FREE, UNKNOWN, OCCUPIED = 254, 205, 0
 """Gray values of the ROS map convention."""
 RAYS_PER_VIEW = 720
 """Rays of a view: a lidar's usual half degree, so that far things show as fans."""
-LOST_FROM = 0.35
+LOST_FROM = 0.15
 """Rays that meet nothing are known to at least this share of the sensor's reach."""
 REACHES_M = (4.0, 6.0, 8.0, 12.0, 18.0)
 USUAL_REACHES, HOME_REACHES = (0.15, 0.25, 0.25, 0.2, 0.15), (0.06, 0.24, 0.35, 0.25, 0.1)
@@ -64,7 +64,7 @@ class Sensor:
         self.pad = reach + 4
         self.solid = np.pad(solid, self.pad)
         self.unglazed = np.pad(solid & (1 - glass), self.pad)
-        self.transmission = rng.uniform(0.1, 1.0)
+        self.transmission = rng.uniform(0.05, 0.8)
         """Share of the rays that pass glass."""
         self.stride = self.solid.shape[1]
         self.evidence = np.zeros(self.solid.shape, np.float32)

@@ -16,6 +16,9 @@ HOMES = frozenset({"home", "villa"})
 """Kinds of plans that people live in."""
 DOOR_PLACE_MIN_M = 0.9
 """A border that is as long has place for a door."""
+AXIS_SHARE_MIN = 0.4
+"""A border lies along the axes where its longest straight run is this share of it; else it may be a staircase of
+cells, at a slant."""
 SLANT_TRIES, SLANT_NEAR_M, SLANT_TOLERANCE_CELLS = 4, 0.6, 1.5
 """A slanting border is followed from this many of its points: the direction is that of the points around, and
 what is no farther from the line is on it."""
@@ -125,7 +128,7 @@ class Stretch:
 def straight_stretch(rng: Generator, runs: list[Run]) -> Stretch:
     """A straight piece of a border: one along an axis where there is a long one, else at a slant."""
     lengths = np.array([r.length for r in runs], float)
-    if lengths.max() >= cells(DOOR_PLACE_MIN_M):
+    if lengths.max() >= cells(DOOR_PLACE_MIN_M) and lengths.max() >= AXIS_SHARE_MIN * lengths.sum():
         run = runs[rng.choice(len(lengths), p=lengths**2 / (lengths**2).sum())]
         start = (run.at + 0.5, float(run.low)) if run.upright else (float(run.low), run.at + 0.5)
         return Stretch(start, (0.0, 1.0) if run.upright else (1.0, 0.0), run.length)
@@ -317,7 +320,7 @@ def _stubs(rng: Generator, walls: Mask, thickness: int, count: int, longest_m: f
 
 def _glass(rng: Generator, walls: Mask, outer_walls: Mask, windows: float) -> Mask:
     """Stretches of wall that rays pass: windows mostly, panes of inner walls at times."""
-    if chance(rng, 0.02):  # a front of glass
+    if chance(rng, 0.01):  # a front of glass
         return outer_walls.copy()
     glass = np.zeros_like(walls)
     for mask, mean, low_m, high_m in ((outer_walls, windows, 0.3, 2.0), (walls, 0.5, 0.3, 0.8)):
