@@ -17,8 +17,7 @@ HOMES = frozenset({"home", "villa"})
 DOOR_PLACE_MIN_M = 0.9
 """A border that is as long has place for a door."""
 AXIS_SHARE_MIN = 0.4
-"""A border lies along the axes where its longest straight run is this share of it; else it may be a staircase of
-cells, at a slant."""
+"""A border lies along the axes where its longest straight run is this share of it; else it may slant."""
 SLANT_TRIES, SLANT_NEAR_M, SLANT_TOLERANCE_CELLS = 4, 0.6, 1.5
 """A slanting border is followed from this many of its points: the direction is that of the points around, and
 what is no farther from the line is on it."""
