@@ -172,7 +172,7 @@ def _sensed(rng: Generator, walled: WalledPlan, solid: Mask) -> tuple[str, NDArr
     kind = "whole" if share == 1.0 else "part"
     away = cv2.erode((solid == 0).astype(np.uint8), np.ones((7, 7), np.uint8)) > 0
     rows, columns = np.nonzero(away & (rooms > 0))
-    place = np.argsort(rooms[rows, columns], kind="stable")
+    place = np.argsort(rooms[rows, columns].astype(np.uint16), kind="stable")
     rows, columns = rows[place], columns[place]
     bounds = np.searchsorted(rooms[rows, columns], [*order, *[n + 1 for n in order]])
     # Share of the rooms that are seen through their doors only.
@@ -214,7 +214,8 @@ def _spread(
     rng: Generator, rows: NDArray[np.intp], columns: NDArray[np.intp], count: int
 ) -> NDArray[np.intp]:
     """Random cells of a room, one in each of equal parts along its longer side."""
-    order = np.argsort(rows if np.ptp(rows) > np.ptp(columns) else columns, kind="stable")
+    longer = rows if np.ptp(rows) > np.ptp(columns) else columns
+    order = np.argsort(longer.astype(np.uint16), kind="stable")  # 16 bits are sorted fastest
     place = (np.arange(count) + rng.random(count)) / count * len(order)
     return order[place.astype(np.intp)]
 
