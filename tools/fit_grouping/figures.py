@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from fit_grouping.preparing import PreparedMap
+from fit_grouping.maps_with_truth import TruthMap
 
 FloatArray = NDArray[np.float64]
 
@@ -17,13 +17,13 @@ INTERVAL = (2.5, 97.5)
 """Percentiles of an interval."""
 
 
-def building_means(maps: Sequence[PreparedMap], scores: FloatArray) -> dict[str, float]:
+def building_means(maps: Sequence[TruthMap], scores: FloatArray) -> dict[str, float]:
     """Mean score of each building."""
     buildings = np.array([one.building for one in maps])
     return {name: float(scores[buildings == name].mean()) for name in dict.fromkeys(buildings.tolist())}
 
 
-def interval(maps: Sequence[PreparedMap], scores: FloatArray, seed: int = 0) -> tuple[float, float]:
+def interval(maps: Sequence[TruthMap], scores: FloatArray, seed: int = 0) -> tuple[float, float]:
     """Range of the mean over maps when buildings are drawn again and again, with return."""
     buildings = np.array([one.building for one in maps])
     names = np.unique(buildings)
@@ -34,7 +34,7 @@ def interval(maps: Sequence[PreparedMap], scores: FloatArray, seed: int = 0) -> 
     return float(low), float(high)
 
 
-def figures_table(maps: Sequence[PreparedMap], rows: dict[str, FloatArray]) -> str:
+def figures_table(maps: Sequence[TruthMap], rows: dict[str, FloatArray]) -> str:
     """Markdown table of the means of groups; below, the intervals of the last row.
 
     Parameters
