@@ -227,7 +227,7 @@ def page_tables(page: PageFigures) -> str:
     lines += _buildings_table(page)
     if page.robustness:
         lines += [
-            "## Maps that change, rooms that do not",
+            "## Invariance",
             "",
             f"`{FIGURE}` between the rooms of a map, changed like the map, and those found in the changed "
             "map: mean / worst over a sample of the maps.",
