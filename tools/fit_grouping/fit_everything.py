@@ -7,6 +7,7 @@ WORK holds simulated maps, checkpoints, prepared maps, and for each seed folders
 WORK holds simulated maps, checkpoints, prepared maps, and for each seed folders `seedS/foldK` with what
 was fitted without the buildings of fold K. `seed0/all` holds what was fitted on all maps, and its
 `manifest.json`: that is what the package ships.
+"""
 
 from __future__ import annotations
 

@@ -46,7 +46,7 @@ def test_network_answers_at_any_size_with_rounded_probabilities():
 )
 def test_trees_ask_only_for_features_there_are(trees, names):
     found = trees()
-    assert 0 < len(found.feature)
+    assert len(found.feature) > 0
     assert found.feature.max() < len(names)
     assert np.isfinite(found(np.zeros((3, len(names))))).all()
 
