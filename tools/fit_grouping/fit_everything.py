@@ -3,7 +3,6 @@
     python tools/fit_grouping/fit_everything.py WORK --cases CASES [--buildings 5000] [--tree-buildings 800]
         [--network-seconds 7200] [--fold-seconds 3600] [--trees 250] [--seeds 3]
 
-WORK holds simulated maps, checkpoints, prepared maps, and for each seed folders `seedS/foldK` with what was
 WORK holds simulated maps, checkpoints, prepared maps, and for each seed folders `seedS/foldK` with what
 was fitted without the buildings of fold K. `seed0/all` holds what was fitted on all maps, and its
 `manifest.json`: that is what the package ships.

@@ -2,7 +2,8 @@
 
     python tools/fit_grouping/left_out_figures.py WORK --cases CASES [--seeds 3]
 
-WORK is that of `fit_everything.py`. `WORK/left_out.csv` holds a row per map, `WORK/figures.md` the table.
+WORK is that of `fit_everything.py`. `WORK/left_out.csv` holds a row per map, `WORK/figures.md` the table, and
+`WORK/seedS/predictions` the label images, which `tools/benchmark.py tables` takes as a method of its own.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from PIL import Image
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
@@ -45,8 +47,10 @@ def fitted_from(folder: Path) -> Iterator[None]:
             read.cache_clear()
 
 
-def scores_of_fold(maps: list[TruthMap], cases: Path, fold: int, folder: Path) -> dict[int, float]:
-    """iou_sym by number of the maps of a fold."""
+def scores_of_fold(
+    maps: list[TruthMap], cases: Path, fold: int, folder: Path, predictions: Path
+) -> dict[int, float]:
+    """iou_sym by number of the maps of a fold; their labels are kept as images."""
     scores = {}
     with fitted_from(folder):
         for number, (one, case) in enumerate(zip(maps, load_cases(cases), strict=True)):
@@ -54,6 +58,9 @@ def scores_of_fold(maps: list[TruthMap], cases: Path, fold: int, folder: Path) -
                 continue
             snapshot = case.snapshot()
             found = analyze(snapshot)
+            image = predictions / one.group / f"{one.name}.png"
+            image.parent.mkdir(parents=True, exist_ok=True)
+            Image.fromarray(np.flipud(found.labels).astype(np.uint16)).save(image)
             part = ExploredPart.of(snapshot.cells, snapshot.geometry, OccupancyParameters())
             labels = found.labels[part.window]
             if part.factor > 1:
@@ -81,7 +88,9 @@ def main() -> None:
     for seed in range(arguments.seeds):
         scores: dict[int, float] = {}
         for fold in range(FOLDS):
-            scores |= scores_of_fold(maps, arguments.cases, fold, arguments.work / f"seed{seed}/fold{fold}")
+            own = arguments.work / f"seed{seed}"
+            folder, predictions = own / f"fold{fold}", own / "predictions"
+            scores |= scores_of_fold(maps, arguments.cases, fold, folder, predictions)
         rows[f"seed {seed}"] = np.array([scores[k] for k in range(len(maps))])
     rows["mean of the seeds"] = np.mean(list(rows.values()), axis=0)
     with (arguments.work / "left_out.csv").open("w", newline="", encoding="utf-8") as file:
