@@ -133,7 +133,7 @@ def _analyze_by_rose2(
     # D: rooms split at the narrow places of their Voronoi graph, with straight borders and doorways
     split = split_rooms(plan.labels, walls, lines_m, directions, cell_m, parameters.topology)
     watch.lap("topology")
-    finished = make_rooms(split, plan, free, cell_m, parameters.floor_plan)
+    finished = make_rooms(split, plan, free, occupied, cell_m, parameters.floor_plan)
     rooms = _room_map(finished.labels, finished.shapes, explored, parameters.topology)
     watch.lap("rooms")
 

@@ -39,6 +39,7 @@ def make_rooms(
     labels: NDArray[np.int32],
     plan: FloorPlanResult,
     free: BoolArray,
+    occupied: BoolArray,
     resolution_m: float,
     parameters: FloorPlanParameters,
 ) -> RoomsResult:
@@ -50,8 +51,8 @@ def make_rooms(
         Split groups of faces of the free cells, 0 for none.
     plan : FloorPlanResult
         Result of stage C.
-    free : (H, W) bool
-        Free cells.
+    free, occupied : (H, W) bool
+        Free and occupied cells.
     resolution_m : float
         Side of a cell.
     parameters : FloorPlanParameters
@@ -62,5 +63,5 @@ def make_rooms(
     settled = renumber_in_place(settled, number)
     # Faces belong to the rooms whose labels they had before borders settled.
     room_of_face = rooms_of_faces(renumber_in_place(whole, number), plan)
-    shapes = room_shapes(settled, plan, room_of_face, resolution_m, parameters.shape_min_seen)
+    shapes = room_shapes(settled, free, occupied, plan.face_of_cell, room_of_face, resolution_m, parameters)
     return RoomsResult(settled, shapes, room_of_face)
