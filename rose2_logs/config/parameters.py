@@ -241,7 +241,7 @@ class FloorPlanParameters(ParameterBlock):
         0.15, "m", "A shape reaches this far into the wall around it: half a wall's thickness, plus drift.", 0.0
     )
     shape_fill_max_m2: float = number(
-        2.0, "m2", "Smaller unseen places within a room are furniture and its shadows.", 0.0
+        1.0, "m2", "Smaller unseen places within a room are furniture and its shadows.", 0.0
     )
     shape_simplify_m: float = number(
         0.1, "m", "Steps of the cells of a shape's outline up to this size are straightened.", 0.0

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from rose2_logs.config.parameters import FloorPlanParameters
-from rose2_logs.model.labels import contacts, distinct_labels
+from rose2_logs.model.labels import distinct_labels, label_sizes
 from rose2_logs.model.occupancy import BoolArray
 from rose2_logs.model.outlines import room_outlines
 from rose2_logs.segmentation.floor_plan.stage import FloorPlanResult
@@ -108,7 +108,8 @@ def predicted_cells(
     was_seen = np.zeros(part.max() + 1, bool)
     was_seen[part[labels > 0]] = True
     cells[~was_seen[part] & (labels == 0)] = 0
-    return _without_small_holes(cells, resolution_m, parameters.shape_fill_max_m2)
+    _fill_small_holes(cells, resolution_m, parameters.shape_fill_max_m2)
+    return cells
 
 
 def _claims(
@@ -125,26 +126,28 @@ def _claims(
     """
     claim = np.zeros_like(labels)
     is_seen = labels > 0
-    if not is_seen.any():
+    seen = np.flatnonzero(is_seen)
+    if len(seen) == 0:
         return claim
     rooms, faces = int(labels.max()) + 1, len(room_of_face) + 1
-    pairs = face_of_cell[is_seen].astype(np.int64) * rooms + labels[is_seen]
-    common = np.bincount(pairs, minlength=faces * rooms).reshape(faces, rooms)
+    room, face = labels.ravel()[seen], face_of_cell.ravel()
+    common = np.bincount(face[seen].astype(np.int64) * rooms + room, minlength=faces * rooms)
+    common = common.reshape(faces, rooms)
     has_part = common >= np.maximum(parameters.shape_share_of_face * common.sum(1, keepdims=True), 1)
     known = np.bincount(face_of_cell[free], minlength=faces)
-    size = np.bincount(face_of_cell.ravel(), minlength=faces)
-    is_known = known >= parameters.shape_min_seen * np.maximum(size, 1)
+    is_known = known >= parameters.shape_min_seen * np.maximum(label_sizes(face_of_cell, faces - 1), 1)
     is_known[0] = False
     has_part &= is_known[:, None]
     room_of = np.where(is_known, np.concatenate([np.zeros(1, np.int32), room_of_face]), 0)
     away, nearest = cv2.distanceTransformWithLabels(
         (~is_seen).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
     )
-    room_of_seen = np.zeros(np.count_nonzero(is_seen) + 1, np.int32)
-    room_of_seen[nearest[is_seen]] = labels[is_seen]
-    unseen = ~is_seen & ~free & (away * resolution_m <= parameters.shape_reach_m)
-    face, room = face_of_cell[unseen], room_of_seen[nearest[unseen]]
-    claim[unseen] = np.where(has_part[face, room], room, room_of[face])
+    nearest = nearest.ravel()
+    room_of_seen = np.zeros(len(seen) + 1, np.int32)
+    room_of_seen[nearest[seen]] = room
+    unseen = np.flatnonzero((away <= parameters.shape_reach_m / resolution_m) & ~(is_seen | free))
+    face, room = face[unseen], room_of_seen[nearest[unseen]]
+    claim.ravel()[unseen] = np.where(has_part[face, room], room, room_of[face])
     return claim
 
 
@@ -157,37 +160,39 @@ def _open_pockets(
     parameters: FloorPlanParameters,
 ) -> BoolArray:
     """Which pockets (N,) are their rooms', by what is around them."""
-    count = int(pocket.max()) + 1
-    room = np.zeros(count, np.int32)
-    room[pocket] = claim
-    is_wall = int(labels.max()) + 1
-    meet = contacts(np.where(pocket > 0, -pocket, np.where(wall, is_wall, labels)))
-    meet = meet.chosen((meet.low < 0) & (meet.high > 0))
-    beside = -meet.low
-    opening = np.bincount(beside[meet.high == room[beside]], minlength=count)
-    walled = np.bincount(beside[meet.high == is_wall], minlength=count)
-    small = np.bincount(pocket.ravel(), minlength=count) * resolution_m**2 <= parameters.shape_fill_max_m2
-    is_room = (opening > 0) & (small | (opening >= parameters.shape_min_open * (opening + walled)))
-    is_room[0] = False
+    inside = pocket > 0
+    number, room = pocket[inside], claim[inside]
+    count = int(number.max(initial=0)) + 1
+    is_wall = int(labels.max(initial=0)) + 1
+    beside = _beside(np.where(wall, np.int32(is_wall), labels), inside)
+    opening = np.bincount(number, (beside == room).sum(0), count)
+    walled = np.bincount(number, (beside == is_wall).sum(0), count)
+    small = np.bincount(number, minlength=count) * resolution_m**2 <= parameters.shape_fill_max_m2
+    is_room: BoolArray = (opening > 0) & (small | (opening >= parameters.shape_min_open * (opening + walled)))
     return is_room
 
 
-def _without_small_holes(
-    cells: NDArray[np.int32], resolution_m: float, largest_m2: float
-) -> NDArray[np.int32]:
-    """Give holes up to some size to the one room that surrounds them."""
-    count, hole = cv2.connectedComponents((np.pad(cells, 1) == 0).astype(np.uint8), connectivity=4)
+def _fill_small_holes(cells: NDArray[np.int32], resolution_m: float, largest_m2: float) -> None:
+    """Give holes up to some size to the one room that surrounds them, in place."""
+    empty = np.pad(cells == 0, 1, constant_values=True).astype(np.uint8)
+    count, hole, stats, _ = cv2.connectedComponentsWithStats(empty, connectivity=4)
     hole = hole[1:-1, 1:-1]
-    meet = contacts(np.where(hole > 0, -hole, cells))
-    meet = meet.chosen((meet.low < 0) & (meet.high > 0))
-    lowest, highest = np.full(count, np.iinfo(np.int32).max), np.zeros(count, np.int32)
-    np.minimum.at(lowest, -meet.low, meet.high)
-    np.maximum.at(highest, -meet.low, meet.high)
-    small = np.bincount(hole.ravel(), minlength=count) * resolution_m**2 <= largest_m2
-    room = np.where(small & (lowest == highest), highest, 0).astype(np.int32)
-    room[:2] = 0  # the rooms themselves, and what is outside of them
-    filled: NDArray[np.int32] = np.where(hole > 0, room[hole], cells)
-    return filled
+    small = stats[:, cv2.CC_STAT_AREA] * resolution_m**2 <= largest_m2
+    small[:2] = False  # the rooms themselves, and what is outside of them
+    inside = small[hole]
+    number, beside = hole[inside], _beside(cells, inside)
+    highest, lowest = np.zeros(count, np.int32), np.full(count, np.iinfo(np.int32).max, np.int32)
+    np.maximum.at(highest, number, beside.max(0, initial=0))
+    np.minimum.at(lowest, number, np.where(beside > 0, beside, lowest[0]).min(0, initial=lowest[0]))
+    cells[inside] = np.where(lowest == highest, highest, 0)[number]
+
+
+def _beside(image: NDArray[np.int32], mask: BoolArray) -> NDArray[np.int32]:
+    """Values (4, N) of an image beside each cell of a mask, in reading order; 0 beyond its edges."""
+    width = image.shape[1] + 2
+    around = np.pad(image, 1).ravel()
+    at = np.flatnonzero(np.pad(mask, 1))
+    return np.stack([around[at + step] for step in (-width, -1, 1, width)])
 
 
 def _parts(values: NDArray[np.int32], mask: BoolArray) -> NDArray[np.int32]:
