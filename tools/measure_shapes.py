@@ -2,12 +2,12 @@
 
 python tools/measure_shapes.py CASES.json --groups incremental_fr79 incremental_intel --simulated 20
 
-For each map of a run and each room that is found in it, the table compares two answers to "what will this room
-be in the end?": its shape with the predicted part, and its seen cells alone. Both are measured by their IoU with
-the true room: of the run's last map, or of the simulated building. Rooms are sorted by the share of the true room
-that the map knows. A room counts for the true room that it holds most of, if most of the room lies in it; so
-rooms that were grouped wrongly are left out. Cells of walls do not count: a shape ends in the middle of a wall,
-a true room at its face.
+For each map of a run and each room that is found in it, the table compares two answers to "what will this
+room be in the end?": its shape with the predicted part, and its seen cells alone. Both are measured by their
+IoU with the true room: of the run's last map, or of the simulated building. Rooms are sorted by the share of
+the true room that the map knows. A room counts for the true room that it holds most of, if most of the room
+lies in it; so rooms that were grouped wrongly are left out. Cells of walls do not count: a shape ends in the
+middle of a wall, a true room at its face.
 """
 
 from __future__ import annotations
@@ -27,15 +27,16 @@ from shapely.affinity import affine_transform
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from rose2_logs.evaluation.cases import Case, load_cases
-from rose2_logs.model.occupancy import BoolArray, GridGeometry, OccupancySnapshot
-from rose2_logs.segmentation.floor_plan.faces import rasterize
-from rose2_logs.segmentation.pipeline import analyze
 from simulation.building import Building
 from simulation.exploration import explore
 from simulation.layout import STYLES
 from simulation.make_building import simulate_building
 from simulation.runs import random_equipment
+
+from rose2_logs.evaluation.cases import Case, load_cases
+from rose2_logs.model.occupancy import BoolArray, GridGeometry, OccupancySnapshot
+from rose2_logs.segmentation.floor_plan.faces import rasterize
+from rose2_logs.segmentation.pipeline import analyze
 
 MAPS_PER_RUN = 8
 """Maps that are kept of a simulated run, evenly spread."""
@@ -138,8 +139,8 @@ def _cells_of(shape: shapely.Geometry, size: tuple[int, int], resolution_m: floa
 def benchmark_run(name: str, cases: Sequence[Case]) -> Run:
     """Make a run of the maps of a group; its rooms are those of the last one.
 
-    A mapper that makes its canvas larger moves its corner, which the images do not tell: each map is put where
-    its occupied cells fit those of the next one best.
+    A mapper that makes its canvas larger moves its corner, which the images do not tell: each map is put
+    where its occupied cells fit those of the next one best.
     """
     snapshots = [case.snapshot() for case in cases]
     truth = np.flipud(cases[-1].truth()).astype(np.int32)
@@ -168,7 +169,10 @@ def _shift(before: BoolArray, after: BoolArray) -> NDArray[np.int64]:
 
 
 def _on_canvas(
-    snapshot: OccupancySnapshot, cells: NDArray[np.int8], resolution_m: float, origin_xy_m: tuple[float, float]
+    snapshot: OccupancySnapshot,
+    cells: NDArray[np.int8],
+    resolution_m: float,
+    origin_xy_m: tuple[float, float],
 ) -> OccupancySnapshot:
     geometry = GridGeometry(resolution_m, origin_xy_m, 0.0, "map", (cells.shape[0], cells.shape[1]))
     return replace(snapshot, cells=np.ascontiguousarray(cells), geometry=geometry)
@@ -185,9 +189,7 @@ def simulated_run(number: int) -> Run:
     return run_of_maps(f"{style} {seed}", building, [(steps[i].cells, steps[i].geometry) for i in keep])
 
 
-def run_of_maps(
-    name: str, building: Building, maps: Sequence[tuple[NDArray[np.int8], GridGeometry]]
-) -> Run:
+def run_of_maps(name: str, building: Building, maps: Sequence[tuple[NDArray[np.int8], GridGeometry]]) -> Run:
     """Put maps of a simulated building on one grid with its true rooms."""
     resolution_m = maps[0][1].resolution_m
     corners = np.array([np.rint(np.array(g.origin_xy_m)[::-1] / resolution_m) for _, g in maps]).astype(int)
@@ -203,7 +205,8 @@ def run_of_maps(
         canvas[row : row + cells.shape[0], column : column + cells.shape[1]] = cells
         geometry = GridGeometry(resolution_m, origin, 0.0, "map", canvas.shape)
         snapshots.append(OccupancySnapshot(index, 0, 0, "/map", canvas, geometry))
-    polygons = [affine_transform(room.polygon, (1, 0, 0, 1, -origin[0], -origin[1])) for room in building.rooms]
+    shift = 1, 0, 0, 1, -origin[0], -origin[1]
+    polygons = [affine_transform(room.polygon, shift) for room in building.rooms]
     numbers = np.array([room.number for room in building.rooms], np.int32)
     rooms = rasterize(np.array(polygons), numbers, canvas.shape, resolution_m)
     return Run(name, tuple(snapshots), rooms, _apart_from_walls(rooms, resolution_m))
@@ -225,8 +228,8 @@ def table(rows: Sequence[RoomSeen]) -> str:
         if len(chosen):
             seen, predicted = chosen.mean(0)
             lines.append(
-                f"| {number / 10:.1f} to {(number + 1) / 10:.1f} | {len(chosen)} | {seen:.1f} | {predicted:.1f} "
-                f"| {predicted - seen:+.1f} |"
+                f"| {number / 10:.1f} to {(number + 1) / 10:.1f} | {len(chosen)} "
+                f"| {seen:.1f} | {predicted:.1f} | {predicted - seen:+.1f} |"
             )
     return "\n".join(lines)
 

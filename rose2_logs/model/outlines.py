@@ -27,12 +27,14 @@ def room_outlines(labels: NDArray[np.int32], resolution_m: float) -> list[BaseGe
     count = int(labels.max(initial=0))
     room, row, column, code, second = _vertices(np.pad(labels, 1))
     along_row = _partners(room, row, column, second)
-    # At a saddle, the vertex that the edge to the left has is that of the edge up if the cell between is inside.
+    # Where an outline touches itself, the edges on both sides of a cell of the room share a vertex.
     along_column = _partners(room, column, row, second ^ (code == NORTHEAST | SOUTHWEST))
     order, length = _rings(along_row, along_column, row * (labels.shape[1] + 1) + column, code)
     vertices = np.column_stack([column, row])[order] * resolution_m
     ring = np.repeat(np.arange(len(length)), length)
-    return _polygons(shapely.linearrings(vertices, indices=ring), room[order][np.diff(ring, prepend=-1) > 0], count)
+    return _polygons(
+        shapely.linearrings(vertices, indices=ring), room[order][np.diff(ring, prepend=-1) > 0], count
+    )
 
 
 def _vertices(padded: NDArray[np.int32]) -> tuple[NDArray[np.int64], ...]:
@@ -83,7 +85,7 @@ def _rings(
     place: NDArray[np.int64],
     code: NDArray[np.int64],
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Follow edges along rows and columns in turn, the room on the left; cut rings where they touch themselves.
+    """Follow edges along rows and columns in turn, the room on the left; cut rings that touch themselves.
 
     Returns
     -------

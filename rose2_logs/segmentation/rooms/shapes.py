@@ -168,7 +168,8 @@ def _open_pockets(
     opening = np.bincount(number, (beside == room).sum(0), count)
     walled = np.bincount(number, (beside == is_wall).sum(0), count)
     small = np.bincount(number, minlength=count) * resolution_m**2 <= parameters.shape_fill_max_m2
-    is_room: BoolArray = (opening > 0) & (small | (opening >= parameters.shape_min_open * (opening + walled)))
+    is_open = opening >= parameters.shape_min_open * (opening + walled)
+    is_room: BoolArray = (opening > 0) & (small | is_open)
     return is_room
 
 
@@ -196,7 +197,7 @@ def _beside(image: NDArray[np.int32], mask: BoolArray) -> NDArray[np.int32]:
 
 
 def _parts(values: NDArray[np.int32], mask: BoolArray) -> NDArray[np.int32]:
-    """Number the parts of a mask in which a value hangs together; the first cells along a border of two get 0."""
+    """Number the parts of a mask in which a value hangs together; cells along a border of two values get 0."""
     inside = mask.copy()
     inside[:, :-1] &= ~mask[:, 1:] | (values[:, :-1] == values[:, 1:])
     inside[:-1] &= ~mask[1:] | (values[:-1] == values[1:])

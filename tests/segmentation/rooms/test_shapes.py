@@ -55,9 +55,7 @@ class Drawing:
         parameters = dataclasses.replace(PARAMETERS, **changes)
         rooms = np.array(self.room_of_face, np.int32)
         free = self.labels > 0
-        return room_shapes(
-            self.labels, free, self.occupied, self.face_of_cell, rooms, CELL_M, parameters
-        )
+        return room_shapes(self.labels, free, self.occupied, self.face_of_cell, rooms, CELL_M, parameters)
 
     @staticmethod
     def _cells(box_m: tuple[float, ...]) -> tuple[slice, slice]:
