@@ -197,7 +197,7 @@ def _beside(image: NDArray[np.int32], mask: BoolArray) -> NDArray[np.int32]:
 
 
 def _parts(values: NDArray[np.int32], mask: BoolArray) -> NDArray[np.int32]:
-    """Number the parts of a mask in which a value hangs together; cells along a border of two values get 0."""
+    """Number the parts of a mask in which a value hangs together; cells along a border of two get 0."""
     inside = mask.copy()
     inside[:, :-1] &= ~mask[:, 1:] | (values[:, :-1] == values[:, 1:])
     inside[:-1] &= ~mask[1:] | (values[:-1] == values[1:])
