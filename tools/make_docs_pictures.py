@@ -182,8 +182,10 @@ def _atoms_and_answers(
     scored = find_structure(part.occupied, cell_m, parameters.spectrum)
     direction = float(scored.directions_rad[0])
     walls = generous_walls(scored, cell_m, parameters)
-    _, faces = generous_floor_plan(walls, part.free, direction, cell_m, parameters)
-    atoms = find_atoms(part.free, part.occupied, scored.score, faces, direction, cell_m, parameters.regions)
+    plan = generous_floor_plan(walls, part.free, direction, cell_m, parameters)
+    atoms = find_atoms(
+        part.free, part.occupied, scored.score, plan.face_of_cell, direction, cell_m, parameters.regions
+    )
     answers = answering_network()(atoms.raster)
     steps = np.rint(answers[:-1].max(0) * 1000).astype(np.int32)
     height, width = part.free.shape

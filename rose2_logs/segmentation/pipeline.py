@@ -185,13 +185,15 @@ def _rooms_by_borders(
     """Faces and basins of the clearance, joined by the fitted strength of their borders."""
     free, occupied, cell_m = explored.free, explored.occupied, explored.resolution_m
     generous = generous_walls(scored, cell_m, parameters)
-    plan, faces = generous_floor_plan(generous, free, strongest_rad, cell_m, parameters)
+    plan = generous_floor_plan(generous, free, strongest_rad, cell_m, parameters)
     watch.lap("floor_plan")
-    atoms = find_atoms(free, occupied, scored.score, faces, strongest_rad, cell_m, parameters.regions)
+    atoms = find_atoms(
+        free, occupied, scored.score, plan.face_of_cell, strongest_rad, cell_m, parameters.regions
+    )
     watch.lap("atoms")
     found = find_rooms(atoms, free, cell_m, parameters.regions)
     watch.lap("regions")
-    finished, borders = finish_rooms(found, plan, faces, free, cell_m, parameters)
+    finished, borders = finish_rooms(found, plan, free, occupied, cell_m, parameters)
     return _Grouped(plan, finished, borders, found.outside_m2)
 
 
@@ -209,7 +211,7 @@ def _rooms_by_walls(
     watch.lap("floor_plan")
     split = split_rooms(plan.labels, built.walls, lines_m, scored.directions_rad, cell_m, parameters.topology)
     watch.lap("topology")
-    return _Grouped(plan, make_rooms(split, plan, free, cell_m, parameters.floor_plan))
+    return _Grouped(plan, make_rooms(split, plan, free, explored.occupied, cell_m, parameters.floor_plan))
 
 
 def _analyze_by_baseline(

@@ -42,6 +42,7 @@ def make_rooms(
     labels: NDArray[np.int32],
     plan: FloorPlanResult,
     free: BoolArray,
+    occupied: BoolArray,
     resolution_m: float,
     parameters: FloorPlanParameters,
 ) -> RoomsResult:
@@ -53,8 +54,8 @@ def make_rooms(
         Split groups of faces of the free cells, 0 for none.
     plan : FloorPlanResult
         Result of stage C.
-    free : (H, W) bool
-        Free cells.
+    free, occupied : (H, W) bool
+        Free and occupied cells.
     resolution_m : float
         Side of a cell.
     parameters : FloorPlanParameters
@@ -65,15 +66,15 @@ def make_rooms(
     settled = renumber_in_place(settled, number)
     # Faces belong to the rooms whose labels they had before borders settled.
     room_of_face = rooms_of_faces(renumber_in_place(whole, number), plan)
-    shapes = room_shapes(settled, plan, room_of_face, resolution_m, parameters.shape_min_seen)
+    shapes = room_shapes(settled, free, occupied, plan.face_of_cell, room_of_face, resolution_m, parameters)
     return RoomsResult(settled, shapes, room_of_face)
 
 
 def finish_rooms(
     found: RegionsResult,
     plan: FloorPlanResult,
-    faces: NDArray[np.int32],
     free: BoolArray,
+    occupied: BoolArray,
     resolution_m: float,
     parameters: Parameters,
 ) -> tuple[RoomsResult, tuple[Border, ...]]:
@@ -85,10 +86,8 @@ def finish_rooms(
         Rooms of the free cells, and their borders.
     plan : FloorPlanResult
         The faces.
-    faces : (H, W) int32
-        Face 1.. of each cell.
-    free : (H, W) bool
-        Free cells.
+    free, occupied : (H, W) bool
+        Free and occupied cells.
     resolution_m : float
         Side of a cell.
     parameters : Parameters
@@ -106,8 +105,10 @@ def finish_rooms(
     )
     number = number_rooms(pieces, len(room_of_piece) - 1, of_regions.room_min_area_m2, resolution_m)
     labels = renumber_in_place(pieces, number)
-    room_of_face = most_seen_rooms(labels, faces, len(plan.graph.polygons))
-    shapes = room_shapes(labels, plan, room_of_face, resolution_m, parameters.floor_plan.shape_min_seen)
+    room_of_face = most_seen_rooms(labels, plan.face_of_cell, len(plan.graph.polygons))
+    shapes = room_shapes(
+        labels, free, occupied, plan.face_of_cell, room_of_face, resolution_m, parameters.floor_plan
+    )
     return RoomsResult(labels, shapes, room_of_face), _renumbered(found.borders, room_of_piece, number)
 
 
