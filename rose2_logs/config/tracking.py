@@ -135,8 +135,8 @@ class TrackingParameters(ParameterBlock):
     final_room_min_iou: float = number(
         0.7,
         "share",
-        "A room of the last map is there when a room overlaps it by this much: not if a neighbor half its size "
-        "is joined to it (2/3), nor if a third of it is missing.",
+        "A room of the last map is there when a room overlaps it by this much: not if a neighbor half its "
+        "size is joined to it (2/3), nor if a third of it is missing.",
         0,
         1,
     )

@@ -44,7 +44,9 @@ class RoomRows:
     @classmethod
     def joined(cls, parts: Sequence[RoomRows]) -> RoomRows:
         """Rows one after the other."""
-        return cls(*(np.concatenate(of_column) for of_column in zip(*(p._columns for p in parts), strict=True)))
+        return cls(
+            *(np.concatenate(of_column) for of_column in zip(*(p._columns for p in parts), strict=True))
+        )
 
     @property
     def _columns(self) -> tuple[NDArray[Any], ...]:
@@ -182,7 +184,7 @@ def _since(
 ) -> SnapshotRef | None:
     """The first of the maps at the end of the run whose shares are all at least so much."""
     since = None
-    for snapshot, share in reversed(shares.items()):
+    for snapshot, share in reversed(list(shares.items())):
         if share is None or share < least:
             break
         since = snapshot_refs[snapshot]

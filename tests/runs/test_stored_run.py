@@ -20,7 +20,6 @@ from rose2_logs.runs.table_schemas import SCHEMAS
 from rose2_logs.runs.tables import TABLES, pack_image
 from rose2_logs.workflows.figure import export_plan
 
-
 KEYS_OF_SINCE = [f"{since}.{key}" for since in SINCE for key in SINCE_KEYS]
 
 

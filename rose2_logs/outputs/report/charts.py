@@ -131,8 +131,8 @@ def _final_meaning(results: Run) -> str:
     tracking = results.parameters.tracking
     return (
         f"A room of the last map is there when a room overlaps it by {tracking.final_room_min_iou:g}. "
-        "Share of the last layout, by area, in rooms that are there; the same of the part known at the time, "
-        "compared as far as it was known, so that rooms not seen yet do not count; mean overlap of all rooms. "
+        "Share of the last layout, by area, in rooms that are there; the same of the part known at the "
+        "time, as far as it was known, so that rooms not seen yet do not count; mean overlap of all rooms. "
         f"The layout is final from the map on after which the first share stays at "
         f"{percent(tracking.final_min_share)} or above: a few rooms at the frontier may still change. "
         "The known part is final likewise, by the second share."

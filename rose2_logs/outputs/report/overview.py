@@ -6,6 +6,7 @@ import csv
 import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 from urllib.parse import quote
 
 from rose2_logs.drawing.pixels import as_pixels
@@ -146,7 +147,7 @@ def _table(rows: list[tuple[Cell, ...]]) -> Table:
         ),
         Column(
             "known part final from",
-            "coverage from which on what was known of the layout was as in the end; none if only the last map was",
+            "coverage from which on what was known of it was as in the end; none if only the last map was",
         ),
         Column("splits"),
         Column("merges"),
