@@ -438,6 +438,8 @@ def evaluate(
 ) -> Evaluation:
     """Segment maps whose true rooms are known, and measure how well the found rooms agree with them.
 
+    Where a map has two truths, the one that agrees better counts.
+
     Parameters
     ----------
     cases : str or path
@@ -459,12 +461,12 @@ def evaluate(
     Returns
     -------
     Evaluation
-        Figures of each map (``maps``) and means of each group (``groups``).
+        Figures of each map (``maps``), with the truth that counted, and means of each group (``groups``).
 
     Raises
     ------
     CasesError
-        If the list or an image cannot be read, or the two images of a case differ in size.
+        If the list or an image cannot be read, or the images of a case differ in size.
     ParameterError
         If a parameter, the method or the number of workers cannot be used.
 

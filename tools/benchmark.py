@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
 """Measure the project and write reports.
 
-`accuracy` gives every figure of every method; `sensitivity` how much the figures hang on each parameter, and
-what a choice made without a building gives there; `speed` how fast everything is.
+`accuracy` gives every figure of every method; `tables` those of the accuracy page, by group and by building;
+`sensitivity` how much the figures hang on each parameter, and what a choice made without a building gives
+there; `speed` how fast everything is.
 
 Examples
 --------
@@ -13,6 +14,8 @@ Examples
     python tools/benchmark.py accuracy --cases SIMULATED/cases.json --sample 3 -o DIR
     # quickly: figures and pictures of one method
     python tools/benchmark.py accuracy --methods rose2 --skip ablations robustness -o DIR
+    # the tables of the accuracy page, with rooms of changed maps on two maps of each group
+    python tools/benchmark.py tables --sample 2 -o DIR
     # each parameter of the stages a step down and up, or only some of them
     python tools/benchmark.py sensitivity -o DIR
     python tools/benchmark.py sensitivity --parameters "walls.*" floor_plan.join_min_openness -o DIR
@@ -20,7 +23,8 @@ Examples
     python tools/benchmark.py speed -o DIR
 
 DIR/report.md is the report, DIR/report.json holds all of it as numbers; DIR/pictures shows every map with its
-true rooms, the found ones, and what is wrong. That of speed is DIR/speed.md with speed.png and speed.json.
+true rooms, the found ones, and what is wrong. That of speed is DIR/speed.md with speed.png and speed.json;
+`tables` writes DIR/tables.md and DIR/tables.json.
 """
 
 from __future__ import annotations
@@ -30,6 +34,7 @@ import sys
 from pathlib import Path
 
 from benchmarking.accuracy import AccuracyOptions, load_all_cases, measure_accuracy
+from benchmarking.page import METHODS_FILE, load_methods, measure_page, write_page
 from benchmarking.references import ABLATIONS_FILE, PUBLISHED_FILE
 from benchmarking.report import write_report
 from benchmarking.sensitivity import (
@@ -71,6 +76,14 @@ def main(arguments: list[str] | None = None) -> int:
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )
     )
+    _add_tables(
+        commands.add_parser(
+            "tables",
+            help="the tables of the accuracy page",
+            description="Compare methods by group and by building, with ranges over buildings, and the rooms "
+            "of each method on maps that are turned, mirrored, padded, finer, or lack 1 % of their cells.",
+        )
+    )
     _add_sensitivity(
         commands.add_parser(
             "sensitivity",
@@ -98,6 +111,14 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _add_common(parser: argparse.ArgumentParser) -> None:
+    _add_output_and_cases(parser)
+    add = parser.add_argument
+    add("--config", type=Path, metavar="FILE.toml", help="parameters, one table per stage")
+    add("--set", action="append", default=[], metavar="STAGE.NAME=VALUE", help="change one parameter")
+    add("--workers", type=int, default=1, help="processes (%(default)s)")
+
+
+def _add_output_and_cases(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("-o", "--output", type=Path, required=True, metavar="DIR", help="folder of the report")
     add(
@@ -109,9 +130,6 @@ def _add_common(parser: argparse.ArgumentParser) -> None:
         help="maps with true rooms; by default the benchmark beside the project, others from "
         "tools/make_sample_logs.py --cases",
     )
-    add("--config", type=Path, metavar="FILE.toml", help="parameters, one table per stage")
-    add("--set", action="append", default=[], metavar="STAGE.NAME=VALUE", help="change one parameter")
-    add("--workers", type=int, default=1, help="processes (%(default)s)")
 
 
 def _add_accuracy(parser: argparse.ArgumentParser) -> None:
@@ -134,6 +152,22 @@ def _add_accuracy(parser: argparse.ArgumentParser) -> None:
         help=f"figures by name of the group; by default {PUBLISHED_FILE.name} of the tool",
     )
     parser.set_defaults(run=_accuracy)
+
+
+def _add_tables(parser: argparse.ArgumentParser) -> None:
+    _add_output_and_cases(parser)
+    add = parser.add_argument
+    add(
+        "--methods",
+        type=Path,
+        default=METHODS_FILE,
+        metavar="FILE.toml",
+        help=f"what is compared; by default {METHODS_FILE.name} of the tool",
+    )
+    add("--sample", type=int, default=2, metavar="N", help="change N maps of each group (%(default)s)")
+    add("--config", type=Path, metavar="FILE.toml", help="parameters that all methods start from")
+    add("--workers", type=int, default=1, help="processes (%(default)s)")
+    parser.set_defaults(run=_tables)
 
 
 def _add_sensitivity(parser: argparse.ArgumentParser) -> None:
@@ -167,6 +201,13 @@ def _accuracy(options: argparse.Namespace) -> int:
         )
     )
     print(write_report(accuracy, options.output))
+    return 0
+
+
+def _tables(options: argparse.Namespace) -> int:
+    methods = load_methods(options.methods, options.config)
+    page = measure_page(options.cases, methods, options.sample, options.workers)
+    print(write_page(page, options.output))
     return 0
 
 

@@ -21,7 +21,6 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 from PIL import Image as PillowImage
-from skimage.morphology import skeletonize
 
 from rose2_logs.config.parameters import Parameters
 from rose2_logs.drawing.palette import track_color
@@ -33,13 +32,11 @@ from rose2_logs.model.explored import ExploredPart
 from rose2_logs.model.labels import known_window
 from rose2_logs.model.occupancy import UNKNOWN, BoolArray, FloatArray, OccupancySnapshot
 from rose2_logs.runs.run import Run
-from rose2_logs.segmentation.floor_plan.stage import make_floor_plan
 from rose2_logs.segmentation.pipeline import analyze
+from rose2_logs.segmentation.regions.fitted import answering_network
+from rose2_logs.segmentation.regions.stage import find_atoms, generous_floor_plan, generous_walls
 from rose2_logs.segmentation.rose.spectrum import Spectrum, compute_spectrum
-from rose2_logs.segmentation.rose.stage import find_structure, make_clean_map
-from rose2_logs.segmentation.topology.splitting import split_rooms
-from rose2_logs.segmentation.topology.voronoi import clearance_m
-from rose2_logs.segmentation.walls.stage import WallCounter, find_walls
+from rose2_logs.segmentation.rose.stage import find_structure
 from rose2_logs.workflows.analyze import RunOptions, analyze_log
 from rose2_logs.workflows.compare import compare_runs
 
@@ -170,32 +167,30 @@ def method_pictures(snapshot: OccupancySnapshot, parameters: Parameters) -> Iter
     edges = [_mixed((120, 200, 130), MARK, weight) for weight in weights]
     faces = painter.outlines(faint, inside, (225, 225, 225))
     yield "method_7_faces", painter.lines(faces, plan.edges_m[counted], edges, [SCALE + 1] * len(edges))
-    joined, split, graph = _labels_along(snapshot, parameters)
-    yield "method_8_joined_faces", painter.rooms(joined, faint)
-    voronoi = painter.cells(graph, MARK, painter.rooms(split, faint))
-    yield "method_9_split_rooms", voronoi
+    atoms, answer = _atoms_and_answers(snapshot, parameters)
+    yield "method_8_atoms", painter.rooms(atoms, faint)
+    yield "method_9_answers", painter.values(np.where(atoms > 0, answer, 0), cv2.COLORMAP_MAGMA)
     yield "method_10_floor_plan", _floor_plan_picture(painter, analysis)
 
 
-def _labels_along(
+def _atoms_and_answers(
     snapshot: OccupancySnapshot, parameters: Parameters
-) -> tuple[NDArray[np.int32], NDArray[np.int32], BoolArray]:
-    """Rooms as faces were joined, as they were split, and the Voronoi graph of these, on the canvas."""
+) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+    """Atoms of the floor, and how likely the network finds each cell to lie on a border, on the canvas."""
     part = ExploredPart.of(snapshot.cells, snapshot.geometry, parameters.occupancy)
     cell_m = part.resolution_m
-    structure = find_structure(part.occupied, cell_m, parameters.spectrum)
-    directions = structure.directions_rad
-    count = WallCounter(directions, cell_m, parameters.walls)
-    clean = make_clean_map(structure, part.free_area_m2, count, parameters.spectrum)
-    walls = find_walls(structure.supported, clean.cells, clean.attached, directions, cell_m, parameters.walls)
-    first = float(directions[0])
-    lines = walls.lines.ends_m
-    plan = make_floor_plan(lines, walls.walls, part.free, first, cell_m, parameters.floor_plan)
-    split = split_rooms(plan.labels, walls.walls, lines, directions, cell_m, parameters.topology)
-    clearance = clearance_m(walls.walls, cell_m, parameters.topology.clearance_blur_cells)
-    is_clear = clearance >= parameters.topology.split_min_clearance_m / 2
-    graph = skeletonize((split > 0) & is_clear).astype(np.int32)  # type: ignore[no-untyped-call]
-    return part.labels(plan.labels), part.labels(split), part.labels(graph) > 0
+    scored = find_structure(part.occupied, cell_m, parameters.spectrum)
+    direction = float(scored.directions_rad[0])
+    walls = generous_walls(scored, cell_m, parameters)
+    plan = generous_floor_plan(walls, part.free, direction, cell_m, parameters)
+    atoms = find_atoms(
+        part.free, part.occupied, scored.score, plan.face_of_cell, direction, cell_m, parameters.regions
+    )
+    answers = answering_network()(atoms.raster)
+    steps = np.rint(answers[:-1].max(0) * 1000).astype(np.int32)
+    height, width = part.free.shape
+    shown = part.labels(atoms.frame.back(steps, (height, width)))
+    return part.labels(atoms.cells), (shown / 1000).astype(np.float32)
 
 
 def _floor_plan_picture(painter: Painter, analysis: SnapshotAnalysis) -> Image:

@@ -217,7 +217,47 @@ class FloorPlanParameters(ParameterBlock):
         0.1, "share", "A face seen less than this is outside: it was seen by rays through windows.", 0, 1
     )
     shape_min_seen: float = number(
-        0.2, "share", "A face seen this much belongs to its room's predicted shape; the paper's value.", 0, 1
+        0.1,
+        "share",
+        "Nothing is predicted in a face seen less than this: rays say little of a room.",
+        0,
+        1,
+    )
+    shape_reach_m: float = number(
+        3.0, "m", "A room is predicted this far beyond what was seen of it: the other half of a room.", 0.0
+    )
+    shape_share_of_face: float = number(
+        0.1,
+        "share",
+        "A room with this share of what was seen of a face may be predicted there; less is due to "
+        "borders that were straightened.",
+        0,
+        1,
+    )
+    shape_gap_m: float = number(
+        0.2,
+        "m",
+        "Gaps in walls up to this width let no room through: drift and far rays leave them.",
+        0.0,
+    )
+    shape_min_open: float = number(
+        0.3,
+        "share",
+        "Unseen space is a room's if this share of its known border is open to it: behind walls it is less.",
+        0,
+        1,
+    )
+    shape_wall_m: float = number(
+        0.15,
+        "m",
+        "A shape reaches this far into the wall around it: half a wall's thickness, plus drift.",
+        0.0,
+    )
+    shape_fill_max_m2: float = number(
+        1.0, "m2", "Smaller unseen places within a room are furniture and its shadows.", 0.0
+    )
+    shape_simplify_m: float = number(
+        0.1, "m", "Steps of the cells of a shape's outline up to this size are straightened.", 0.0
     )
     grouping: str = choice(
         "fitted",

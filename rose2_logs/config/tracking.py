@@ -132,6 +132,27 @@ class TrackingParameters(ParameterBlock):
     last_shape_min_iou: float = number(
         0.8, "share", "A room's shape is right from this overlap with its last one on: decimeters off in 5 m."
     )
+    final_room_min_iou: float = number(
+        0.7,
+        "share",
+        "A room of the last map is there when a room overlaps it by this much: not if a neighbor half its "
+        "size is joined to it (2/3), nor if a third of it is missing.",
+        0,
+        1,
+    )
     final_min_share: float = number(
-        0.9, "share", "The layout is final when this share of it is in rooms whose shape is right."
+        0.8,
+        "share",
+        "The layout is final when this share of it, by area, is there: one room in five, as those at the "
+        "frontier, may still change.",
+        0,
+        1,
+    )
+    lasting_min_maps: int = number(
+        3,
+        "maps",
+        "Tracks that fewer maps show, and the last one does not, are brief: pieces of rooms at the frontier, "
+        "which one map has and the next one may repeat.",
+        1,
+        10**6,
     )

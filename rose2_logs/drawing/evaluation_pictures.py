@@ -22,6 +22,7 @@ from rose2_logs.drawing.sheet import Key, arranged, captioned, legend, stacked, 
 from rose2_logs.evaluation.along import RunPoint
 from rose2_logs.evaluation.benchmark import CaseResult
 from rose2_logs.evaluation.case_errors import Comparison, Mark, compare
+from rose2_logs.evaluation.cases import Truth
 from rose2_logs.evaluation.scores import Scores
 from rose2_logs.model.labels import known_window, straight_runs
 from rose2_logs.model.occupancy import BoolArray, FloatArray, GridGeometry
@@ -57,7 +58,13 @@ MARK_WORDS: dict[Mark, str] = {
 }
 
 
-def case_sheet(panels: Sequence[Drawing], comparison: Comparison, scores: Scores, title: str) -> Drawing:
+def case_sheet(
+    panels: Sequence[Drawing],
+    comparison: Comparison,
+    scores: Scores,
+    title: str,
+    truth: Truth | None = None,
+) -> Drawing:
     """Arrange the panels of `draw_panels` with a title, captions and a legend; a unit of the page is a pixel.
 
     Parameters
@@ -70,10 +77,12 @@ def case_sheet(panels: Sequence[Drawing], comparison: Comparison, scores: Scores
         Figures for the title line.
     title : str
         What the map is called.
+    truth : {"rooms", "rooms_other"}, optional
+        Which truth is shown, where there are two.
     """
     captions = (
         "map",
-        f"truth: {scores.rooms_gt:.0f} rooms",
+        f"{_truth_words(truth)}: {scores.rooms_gt:.0f} rooms",
         f"found: {scores.rooms_seg:.0f} rooms (striped: no partner)",
         "errors",
     )
@@ -89,6 +98,10 @@ def case_sheet(panels: Sequence[Drawing], comparison: Comparison, scores: Scores
         for mark, color in MARK_COLORS.items()
     ]
     return stacked([head, sheet, legend(keys, sheet.width, TEXT_PX)], GAP_PX / 2, title)
+
+
+def _truth_words(truth: Truth | None) -> str:
+    return "truth" if truth is None else f"truth that agrees better ({truth})"
 
 
 def _figures(scores: Scores) -> str:
@@ -241,9 +254,10 @@ class CasePictures:
         """
         case = result.case
         cells = np.flipud(case.snapshot().cells)
-        comparison = compare(case.truth(), result.labels)
+        comparison = compare(case.truth(result.truth), result.labels)
         panels = draw_panels(cells, comparison)
-        picture = case_sheet(panels, comparison, result.scores, f"{case.group}/{case.name}")
+        title = f"{case.group}/{case.name}"
+        picture = case_sheet(panels, comparison, result.scores, title, _which_truth(result))
         picture.save(self._folder / case.group / f"{case.name}.png", width_px=None)
         self._tiles.setdefault(case.group, []).append(_tile(panels[1:], result))
 
@@ -256,6 +270,10 @@ class CasePictures:
             for page, first in enumerate(range(0, len(tiles), COLUMNS * ROWS), start=1):
                 sheet = tiled(tiles[first : first + COLUMNS * ROWS], min(COLUMNS, len(tiles)), GAP_PX)
                 sheet.save(self._folder / f"{group}.sheet_{page}.png", width_px=None)
+
+
+def _which_truth(result: CaseResult) -> Truth | None:
+    return None if result.case.rooms_other_path is None else result.truth
 
 
 def _tile(panels: Sequence[Drawing], result: CaseResult) -> Drawing:
@@ -275,6 +293,8 @@ def _tile(panels: Sequence[Drawing], result: CaseResult) -> Drawing:
         f"{result.case.name}   iou_sym {scores.iou_sym:.1f}   (seg {scores.iou_seg:.1f}, "
         f"gt {scores.iou_gt:.1f})   rooms {scores.rooms_seg:.0f}/{scores.rooms_gt:.0f}"
     )
+    if (truth := _which_truth(result)) is not None:
+        text += f"   truth {truth}"
     return captioned(tile, text, TILE_CAPTION_PX)
 
 

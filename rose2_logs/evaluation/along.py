@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from rose2_logs.evaluation.benchmark import CaseResult
+from rose2_logs.evaluation.cases import Truth
 from rose2_logs.evaluation.scores import Scores
 
 
@@ -23,11 +24,14 @@ class RunPoint:
         Known free area of its map over that of the run's last map; above 1 where a later map lost some.
     scores : Scores
         Its figures.
+    truth : {"rooms", "rooms_other"}
+        The truth that they are against.
     """
 
     name: str
     coverage: float
     scores: Scores
+    truth: Truth = "rooms"
 
 
 def along_runs(results: Sequence[CaseResult]) -> dict[str, tuple[RunPoint, ...]]:
@@ -48,7 +52,12 @@ def along_runs(results: Sequence[CaseResult]) -> dict[str, tuple[RunPoint, ...]]
 def _points(members: Sequence[CaseResult]) -> list[RunPoint]:
     whole = members[-1].free_area_m2
     return [
-        RunPoint(result.case.name, result.free_area_m2 / whole if whole > 0 else 0.0, result.scores)
+        RunPoint(
+            result.case.name,
+            result.free_area_m2 / whole if whole > 0 else 0.0,
+            result.scores,
+            result.truth,
+        )
         for result in members
     ]
 
@@ -57,7 +66,8 @@ def along_as_json(runs: Mapping[str, Sequence[RunPoint]]) -> dict[str, list[dict
     """Return the points of each run as JSON values."""
     return {
         group: [
-            {"name": point.name, "coverage": point.coverage, **dataclasses.asdict(point.scores)}
+            {"name": point.name, "truth": point.truth, "coverage": point.coverage}
+            | dataclasses.asdict(point.scores)
             for point in points
         ]
         for group, points in runs.items()

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from rose2_logs.config.parameters import Parameters
 from rose2_logs.errors import CasesError
-from rose2_logs.evaluation.cases import Case
-from rose2_logs.evaluation.scores import Scores, mean_scores, score
+from rose2_logs.evaluation.cases import Case, Truth
+from rose2_logs.evaluation.scores import Scores, mean_scores, score_against
 from rose2_logs.system.text import counted
 from rose2_logs.system.workers import ordered_map
 
@@ -32,11 +32,13 @@ class CaseResult:
     labels : (H, W) int32
         The segmented rooms, row 0 at the top as in the case's images.
     scores : Scores
-        Figures against the true rooms.
+        Figures against the true rooms, where there are two truths against the one that agrees better.
     free_area_m2 : float
         Area of the map's known free cells.
     seconds : float
         Time of the segmentation.
+    truth : {"rooms", "rooms_other"}
+        The truth that the figures are against.
     """
 
     case: Case
@@ -44,6 +46,7 @@ class CaseResult:
     scores: Scores
     free_area_m2: float
     seconds: float
+    truth: Truth = "rooms"
 
     def __repr__(self) -> str:
         rooms = counted(round(self.scores.rooms_seg), "room")
@@ -62,7 +65,7 @@ def evaluate_cases(
     Raises
     ------
     CasesError
-        If an image cannot be read or the two images of a case differ in size.
+        If an image cannot be read or the images of a case differ in size.
     """
     for _, result in ordered_map(
         partial(evaluate_case, method=method, parameters=parameters), cases, workers
@@ -74,20 +77,21 @@ def evaluate_case(case: Case, method: str, parameters: Parameters) -> CaseResult
     """Segment and score one case."""
     from rose2_logs.segmentation.pipeline import analyze
 
-    snapshot, truth = case.snapshot(), case.truth()
-    if snapshot.cells.shape != truth.shape:
-        raise CasesError(f"{case.rooms_path}: of shape {truth.shape}, but its map is {snapshot.cells.shape}")
+    snapshot, truths = case.snapshot(), case.truths()
+    if snapshot.cells.shape != (shape := truths["rooms"].shape):
+        raise CasesError(f"{case.rooms_path}: of shape {shape}, but its map is {snapshot.cells.shape}")
     start = time.perf_counter()
     analysis = analyze(snapshot, parameters, method)
     seconds = time.perf_counter() - start
     labels = np.ascontiguousarray(np.flipud(analysis.rooms.labels))
-    return CaseResult(case, labels, score(truth, labels), analysis.free_area_m2, seconds)
+    truth, scores = score_against(truths, labels)
+    return CaseResult(case, labels, scores, analysis.free_area_m2, seconds, truth)
 
 
 def figures(results: Sequence[CaseResult]) -> dict[str, Any]:
     """Return the figures of each map and the means of each group as JSON values."""
     maps = [
-        {"group": result.case.group, "name": result.case.name}
+        {"group": result.case.group, "name": result.case.name, "truth": result.truth}
         | dataclasses.asdict(result.scores)
         | {"free_area_m2": result.free_area_m2, "seconds": result.seconds}
         for result in results

@@ -2,7 +2,9 @@
 
 The file holds ``{"cases": [{"group", "name", "map", "rooms", "resolution_m"}, ...]}`` with paths relative to
 itself: `map` is an 8-bit gray image in the convention of ROS maps, `rooms` a label image of the same size.
-A case may give ``"origin_xy_m": [x, y]``, the position of the image's lower left corner in the world.
+A case may give ``"rooms_other"``, a second label image, where careful people may draw the rooms in two ways:
+the truth that agrees better with the found rooms counts. It may also give ``"origin_xy_m": [x, y]``, the
+position of the images' lower left corner in the world.
 Images have row 0 at the top, occupancy grids at the origin below; a case converts between the two.
 """
 
@@ -11,7 +13,7 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +27,9 @@ OCCUPIED_MAX_GRAY = 89
 """Darker is occupied: (255 - gray) / 255 above map_server's default occupied_thresh of 0.65."""
 FREE_MIN_GRAY = 206
 """Lighter is free: (255 - gray) / 255 below map_server's default free_thresh of 0.196; 205 is unknown."""
+
+Truth = Literal["rooms", "rooms_other"]
+"""One of the true rooms of a case, by its name in the list of cases."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +46,8 @@ class Case:
         Side of a cell.
     origin_xy_m : (float, float), optional
         World position of the images' lower left corner, where it is known.
+    rooms_other_path : path, optional
+        A second image of true rooms, where these may be drawn in two ways.
     """
 
     group: str
@@ -49,6 +56,7 @@ class Case:
     rooms_path: Path
     resolution_m: float
     origin_xy_m: tuple[float, float] | None = None
+    rooms_other_path: Path | None = None
 
     def snapshot(self) -> OccupancySnapshot:
         """Read the map as an occupancy grid; its origin is (0, 0) where it is not known.
@@ -69,18 +77,42 @@ class Case:
             0, 0, 0, str(self.map_path), np.ascontiguousarray(np.flipud(cells)), geometry
         )
 
-    def truth(self) -> NDArray[np.int64]:
+    def truth(self, name: Truth = "rooms") -> NDArray[np.int64]:
         """Read the true rooms (H, W) as labels, row 0 at the top.
+
+        Parameters
+        ----------
+        name : {"rooms", "rooms_other"}
+            Which of them; a case without a second truth has only the first.
 
         Raises
         ------
         CasesError
             If the image cannot be read.
         """
-        labels = _read_image(self.rooms_path)
-        if labels.ndim != 2:
-            raise CasesError(f"{self.rooms_path}: the rooms must be a single-channel label image")
-        return labels.astype(np.int64)
+        return _read_labels(self._truth_paths()[name])
+
+    def truths(self) -> dict[Truth, NDArray[np.int64]]:
+        """Read every truth of the case, the first one first; all of one size.
+
+        Raises
+        ------
+        CasesError
+            If an image cannot be read, or the second truth is of another size than the first.
+        """
+        found = {name: _read_labels(path) for name, path in self._truth_paths().items()}
+        first = found["rooms"].shape
+        for name, labels in found.items():
+            if labels.shape != first:
+                path = self._truth_paths()[name]
+                raise CasesError(f"{path}: of shape {labels.shape}, but {self.rooms_path} is {first}")
+        return found
+
+    def _truth_paths(self) -> dict[Truth, Path]:
+        paths: dict[Truth, Path] = {"rooms": self.rooms_path}
+        if self.rooms_other_path is not None:
+            paths["rooms_other"] = self.rooms_other_path
+        return paths
 
 
 def load_cases(path: Path, group: str | None = None) -> tuple[Case, ...]:
@@ -122,10 +154,12 @@ def _case(path: Path, number: int, entry: Any) -> Case:
             path.parent / entry["rooms"],
             float(entry["resolution_m"]),
             _origin(entry.get("origin_xy_m")),
+            None if (other := entry.get("rooms_other")) is None else path.parent / other,
         )
     except (KeyError, TypeError, ValueError) as error:
         raise CasesError(
-            f"{path}: case {number} needs group, name, map, rooms, resolution_m: {error!r}"
+            f"{path}: case {number} needs group, name, map, rooms, resolution_m, and may have rooms_other, "
+            f"origin_xy_m: {error!r}"
         ) from error
 
 
@@ -134,6 +168,13 @@ def _origin(given: Any) -> tuple[float, float] | None:
         return None
     x, y = given
     return float(x), float(y)
+
+
+def _read_labels(path: Path) -> NDArray[np.int64]:
+    labels = _read_image(path)
+    if labels.ndim != 2:
+        raise CasesError(f"{path}: the rooms must be a single-channel label image")
+    return labels.astype(np.int64)
 
 
 def _read_image(path: Path) -> NDArray[Any]:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rose2_logs.tracking.overlap import overlap_of
+
+Name = TypeVar("Name", bound=str)
 
 FIGURES = ("precision", "recall", "iou_seg", "iou_gt", "iou_sym", "pq")
 MATCH_IOU = 0.5
@@ -91,6 +94,34 @@ def score(truth: NDArray[np.integer], segmented: NDArray[np.integer]) -> Scores:
         rooms_seg=rooms_seg,
         rooms_gt=rooms_gt,
     )
+
+
+def score_against(
+    truths: Mapping[Name, NDArray[np.integer]], segmented: NDArray[np.integer]
+) -> tuple[Name, Scores]:
+    """Compare a label image with every truth of its map; the one of the greatest `iou_sym` counts.
+
+    Parameters
+    ----------
+    truths : mapping of str to (H, W) int
+        At least one label image by its name, 0 = no room.
+    segmented : (H, W) int
+        Labels, 0 = no room.
+
+    Returns
+    -------
+    name : str
+        The truth that counts; of equal ones the first.
+    scores : Scores
+        The figures against it.
+
+    Raises
+    ------
+    ValueError
+        If the shapes differ.
+    """
+    found = ((name, score(truth, segmented)) for name, truth in truths.items())
+    return max(found, key=lambda named: named[1].iou_sym)
 
 
 def mean_scores(scores: Iterable[Scores]) -> Scores:

@@ -151,6 +151,11 @@ class RunSummary:
         """The map from which on the layout was that of the last one; None if the last one has no room."""
         return self.convergence.layout_final
 
+    @property
+    def known_final(self) -> SnapshotRef | None:
+        """The map from which on what was known of the layout was that of the last one; None as above."""
+        return self.convergence.known_final
+
     def median_coverage(self, since: Mapping[int, SnapshotRef]) -> float | None:
         """Median coverage, over the last map's rooms, from which on something held; None if it never did."""
         tracks = self.histories.in_last_map

@@ -121,6 +121,7 @@ class RunStore:
             final = {
                 "final_iou": convergence.final_iou[index],
                 "final_share": convergence.final_share[index],
+                "known_final_share": convergence.known_final_share[index],
             }
             self._tables["snapshots"].add([row | final])
         for track, of_track in sorted(summary.histories.tracks.items()):

@@ -51,20 +51,20 @@ SUMMARY_KEYS: dict[str, type | tuple[type, ...]] = {
     "results.snapshots": int,
     "results.rooms_last": int,
     "results.tracks": int,
+    "results.brief_tracks": int,
     "results.coverage_first": NUMBER,
     "results.coverage_last": NUMBER,
     "results.events": dict,
     "layout": dict,
     "layout.final_since": (dict, NoneType),
+    "layout.known_final_since": (dict, NoneType),
     "files": list,
 }
 """What every summary holds, and is read from it."""
-FINAL_KEYS: dict[str, type | tuple[type, ...]] = {
-    "layout.final_since.snapshot": int,
-    "layout.final_since.time_s": NUMBER,
-    "layout.final_since.coverage": NUMBER,
-}
-"""And that of a run whose layout became final."""
+SINCE = ("layout.final_since", "layout.known_final_since")
+"""From which map on the layout, and what was known of it, was final; null if it never was."""
+SINCE_KEYS: dict[str, type | tuple[type, ...]] = {"snapshot": int, "time_s": NUMBER, "coverage": NUMBER}
+"""And what stands under each of these, unless it is null."""
 MAKE_AGAIN = "analyze the log again"
 """The remedy for results that cannot be used."""
 
@@ -355,8 +355,10 @@ def _read_summary(folder: Path) -> dict[str, Any]:
             file=path,
         )
     _require_keys(path, summary, SUMMARY_KEYS)
-    if summary["layout"]["final_since"] is not None:
-        _require_keys(path, summary, FINAL_KEYS)
+    for since in SINCE:
+        block, name = since.split(".")
+        if summary[block][name] is not None:
+            _require_keys(path, summary, {f"{since}.{key}": kind for key, kind in SINCE_KEYS.items()})
     return summary
 
 

@@ -83,6 +83,7 @@ def write_summary(
             "rooms_last": totals.rooms_last,
             "outside_m2_last": totals.outside_m2_last,
             "tracks": totals.tracks,
+            "brief_tracks": len(summary.convergence.brief),
             "events": dict(sorted(totals.events.items())),
         },
         "layout": _layout(summary),
@@ -102,11 +103,12 @@ def write_summary(
 def _layout(summary: RunSummary) -> dict[str, Any]:
     """Describe how the layout developed: since when it was final, how much it changed, how sure it is."""
     totals, histories, convergence = summary.totals, summary.histories, summary.convergence
-    final = convergence.layout_final
+    final, known = convergence.layout_final, convergence.known_final
     rooms = [histories.tracks[track] for track in histories.in_last_map]
     seen_shares = (convergence.shape_right_seen.get(track) for track in histories.in_last_map)
     return {
         "final_since": final and dataclasses.asdict(final),
+        "known_final_since": known and dataclasses.asdict(known),
         "changed_share_mean": totals.changed_share.mean,
         "changed_share_max": totals.changed_share.maximum,
         "variation_bits_mean": totals.variation_bits.mean,

@@ -117,12 +117,18 @@ SNAPSHOTS = _table(
         **_SNAPSHOTS_ALONG,
         "final_iou": (
             pa.float64(),
-            "mean intersection over union of the last map's rooms with their shapes in this map, weighted by "
-            "area; 0 for a room that does not exist yet",
+            "mean intersection over union of the last map's rooms with the rooms of this map that are most "
+            "like them, weighted by area; 0 for a room that does not exist yet",
         ),
         "final_share": (
             pa.float64(),
-            "share of the last layout, by area, in rooms that overlap their last shape by 0.8",
+            "share of the last layout, by area, in rooms that a room of this map overlaps by "
+            "tracking.final_room_min_iou",
+        ),
+        "known_final_share": (
+            pa.float64(),
+            "the same of the floor that is in a room in this map and in the last one, compared on this floor "
+            "alone; null without such floor",
         ),
     }
 )

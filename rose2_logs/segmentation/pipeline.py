@@ -207,15 +207,12 @@ class RoomTree:
     explored : ExploredPart
     plan : FloorPlanResult
         The faces that the atoms were cut with, in no group.
-    faces : (H, W) int32
-        Face 1.. of each cell.
     tree : RegionTree
     parameters : Parameters
     """
 
     explored: ExploredPart
     plan: FloorPlanResult
-    faces: NDArray[np.int32]
     tree: RegionTree
     parameters: Parameters
 
@@ -224,7 +221,7 @@ class RoomTree:
         explored, parameters = self.explored, self.parameters
         found = self.tree.rooms(detail)
         finished, found_as = finish_rooms(
-            found, self.plan, self.faces, explored.free, explored.resolution_m, parameters
+            found, self.plan, explored.free, explored.occupied, explored.resolution_m, parameters
         )
         rooms = _room_map(finished.labels, finished.shapes, explored, parameters.topology)
         most_m = parameters.regions.door_max_width_m
@@ -264,13 +261,15 @@ def _grow_tree(
     """Cut the floor into atoms, by faces and by basins of the clearance, and judge their borders."""
     free, occupied, cell_m = explored.free, explored.occupied, explored.resolution_m
     generous = generous_walls(scored, cell_m, parameters)
-    plan, faces = generous_floor_plan(generous, free, strongest_rad, cell_m, parameters)
+    plan = generous_floor_plan(generous, free, strongest_rad, cell_m, parameters)
     watch.lap("floor_plan")
-    atoms = find_atoms(free, occupied, scored.score, faces, strongest_rad, cell_m, parameters.regions)
+    atoms = find_atoms(
+        free, occupied, scored.score, plan.face_of_cell, strongest_rad, cell_m, parameters.regions
+    )
     watch.lap("atoms")
     tree = region_tree(atoms, free, cell_m, parameters.regions)
     watch.lap("regions")
-    return RoomTree(explored, plan, faces, tree, parameters)
+    return RoomTree(explored, plan, tree, parameters)
 
 
 def _rooms_by_walls(
@@ -287,7 +286,7 @@ def _rooms_by_walls(
     watch.lap("floor_plan")
     split = split_rooms(plan.labels, built.walls, lines_m, scored.directions_rad, cell_m, parameters.topology)
     watch.lap("topology")
-    finished = make_rooms(split, plan, free, cell_m, parameters.floor_plan)
+    finished = make_rooms(split, plan, free, explored.occupied, cell_m, parameters.floor_plan)
     return _FoundRooms(
         finished.labels,
         _room_map(finished.labels, finished.shapes, explored, parameters.topology),

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import shapely
@@ -35,6 +37,21 @@ class RoomRows:
     area_m2: FloatArray
     polygons: NDArray[np.object_]
 
+    def part(self, begin: int, end: int) -> RoomRows:
+        """Some rows, from `begin` on and before `end`."""
+        return RoomRows(*(column[begin:end] for column in self._columns))
+
+    @classmethod
+    def joined(cls, parts: Sequence[RoomRows]) -> RoomRows:
+        """Rows one after the other."""
+        return cls(
+            *(np.concatenate(of_column) for of_column in zip(*(p._columns for p in parts), strict=True))
+        )
+
+    @property
+    def _columns(self) -> tuple[NDArray[Any], ...]:
+        return self.snapshot, self.track, self.area_m2, self.polygons
+
 
 @dataclass
 class Convergence:
@@ -49,12 +66,19 @@ class Convergence:
     shape_right_seen : dict
         By track, the area seen of it at that time over its last.
     final_iou : dict
-        By snapshot, the mean overlap of the last layout's rooms with their shape then, by area; None where
-        the last map has no room.
+        By snapshot, the mean overlap of the last layout's rooms with the map's rooms that are most like them,
+        by area; None where the last map has no room.
     final_share : dict
-        By snapshot, the share of the last layout's area that was in rooms in their final shape.
-    layout_final : SnapshotRef or None
-        The map from which on this share stayed above `final_min_share`; None where the last map has no room.
+        By snapshot, the share of the last layout's area in rooms that the map had: some room of the map
+        overlaps them by `final_room_min_iou`. None where the last map has no room.
+    known_final_share : dict
+        The same of the floor that is in a room both in the map and in the last one, with both divisions
+        compared on this floor alone: what was not seen yet does not count. None without such floor.
+    layout_final, known_final : SnapshotRef or None
+        The map from which on `final_share`, and `known_final_share`, stayed at `final_min_share` or above;
+        None where the last map has no room.
+    brief : tuple of int
+        The tracks that fewer than `lasting_min_maps` maps show, and the last map does not.
     """
 
     area_settled: dict[int, SnapshotRef] = field(default_factory=dict)
@@ -62,7 +86,10 @@ class Convergence:
     shape_right_seen: dict[int, float] = field(default_factory=dict)
     final_iou: dict[int, float | None] = field(default_factory=dict)
     final_share: dict[int, float | None] = field(default_factory=dict)
+    known_final_share: dict[int, float | None] = field(default_factory=dict)
     layout_final: SnapshotRef | None = None
+    known_final: SnapshotRef | None = None
+    brief: tuple[int, ...] = ()
 
 
 def measure_convergence(
@@ -88,38 +115,146 @@ def measure_convergence(
         From when on an area has settled, a shape is that of the last map, and the layout is final.
     """
     parameters = parameters or TrackingParameters()
+    layout = _LastLayout(histories, drifts, parameters.final_room_min_iou)
     measured = Convergence()
-    weight = {track: histories.tracks[track].polygon.area for track in histories.in_last_map}
-    total = sum(weight.values())
-    final_iou, final_share = dict.fromkeys(snapshot_refs, 0.0), dict.fromkeys(snapshot_refs, 0.0)
-    for batch in rows:
-        for snapshot, track, area, iou in zip(
-            batch.snapshot.tolist(),
-            batch.track.tolist(),
-            batch.area_m2.tolist(),
-            _iou_with_last(batch, histories, drifts).tolist(),
-            strict=True,
-        ):
-            last = histories.tracks[track].area_m2
-            if abs(area - last) > parameters.settled_area_tolerance * last:
-                measured.area_settled.pop(track, None)
-            else:
-                measured.area_settled.setdefault(track, snapshot_refs[snapshot])
-            if iou >= parameters.last_shape_min_iou and track not in measured.shape_right:
-                measured.shape_right[track] = snapshot_refs[snapshot]
-                measured.shape_right_seen[track] = area / last if last > 0 else 0.0
-            if track in weight:
-                final_iou[snapshot] += iou * weight[track]
-                final_share[snapshot] += (iou >= parameters.last_shape_min_iou) * weight[track]
-    for snapshot, snapshot_ref in snapshot_refs.items():
-        share = final_share[snapshot] / total if total > 0 else None
-        measured.final_iou[snapshot] = final_iou[snapshot] / total if total > 0 else None
-        measured.final_share[snapshot] = share
-        if share is None or share < parameters.final_min_share:
-            measured.layout_final = None
-        elif measured.layout_final is None:
-            measured.layout_final = snapshot_ref
+    likeness = dict.fromkeys(snapshot_refs, layout.likeness_of_nothing)
+    for of_map in _map_by_map(rows):
+        _follow_tracks(measured, of_map, histories, snapshot_refs, drifts, parameters)
+        likeness[int(of_map.snapshot[0])] = layout.likeness(of_map)
+    measured.final_iou = {snapshot: like.iou for snapshot, like in likeness.items()}
+    measured.final_share = {snapshot: like.share for snapshot, like in likeness.items()}
+    measured.known_final_share = {snapshot: like.known_share for snapshot, like in likeness.items()}
+    least = parameters.final_min_share
+    measured.layout_final = _since(measured.final_share, snapshot_refs, least)
+    measured.known_final = _since(measured.known_final_share, snapshot_refs, least)
+    in_last = set(histories.in_last_map)
+    measured.brief = tuple(
+        track
+        for track, history in sorted(histories.tracks.items())
+        if history.maps < parameters.lasting_min_maps and track not in in_last
+    )
     return measured
+
+
+def _map_by_map(rows: Iterable[RoomRows]) -> Iterator[RoomRows]:
+    """Rooms of one map at a time, however they came together."""
+    held: list[RoomRows] = []
+    for batch in rows:
+        ends = [*(np.flatnonzero(np.diff(batch.snapshot)) + 1).tolist(), len(batch.snapshot)]
+        for begin, end in pairwise([0, *ends]):
+            if begin == end:
+                continue
+            part = batch.part(begin, end)
+            if held and held[0].snapshot[0] != part.snapshot[0]:
+                yield RoomRows.joined(held)
+                held = []
+            held.append(part)
+    if held:
+        yield RoomRows.joined(held)
+
+
+def _follow_tracks(
+    measured: Convergence,
+    rows: RoomRows,
+    histories: TrackHistories,
+    snapshot_refs: Mapping[int, SnapshotRef],
+    drifts: Mapping[int, RigidMotion],
+    parameters: TrackingParameters,
+) -> None:
+    """Note for each room of the next map whether its area and its shape are those of its track in the end."""
+    for snapshot, track, area, iou in zip(
+        rows.snapshot.tolist(),
+        rows.track.tolist(),
+        rows.area_m2.tolist(),
+        _iou_with_last(rows, histories, drifts).tolist(),
+        strict=True,
+    ):
+        last = histories.tracks[track].area_m2
+        if abs(area - last) > parameters.settled_area_tolerance * last:
+            measured.area_settled.pop(track, None)
+        else:
+            measured.area_settled.setdefault(track, snapshot_refs[snapshot])
+        if iou >= parameters.last_shape_min_iou and track not in measured.shape_right:
+            measured.shape_right[track] = snapshot_refs[snapshot]
+            measured.shape_right_seen[track] = area / last if last > 0 else 0.0
+
+
+def _since(
+    shares: Mapping[int, float | None], snapshot_refs: Mapping[int, SnapshotRef], least: float
+) -> SnapshotRef | None:
+    """The first of the maps at the end of the run whose shares are all at least so much."""
+    since = None
+    for snapshot, share in reversed(list(shares.items())):
+        if share is None or share < least:
+            break
+        since = snapshot_refs[snapshot]
+    return since
+
+
+@dataclass(frozen=True)
+class _Likeness:
+    """How far a map's layout is that of the last map: see `Convergence`."""
+
+    iou: float | None
+    share: float | None
+    known_share: float | None
+
+
+class _LastLayout:
+    """The rooms of the last map, which those of each map are compared with, whatever their tracks.
+
+    Parameters
+    ----------
+    histories : TrackHistories
+        With the shapes of the last map's rooms.
+    drifts : mapping of int to RigidMotion
+        How each map moved since the first one.
+    room_min_iou : float
+        Rooms that overlap by this much are the same.
+    """
+
+    def __init__(
+        self, histories: TrackHistories, drifts: Mapping[int, RigidMotion], room_min_iou: float
+    ) -> None:
+        rooms = [histories.tracks[track].polygon for track in histories.in_last_map]
+        self._rooms = _valid(np.array(rooms, object))
+        self._areas = shapely.area(self._rooms)
+        self._tree = shapely.STRtree(self._rooms)
+        self._drifts = drifts
+        self._last = None if histories.last is None else histories.last.snapshot
+        self._room_min_iou = room_min_iou
+
+    @property
+    def likeness_of_nothing(self) -> _Likeness:
+        """How a map without rooms compares."""
+        none = 0.0 if self._areas.sum() > 0 else None
+        return _Likeness(none, none, None)
+
+    def likeness(self, rows: RoomRows) -> _Likeness:
+        """Compare the rooms of one map."""
+        total = float(self._areas.sum())
+        if total == 0 or self._last is None:
+            return self.likeness_of_nothing
+        drift = self._drifts[int(rows.snapshot[0])], self._drifts[self._last]
+        rooms = _placed(rows.polygons, [drift] * len(rows.polygons))
+        room, last = self._tree.query(rooms, predicate="intersects")
+        common = np.zeros((len(rooms), len(self._rooms)))
+        common[room, last] = shapely.area(shapely.intersection(rooms[room], self._rooms[last]))
+        iou = _best_iou(common, shapely.area(rooms), self._areas)
+        known = common.sum(axis=0)
+        known_iou = _best_iou(common, common.sum(axis=1), known)
+        known_total = float(known.sum())
+        return _Likeness(
+            float(iou @ self._areas) / total,
+            float(self._areas[iou >= self._room_min_iou].sum()) / total,
+            float(known[known_iou >= self._room_min_iou].sum()) / known_total if known_total > 0 else None,
+        )
+
+
+def _best_iou(common: FloatArray, areas: FloatArray, last_areas: FloatArray) -> FloatArray:
+    """Greatest intersection over union (F,) of each last room with a room; `common` is (R, F)."""
+    best: FloatArray = share_of(common, areas[:, None] + last_areas - common).max(axis=0)
+    return best
 
 
 def _iou_with_last(

@@ -27,6 +27,8 @@ OnCase = Callable[[CaseResult, int, int], None]
 class Evaluation:
     """How well the rooms of a method agree with the true ones.
 
+    A map may have two truths: the one that agrees better counts, and its result names it.
+
     Attributes
     ----------
     method : str
@@ -106,7 +108,7 @@ def evaluate_method(
     Raises
     ------
     CasesError
-        If the list or an image cannot be read, or the two images of a case differ in size.
+        If the list or an image cannot be read, or the images of a case differ in size.
     ParameterError
         If there is no such method, or the number of workers cannot be used.
     OutputError

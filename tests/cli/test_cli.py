@@ -295,6 +295,41 @@ def test_evaluate_along_a_run(cli, cases: Path, tmp_path: Path):
     assert (tmp_path / "drawn.along.png").exists()
 
 
+def test_evaluate_names_the_truth_that_counts(cli, cases: Path, tmp_path: Path):
+    """A column of every table and a key of every row; no column where no case has two truths."""
+    assert "truth" not in cli("evaluate", cases)[1]
+    listed = json.loads(cases.read_text())["cases"]
+    write_label_image(tmp_path / "one.png", (two_rooms() == 254).astype(int))
+    listed[1] |= {"rooms": "one.png", "rooms_other": listed[1]["rooms"]}
+    cases.write_text(json.dumps({"cases": listed}))
+    code, out, _ = cli("evaluate", cases, "--json", tmp_path / "f.json")
+    assert code == 0
+    assert "truth" in out
+    lines = {line.split()[0]: line.rstrip() for line in out.splitlines() if line.strip()}
+    assert lines["half"].endswith(" rooms")
+    assert lines["flat"].endswith(" rooms_other")
+    assert [row["truth"] for row in json.loads((tmp_path / "f.json").read_text())["maps"]] == [
+        "rooms",
+        "rooms_other",
+    ]
+    code, out, _ = cli("evaluate", cases, "--along", "--json", tmp_path / "f.json")
+    assert (code, out.count(" truth")) == (0, 2)
+    figures = json.loads((tmp_path / "f.json").read_text())
+    assert [point["truth"] for point in figures["along"]["drawn"]] == ["rooms", "rooms_other"]
+    assert figures["tracks"]["drawn"]["truth"] == "rooms_other"
+    assert figures["tracks"]["drawn"]["found"]["idf1"] == 100
+
+
+def test_evaluate_says_what_is_wrong_with_a_second_truth(cli, cases: Path, tmp_path: Path):
+    """A file that is missing is one line."""
+    listed = json.loads(cases.read_text())["cases"]
+    listed[1]["rooms_other"] = "none.png"
+    cases.write_text(json.dumps({"cases": listed}))
+    code, _, err = cli("evaluate", cases)
+    assert (code, err.strip().count("\n")) == (2, 0)
+    assert "none.png: cannot be read as an image" in err
+
+
 def test_info_takes_the_parameters_that_its_messages_name(cli, tmp_path: Path):
     """A map that is larger than the limit is told with it; the limit can be set as for the other commands."""
     tight = ["--set", "reading.map_max_cells=100000"]

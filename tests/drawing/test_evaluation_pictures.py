@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
@@ -187,6 +188,38 @@ def test_pictures_and_sheets_of_pages(result: CaseResult, tmp_path: Path):
         assert one.height > (ROWS - 0.5) * two.height
         assert one.width > COLUMNS * two.width
         assert two.width == pytest.approx(3 * TILE_PX[0], abs=1)
+
+
+def test_the_truth_that_counted_is_shown_and_named(result: CaseResult, tmp_path: Path):
+    """Found as one, which is what the second truth says: its panel has one room, and all of it is right."""
+    write_label_image(tmp_path / "other.png", result.labels)
+    case = dataclasses.replace(result.case, rooms_other_path=tmp_path / "other.png")
+    scores = score(case.truth("rooms_other"), result.labels)
+    better = dataclasses.replace(result, case=case, scores=scores, truth="rooms_other")
+    shown = {}
+    for name, each in (("one truth", result), ("two truths", better)):
+        with CasePictures(tmp_path / name) as pictures:
+            pictures.add(each)
+        with Image.open(tmp_path / name / "drawn" / "flat.png") as image:
+            shown[name] = {
+                tuple(color) for color in np.unique(np.asarray(image).reshape(-1, 3), axis=0).tolist()
+            }
+    # Both legends show all marks once; only the map of the first has merged cells over a whole room.
+    assert tinted(2) in shown["one truth"]
+    assert tinted(2) not in shown["two truths"]
+
+
+def test_a_second_truth_is_named_in_the_caption(drawn):
+    """Only where there are two."""
+    cells, truth, found = drawn
+    comparison, scores = compare(truth, found), score(truth, found)
+    panels = draw_panels(cells, comparison)
+    for name, caption in (
+        (None, "truth: 2 rooms"),
+        ("rooms_other", "truth that agrees better (rooms_other): 2 rooms"),
+    ):
+        page = case_sheet(panels, comparison, scores, "group/name", name)
+        assert caption in {each.text for each in page.shapes if isinstance(each, Text)}
 
 
 def test_no_sheet_after_an_error(result: CaseResult, tmp_path: Path):

@@ -8,10 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
+from support.saved_maps import RESOLUTION_M, save_map, two_rooms
 
+from rose2_logs.config.parameters import Parameters
 from rose2_logs.drawing.image_files import write_label_image
 from rose2_logs.errors import CasesError, OutputError
-from rose2_logs.evaluation.cases import load_cases
+from rose2_logs.evaluation.benchmark import evaluate_case, figures
+from rose2_logs.evaluation.cases import Case, load_cases
 
 
 @pytest.fixture
@@ -77,6 +80,68 @@ def test_an_image_that_is_missing_is_named(cases_file: Path):
     (cases_file.parent / "map.png").unlink()
     with pytest.raises(CasesError, match=r"map\.png"):
         load_cases(cases_file)[0].snapshot()
+
+
+def with_other(cases_file: Path, other: object) -> Case:
+    """The first case of a file, with a second truth."""
+    listed = json.loads(cases_file.read_text())["cases"]
+    listed[0]["rooms_other"] = other
+    cases_file.write_text(json.dumps({"cases": listed}))
+    return load_cases(cases_file)[0]
+
+
+def test_a_case_may_have_a_second_truth(cases_file: Path):
+    """Both are read, the first one first; a case without one has only the first."""
+    second = np.array([[0, 7, 0], [0, 0, 0]])
+    write_label_image(cases_file.parent / "other.png", second)
+    case = with_other(cases_file, "other.png")
+    assert list(case.truths()) == ["rooms", "rooms_other"]
+    assert case.truth("rooms_other").tolist() == case.truths()["rooms_other"].tolist() == second.tolist()
+    assert case.truth().tolist() == [[300, 0, 0], [0, 0, 2]]
+    assert list(load_cases(cases_file)[1].truths()) == ["rooms"]
+    assert list(with_other(cases_file, None).truths()) == ["rooms"]
+
+
+@pytest.mark.parametrize(
+    ("drawn", "message"),
+    [
+        (None, r"other\.png: cannot be read as an image"),
+        (np.ones((3, 3), int), r"other\.png: of shape \(3, 3\), but .*rooms\.png is \(2, 3\)"),
+        (np.ones((2, 3, 3), np.uint8), r"other\.png: the rooms must be a single-channel label image"),
+    ],
+)
+def test_a_bad_second_truth_is_one_clear_line(cases_file: Path, drawn: np.ndarray | None, message: str):
+    """A file that is missing, of another size, or in color."""
+    if drawn is not None:
+        Image.fromarray(drawn.astype(np.uint8)).save(cases_file.parent / "other.png")
+    with pytest.raises(CasesError, match=message) as caught:
+        evaluate_case(with_other(cases_file, "other.png"), "rose2", Parameters())
+    assert "\n" not in str(caught.value)
+
+
+def test_a_second_truth_that_is_no_path_is_one_clear_line(cases_file: Path):
+    """The case is named, and what it may hold."""
+    with pytest.raises(CasesError, match=r"case 0 needs .* may have rooms_other") as caught:
+        with_other(cases_file, 3)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("found_is", ["rooms", "rooms_other"])
+def test_the_truth_that_agrees_better_counts(tmp_path: Path, found_is: str):
+    """One drawing has the two rooms, the other says that they are one: the first fits what is found."""
+    save_map(tmp_path, "flat", two_rooms())
+    free = two_rooms() == 254
+    drawings = {"two": np.where(free, 1 + (np.arange(240) >= 117)[None], 0), "one": free.astype(int)}
+    for name, labels in drawings.items():
+        write_label_image(tmp_path / f"{name}.png", labels)
+    other = "rooms_other" if found_is == "rooms" else "rooms"
+    paths = {found_is: tmp_path / "two.png", other: tmp_path / "one.png"}
+    case = Case("g", "n", tmp_path / "flat.png", paths["rooms"], RESOLUTION_M, None, paths["rooms_other"])
+    result = evaluate_case(case, "rose2", Parameters())
+    assert (result.truth, result.scores.rooms_gt) == (found_is, 2)
+    assert result.scores.iou_sym > 90
+    (row,) = figures([result])["maps"]
+    assert (row["truth"], row["rooms_gt"]) == (found_is, 2)
 
 
 def test_label_images_are_8_bit_where_they_can_be(tmp_path: Path):

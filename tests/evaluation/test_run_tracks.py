@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,7 @@ from rose2_logs.drawing.image_files import write_label_image
 from rose2_logs.evaluation.benchmark import CaseResult
 from rose2_logs.evaluation.cases import Case, load_cases
 from rose2_logs.evaluation.run_tracks import RunTracks, placed, run_tracks_as_json
-from rose2_logs.evaluation.scores import score
+from rose2_logs.evaluation.scores import score, score_against
 from rose2_logs.evaluation.tracks import TruthLinker
 from rose2_logs.model.occupancy import GridGeometry
 
@@ -75,14 +76,18 @@ def test_a_canvas_that_grew_is_laid_over_the_one_before(pad: tuple[int, int]):
     assert cut.geometry.origin_xy_m == pytest.approx((3.0, -2.0))
 
 
-def case_result(folder: Path, name: str, cells, truth, labels) -> CaseResult:
-    """A case as images in a folder, and rooms found in it."""
+def case_result(folder: Path, name: str, cells, truth, labels, other=None) -> CaseResult:
+    """A case as images in a folder, maybe with a second truth, and rooms found in it."""
     gray = np.select([cells == 0, cells == 100], [254, 0], 205).astype(np.uint8)
     Image.fromarray(np.flipud(gray)).save(folder / f"{name}.png")
     write_label_image(folder / f"{name}.rooms.png", np.flipud(truth))
     case = Case("run", name, folder / f"{name}.png", folder / f"{name}.rooms.png", 0.05)
+    if other is not None:
+        write_label_image(folder / f"{name}.other.png", np.flipud(other))
+        case = dataclasses.replace(case, rooms_other_path=folder / f"{name}.other.png")
     found = np.flipud(labels).astype(np.int32)
-    return CaseResult(case, found, score(case.truth(), found), 1.0, 0.0)
+    name, scores = score_against(case.truths(), found)
+    return CaseResult(case, found, scores, 1.0, 0.0, name)
 
 
 def test_a_run_is_scored_over_growing_canvases_without_origins(tmp_path: Path):
@@ -102,6 +107,30 @@ def test_a_run_is_scored_over_growing_canvases_without_origins(tmp_path: Path):
     assert scores.back_projected.idf1 == 100  # the last map has the missed room
     assert scores.back_projected_iou_sym == pytest.approx(100)
     assert run_tracks_as_json({"run": scores})["run"]["found"]["idf1"] == scores.found.idf1
+
+
+@pytest.mark.parametrize("are_three", [True, False])
+def test_one_drawing_of_the_rooms_counts_for_the_tracks_of_a_whole_run(tmp_path: Path, are_three: bool):
+    """The three rooms may be one, on all maps but the first: what was found decides once, not map by map."""
+    cells, three = office()
+    one = np.minimum(three, 1)
+    tracks = RunTracks(Parameters())
+    often, once = (three, one) if are_three else (one, three)
+    for number in range(5):
+        other = None if number == 0 else one
+        tracks.add(case_result(tmp_path, f"m{number}", cells, three, once if number == 2 else often, other))
+    scores = tracks.scores()["run"]
+    assert scores.truth == run_tracks_as_json({"run": scores})["run"]["truth"]
+    if are_three:
+        assert scores.truth == "rooms"
+        assert scores.found.idf1 == pytest.approx(100 * 2 * 12 / (15 + 13))
+        assert scores.back_projected_iou_sym == pytest.approx(100)
+    else:
+        # The first map is drawn in one way only: a third of the one room that is found there, three times.
+        assert scores.truth == "rooms_other"
+        assert scores.found.idf1_bound == pytest.approx(100 * 2 * 3 / (7 + 7))
+        assert scores.back_projected_iou_sym == pytest.approx(100 * (1 / 3 + 4) / 5, abs=0.5)
+    assert scores.found.true_tracks == 3
 
 
 @pytest.mark.skipif(not BENCHMARK.exists(), reason="the benchmark is not beside the project")

@@ -15,10 +15,12 @@ from finished_runs import SAMPLE_LOGS, run_of
 from saved_maps import save_run
 
 from rose2_logs.errors import ParameterError, ResultsError
-from rose2_logs.runs.stored_run import FINAL_KEYS, SUMMARY_KEYS, StoredRun, find_results
+from rose2_logs.runs.stored_run import SINCE, SINCE_KEYS, SUMMARY_KEYS, StoredRun, find_results
 from rose2_logs.runs.table_schemas import SCHEMAS
 from rose2_logs.runs.tables import TABLES, pack_image
 from rose2_logs.workflows.figure import export_plan
+
+KEYS_OF_SINCE = [f"{since}.{key}" for since in SINCE for key in SINCE_KEYS]
 
 
 def saved_maps_run(folder: Path) -> Path:
@@ -120,7 +122,7 @@ def whole_summary(folder: Path) -> dict:
 
 
 @pytest.mark.parametrize("wrong", [None, "damaged"], ids=["missing", "of another type"])
-@pytest.mark.parametrize("key", [key for key in (*SUMMARY_KEYS, *FINAL_KEYS) if "." in key])
+@pytest.mark.parametrize("key", [key for key in (*SUMMARY_KEYS, *KEYS_OF_SINCE) if "." in key])
 def test_what_is_read_from_a_summary_is_required_when_it_is_opened(copied: Path, key: str, wrong: object):
     """Not only when a run is shown, or its report is written."""
     summary = whole_summary(copied)

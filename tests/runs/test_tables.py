@@ -150,6 +150,7 @@ def test_snapshots_are_compared_with_the_last_one(tmp_path: Path):
     table = write(tmp_path)["snapshots"]
     assert [row["final_iou"] for row in table] == [1.0, 0.5, 1.0]
     assert [row["final_share"] for row in table] == [1.0, 0.5, 1.0]
+    assert [row["known_final_share"] for row in table] == [1.0, 1.0, 1.0]
     assert [row["variation_bits"] for row in table] == [None] * 3
 
 

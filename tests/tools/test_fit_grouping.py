@@ -217,6 +217,84 @@ def test_simulated_maps_are_the_same_for_the_same_seed(seed):
         assert set(np.unique(truth[truth > 0])) == set(range(1, truth.max() + 1))
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_villas_are_grown_in_one_piece(seed):
+    """Every room of a villa is connected and touches the rest of the house."""
+    from fit_grouping.buildings.villas import villa
+    from scipy.ndimage import label
+
+    plan = villa(np.random.default_rng(seed))
+    plan.tidy()
+    numbers = np.unique(plan.rooms[plan.rooms > 0]).tolist()
+    assert len(numbers) >= 3
+    assert plan.public <= set(numbers)
+    assert plan.public
+    for number in numbers:
+        assert label(plan.rooms == number)[1] == 1
+    assert label(plan.rooms > 0, np.ones((3, 3)))[1] == 1
+
+
+@pytest.fixture
+def slanting_rooms():
+    """Two rooms on one side each of a line at 35 degrees through a square of 8 m."""
+    y, x = np.mgrid[:200, :200]
+    angle = np.deg2rad(35)
+    beyond = np.sin(angle) * (x - 100) - np.cos(angle) * (y - 100) > 0
+    rooms = np.where(beyond, 2, 1).astype(np.int32)
+    rooms[:20] = rooms[-20:] = 0
+    rooms[:, :20] = rooms[:, -20:] = 0
+    return rooms, angle
+
+
+def test_slanting_borders_are_followed(slanting_rooms):
+    from fit_grouping.buildings.walls import border_runs, straight_stretch
+
+    rooms, angle = slanting_rooms
+    stretch = straight_stretch(np.random.default_rng(0), border_runs(rooms)[1, 2])
+    across = np.cos(angle) * stretch.direction[1] - np.sin(angle) * stretch.direction[0]
+    assert abs(across) < 0.06
+    assert 160 < stretch.length < 200
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_rooms_beside_a_slanting_wall_are_joined_by_an_opening(seed, slanting_rooms):
+    from fit_grouping.buildings.plans import Plan
+    from fit_grouping.buildings.walls import build_walls
+    from scipy.ndimage import label
+
+    rooms, _ = slanting_rooms
+    walled = build_walls(np.random.default_rng(seed), Plan("villa", rooms, public={1, 2}))
+    pieces = label((walled.walls == 0) & (rooms > 0))[0]
+    largest = np.argmax(np.bincount(pieces.ravel())[1:]) + 1
+    assert set(np.unique(rooms[pieces == largest])) == {1, 2}
+    assert walled.neighbors[1] == [2] * len(walled.neighbors[1])
+
+
+@pytest.mark.parametrize(("low", "high", "parted"), [(20, 120, False), (50, 90, True)])
+def test_a_change_of_width_parts_rooms_without_jambs(low, high, parted):
+    from fit_grouping.buildings.walls import border_runs, only_taste_parts, straight_stretch
+
+    rooms = np.zeros((140, 200), np.int32)
+    rooms[20:120, 20:100] = 1
+    rooms[low:high, 100:180] = 2
+    stretch = straight_stretch(np.random.default_rng(0), border_runs(rooms)[1, 2])
+    assert only_taste_parts(rooms, stretch) != parted
+
+
+@pytest.mark.parametrize("angle", [0.3, 0.785, 1.2])
+def test_slanting_rooms_are_furnished_in_their_own_frame(angle):
+    from fit_grouping.buildings.furniture import room_frame
+
+    y, x = np.mgrid[:220, :220] - 110
+    along, across = np.cos(angle) * x + np.sin(angle) * y, np.cos(angle) * y - np.sin(angle) * x
+    inside = (np.abs(along) < 90) & (np.abs(across) < 45)
+    frame = room_frame(inside)
+    assert sorted(frame.shape) == pytest.approx([90, 180], abs=4)
+    back = frame.back(np.ones(frame.shape, np.uint8), inside.shape) > 0
+    assert np.count_nonzero(back & inside) > 0.97 * np.count_nonzero(inside | back)
+    assert room_frame(np.ones((40, 60), bool)) is None
+
+
 def test_simulated_maps_come_back_from_their_file(tmp_path):
     from fit_grouping.buildings.make_buildings import read_maps, simulate, write_maps
 

@@ -96,11 +96,12 @@ def tracked(*labels: np.ndarray) -> tuple[TrackHistories, list[RoomRows], dict[i
     return histories, all_rows, snapshot_refs
 
 
-def measured(*labels: np.ndarray) -> tuple[TrackHistories, Convergence]:
+def measured(
+    *labels: np.ndarray, parameters: TrackingParameters | None = None
+) -> tuple[TrackHistories, Convergence]:
     histories, all_rows, snapshot_refs = tracked(*labels)
-    return histories, measure_convergence(
-        all_rows, histories, snapshot_refs, dict.fromkeys(snapshot_refs, RigidMotion.none())
-    )
+    still = dict.fromkeys(snapshot_refs, RigidMotion.none())
+    return histories, measure_convergence(all_rows, histories, snapshot_refs, still, parameters)
 
 
 GROWING = (
@@ -157,9 +158,105 @@ def test_how_far_a_layout_was_the_last_one():
     """Weighted by the last rooms' area; final from the first map after which it stays so."""
     _, found = measured(*GROWING)
     assert found.final_iou == pytest.approx({0: 0.4, 1: 0.7, 2: 1.0, 3: 0.9, 4: 1.0})
-    assert found.final_share == pytest.approx({0: 0.0, 1: 0.0, 2: 1.0, 3: 0.9, 4: 1.0})
+    assert found.final_share == pytest.approx({0: 0.0, 1: 0.9, 2: 1.0, 3: 0.9, 4: 1.0})
+    assert found.layout_final is not None
+    assert found.layout_final.snapshot == 1
+
+
+FRONTIER = (
+    rows("1111......"),
+    rows("11112222.."),
+    rows("11112222.3"),
+    rows("111122223."),
+    rows("1111222233"),
+)
+"""Two rooms that are right from the second map on, and one at the frontier that moves to the end."""
+
+
+def test_a_room_at_the_frontier_does_not_undo_the_layout():
+    """It is a fifth of the floor, and wrong up to the last map; the rest was as in the end long before."""
+    _, found = measured(*FRONTIER)
+    assert found.final_share == pytest.approx({0: 0.4, 1: 0.8, 2: 0.8, 3: 0.8, 4: 1.0})
+    assert found.layout_final is not None
+    assert found.layout_final.snapshot == 1
+    none_may_change = TrackingParameters(final_min_share=0.81)
+    _, strict = measured(*FRONTIER, parameters=none_may_change)
+    assert strict.layout_final is not None
+    assert strict.layout_final.snapshot == 4
+
+
+def test_what_was_not_seen_yet_does_not_count_against_what_was_known():
+    """Rooms come to light one after the other: each is right as soon as it is seen, the layout late."""
+    _, found = measured(rows("11........"), rows("1111......"), rows("11112222.."), rows("1111222233"))
+    assert found.known_final_share == pytest.approx({0: 1.0, 1: 1.0, 2: 1.0, 3: 1.0})
+    assert found.known_final is not None
+    assert found.known_final.snapshot == 0
     assert found.layout_final is not None
     assert found.layout_final.snapshot == 2
+
+
+def test_two_rooms_in_one_are_not_known_yet():
+    """Rooms of 4 and 4 that are one at first; one of 1 at its edge would not be missed."""
+    halves, whole = rows("11112222"), rows("11111111")
+    _, found = measured(whole, halves)
+    assert found.known_final_share == {0: 0.0, 1: 1.0}
+    _, found = measured(rows("111111111"), rows("111111112"))
+    assert found.known_final_share == pytest.approx({0: 8 / 9, 1: 1.0})
+    assert found.final_iou[0] == pytest.approx((8 / 9 * 8 + 1 / 9) / 9)
+
+
+def test_a_room_counts_from_the_overlap_that_is_asked():
+    """Seven tenths of a room are the room; with more asked they are not."""
+    short, full = rows("1111111..."), rows("1111111111")
+    for least, share in ((0.7, 1.0), (0.71, 0.0)):
+        _, found = measured(short, full, parameters=TrackingParameters(final_room_min_iou=least))
+        assert found.final_share == {0: share, 1: 1.0}
+
+
+def test_a_layout_is_final_whatever_the_numbers_of_its_rooms():
+    """The rooms lie as in the end, though a track ended and another began in its place."""
+    histories, all_rows, snapshot_refs = tracked(rows("1122"), rows("1122"))
+    all_rows[0] = dataclasses.replace(all_rows[0], track=np.array([1, 3]))
+    histories.tracks[3] = dataclasses.replace(histories.tracks[2])
+    found = measure_convergence(
+        all_rows, histories, snapshot_refs, dict.fromkeys(snapshot_refs, RigidMotion.none())
+    )
+    assert found.final_share == {0: 1.0, 1: 1.0}
+    assert found.layout_final == snapshot_refs[0]
+
+
+def test_a_map_without_rooms_ends_a_final_layout():
+    """Nothing was known of it then, and the layout has to be found again."""
+    _, found = measured(rows("11"), rows(".."), rows("11"))
+    assert found.final_share == {0: 1.0, 1: 0.0, 2: 1.0}
+    assert found.known_final_share == {0: 1.0, 1: None, 2: 1.0}
+    for since in (found.layout_final, found.known_final):
+        assert since is not None
+        assert since.snapshot == 2
+
+
+def test_rows_of_a_map_may_come_in_pieces():
+    """However the rows are read, a map is compared as a whole."""
+    histories, all_rows, snapshot_refs = tracked(*FRONTIER)
+    still = dict.fromkeys(snapshot_refs, RigidMotion.none())
+    whole = measure_convergence(all_rows, histories, snapshot_refs, still)
+    joined = RoomRows.joined(all_rows)
+    for size in (1, 2, 5, len(joined.track)):
+        pieces = [joined.part(begin, begin + size) for begin in range(0, len(joined.track), size)]
+        assert measure_convergence(pieces, histories, snapshot_refs, still) == whole
+
+
+def test_tracks_that_few_maps_show_are_brief():
+    """Two maps are few, three are not; a room that the last map shows may be a room that was found late."""
+    two, three = rows("11.22...."), rows("11.22.33.")
+    gone, late = rows("11....22."), rows("11....22.33")
+    histories, found = measured(two, two, three, gone, late)
+    assert {track: history.maps for track, history in histories.tracks.items()} == {1: 5, 2: 3, 3: 3, 4: 1}
+    assert found.brief == ()
+    _, found = measured(two, three, gone, late)
+    assert found.brief == (2,)
+    _, found = measured(two, three, gone, late, parameters=TrackingParameters(lasting_min_maps=2))
+    assert found.brief == ()
 
 
 def test_a_last_map_without_rooms_has_no_layout():

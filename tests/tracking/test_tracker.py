@@ -132,6 +132,17 @@ def test_a_merge_that_is_taken_back_restores_both_numbers():
     assert events[2] == [("continued", 2, ()), ("returned", 1, ()), ("split", 2, (1,))]
 
 
+def test_a_room_that_is_split_and_merged_back_has_its_old_number_throughout():
+    """The part that comes and goes has one number, too, whatever the map shows in between."""
+    one, two, other = rows("111111..."), rows("111122..."), rows("111111.22")
+    ids, events = run(one, two, one, other, two)
+    assert ids == [(1,), (1, 2), (1,), (1, 3), (1, 2)]
+    assert events[1] == [("continued", 1, ()), ("born", 2, ()), ("split", 1, (2,))]
+    assert events[2] == [("continued", 1, ()), ("merged", 1, (2,)), ("lost", 2, ())]
+    assert ("returned", 2, ()) in events[4]
+    assert ("split", 1, (2,)) in events[4]
+
+
 def test_numbers_are_never_used_again():
     """A room at another place gets a new number, though the old one is lost."""
     ids, _ = run(rows("11......"), rows("........"), rows("......11"))

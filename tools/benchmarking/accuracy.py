@@ -136,7 +136,7 @@ def measure_accuracy(options: AccuracyOptions) -> Accuracy:
         for ablation in ablations
         if ablation.method in options.methods
     ]
-    say = _Progress(len(cases))
+    say = Progress(len(cases))
     results = {
         method: tuple(_evaluated(cases, method, parameters, options, say)) for method in options.methods
     }
@@ -178,7 +178,7 @@ def load_all_cases(paths: Sequence[Path]) -> tuple[Case, ...]:
 
 
 def _evaluated(
-    cases: Sequence[Case], method: str, parameters: Parameters, options: AccuracyOptions, say: _Progress
+    cases: Sequence[Case], method: str, parameters: Parameters, options: AccuracyOptions, say: Progress
 ) -> Iterator[CaseResult]:
     say.start(f"figures of {method}", len(cases))
     drawn = "pictures" not in options.skip
@@ -193,7 +193,7 @@ def _given(path: Path | None) -> tuple[Path, ...]:
     return () if path is None else (path,)
 
 
-class _Progress:
+class Progress:
     """A line on stderr for each step, with how far it is where that is a terminal."""
 
     def __init__(self, count: int) -> None:
@@ -201,10 +201,12 @@ class _Progress:
         self._write: Callable[[str], int] = sys.stderr.write
 
     def start(self, step: str, count: int | None = None) -> None:
+        """Begin a step of so many items, by default of as many as the one before."""
         self._count = count or self._count
         self._write(f"{time.monotonic() - self._began:6.0f} s  {step}\n")
 
     def each(self, items: Iterator[Item]) -> Iterator[Item]:
+        """Hand on the items of the step, and count them."""
         for number, item in enumerate(items, start=1):
             if sys.stderr.isatty():
                 self._write(

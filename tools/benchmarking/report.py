@@ -10,6 +10,7 @@ import numpy as np
 
 from benchmarking.accuracy import Accuracy
 from benchmarking.markdown import bold, difference, figures_of, percent, rooms_of, table
+from benchmarking.robustness import robustness_table
 from benchmarking.transforms import TRANSFORMS
 from rose2_logs.drawing.chart import Curve, line_chart
 from rose2_logs.drawing.sheet import stacked
@@ -23,7 +24,8 @@ EXPLAINED = """\
 Percent, means over maps. The partner of a room is the room on the other side that it overlaps most.
 `precision` and `recall`: overlap over own size, mean over found and over true rooms. `iou_seg`: intersection
 over union with the partner, mean over found rooms, which forgives merged rooms; `iou_gt`: the same over true
-rooms, which punishes them; `iou_sym`: their mean. `pq`: panoptic quality. Rooms: found over true ones."""
+rooms, which punishes them; `iou_sym`: their mean. `pq`: panoptic quality. Rooms: found over true ones. Truth:
+which of the true rooms counts where a map has two."""
 
 
 def write_report(accuracy: Accuracy, folder: Path) -> Path:
@@ -98,8 +100,8 @@ def _maps(accuracy: Accuracy, group: str, folder: Path) -> list[str]:
             name = result.case.name
             picture = Path("pictures") / method / group / f"{name}.png"
             label = f"[{name}]({quote(picture.as_posix())})" if (folder / picture).exists() else name
-            rows.append([label, *figures_of(result.scores, FIGURES), rooms_of(result.scores)])
-        lines += [f"### {group}: each map, {method}", "", *table(["map", *FIGURES, "rooms"], rows)]
+            rows.append([label, *figures_of(result.scores, FIGURES), rooms_of(result.scores), result.truth])
+        lines += [f"### {group}: each map, {method}", "", *table(["map", *FIGURES, "rooms", "truth"], rows)]
     return lines
 
 
@@ -201,17 +203,7 @@ def _robustness(accuracy: Accuracy) -> list[str]:
         "",
     ]
     for method, rows in accuracy.robustness.items():
-        groups = dict.fromkeys(row.group for row in rows)
-        cells = []
-        for group in groups:
-            members = [row for row in rows if row.group == group]
-            line = [f"{group} ({len(members)})"]
-            for transform in TRANSFORMS:
-                values = [row.iou_sym[transform.name] for row in members]
-                line.append(f"{np.mean(values):.1f} / {min(values):.1f}")
-            cells.append(line)
-        head = ["group (maps)", *(transform.name for transform in TRANSFORMS)]
-        lines += [f"### {method}: mean / worst", "", *table(head, cells)]
+        lines += [f"### {method}: mean / worst", "", *robustness_table(rows)]
     return lines
 
 

@@ -10,6 +10,7 @@ from typing import Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarking.markdown import table
 from benchmarking.transforms import TRANSFORMS
 from rose2_logs.config.parameters import Parameters
 from rose2_logs.evaluation.cases import Case
@@ -74,6 +75,19 @@ def robustness_of(case: Case, method: str, parameters: Parameters) -> Robustness
         changed, expected = transform(snapshot, labels)
         agreement[transform.name] = agreement_of(expected, analyze(changed, parameters, method).rooms.labels)
     return Robustness(case.group, case.name, agreement)
+
+
+def robustness_table(rows: Sequence[Robustness]) -> list[str]:
+    """Return the lines of a table: mean and worst of each group under each transform."""
+    cells = []
+    for group in dict.fromkeys(row.group for row in rows):
+        members = [row for row in rows if row.group == group]
+        line = [f"{group} ({len(members)})"]
+        for transform in TRANSFORMS:
+            values = [row.iou_sym[transform.name] for row in members]
+            line.append(f"{np.mean(values):.1f} / {min(values):.1f}")
+        cells.append(line)
+    return table(["group (maps)", *(transform.name for transform in TRANSFORMS)], cells)
 
 
 def agreement_of(expected: NDArray[np.integer], found: NDArray[np.integer]) -> float:

@@ -5,36 +5,26 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from benchmarking.bootstrap import bootstrap_interval
 from numpy.typing import NDArray
 
-from fit_grouping.preparing import PreparedMap
+from fit_grouping.maps_with_truth import TruthMap
 
 FloatArray = NDArray[np.float64]
 
-DRAWS = 2000
-"""Bootstrap draws of buildings."""
-INTERVAL = (2.5, 97.5)
-"""Percentiles of an interval."""
 
-
-def building_means(maps: Sequence[PreparedMap], scores: FloatArray) -> dict[str, float]:
+def building_means(maps: Sequence[TruthMap], scores: FloatArray) -> dict[str, float]:
     """Mean score of each building."""
     buildings = np.array([one.building for one in maps])
     return {name: float(scores[buildings == name].mean()) for name in dict.fromkeys(buildings.tolist())}
 
 
-def interval(maps: Sequence[PreparedMap], scores: FloatArray, seed: int = 0) -> tuple[float, float]:
+def interval(maps: Sequence[TruthMap], scores: FloatArray, seed: int = 0) -> tuple[float, float]:
     """Range of the mean over maps when buildings are drawn again and again, with return."""
-    buildings = np.array([one.building for one in maps])
-    names = np.unique(buildings)
-    sums = np.array([scores[buildings == name].sum() for name in names])
-    counts = np.array([np.count_nonzero(buildings == name) for name in names])
-    drawn = np.random.default_rng(seed).integers(0, len(names), (DRAWS, len(names)))
-    low, high = np.percentile(sums[drawn].sum(1) / counts[drawn].sum(1), INTERVAL)
-    return float(low), float(high)
+    return bootstrap_interval([one.building for one in maps], scores, seed=seed)
 
 
-def figures_table(maps: Sequence[PreparedMap], rows: dict[str, FloatArray]) -> str:
+def figures_table(maps: Sequence[TruthMap], rows: dict[str, FloatArray]) -> str:
     """Markdown table of the means of groups; below, the intervals of the last row.
 
     Parameters

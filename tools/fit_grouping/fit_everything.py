@@ -1,15 +1,17 @@
 """Remakes all that is fitted, step by step; a step whose file exists is not made again.
 
     python tools/fit_grouping/fit_everything.py WORK --cases CASES [--buildings 5000] [--tree-buildings 800]
-        [--network-seconds 7200] [--fold-seconds 3600] [--trees 250] [--seed 0]
+        [--network-seconds 7200] [--fold-seconds 3600] [--trees 250] [--seeds 3]
 
-WORK holds the simulated maps, checkpoints, answers and samples, and in the end `borders.onnx`, `joins.npz`,
-`outside.npz` (fitted on all maps), and `figures.md` (with the building left out).
+WORK holds simulated maps, checkpoints, prepared maps, and for each seed folders `seedS/foldK` with what
+was fitted without the buildings of fold K. `seed0/all` holds what was fitted on all maps, and its
+`manifest.json`: that is what the package ships.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -21,36 +23,28 @@ from numpy.typing import NDArray
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from fit_grouping.figures import figures_table
-from fit_grouping.fit_tree import (
-    Example,
-    TreeParameters,
-    columns_of,
-    examples_of,
-    fit_trees,
-    gather,
-    left_out_scores,
-    scores_at,
-)
+from fit_grouping.fit_tree import Example, TreeParameters, columns_of, examples_of, fit_trees, gather
 from fit_grouping.keeping import kept
 from fit_grouping.maps_with_truth import FOLDS, load_benchmark
 from fit_grouping.outside import fit_outside
 from fit_grouping.preparing import PreparedMap, answered, prepared_benchmark, prepared_simulated
 from fit_grouping.sampling import Samples, by_hand
-from fit_grouping.scores import best_iou_sym
 from fit_grouping.tree_files import write_trees
 from rose2_logs.config.parameters import RegionParameters
 from rose2_logs.segmentation.regions.features import REGION_FEATURES, SHAPE_FEATURES
-from rose2_logs.segmentation.regions.joining import Strength, join_regions
-from rose2_logs.segmentation.regions.outside import rooms_of
+from rose2_logs.segmentation.regions.fitted import JOINS, MANIFEST, NETWORK, OUTSIDE, sha256_of
+from rose2_logs.segmentation.regions.joining import join_regions
 from rose2_logs.segmentation.regions.strengths import BoostedTrees, JoinStrength
 
 HERE = Path(__file__).parent
 MAPS_PER_FILE = 400
 SIMULATED_WEIGHT = 0.15
 """Weight of a simulated map in the fit of the trees, beside 1 for a real building of one map."""
+REAL_SHARE = 0.5
+"""Share of the crops that come from real maps when a network goes on from simulated ones."""
+ALL = -2
+"""Instead of the number of a fold: no map is in it, so that nothing is left out."""
 REGIONS = RegionParameters()
-LEVELS = tuple(np.arange(-1.5, 1.51, 0.5).tolist())
 
 
 def run_tool(script: str, *arguments: object) -> None:
@@ -58,9 +52,9 @@ def run_tool(script: str, *arguments: object) -> None:
     subprocess.run([sys.executable, str(HERE / script), *map(str, arguments)], check=True)
 
 
-def make_buildings(work: Path, count: int, tree_count: int, seed: int) -> None:
+def make_buildings(work: Path, count: int, tree_count: int) -> None:
     """Simulated maps for the network, and others for the trees: those are fitted on its answers for them."""
-    first = seed * 1_000_000 + 1
+    first = 1
     for folder, wanted in (("buildings", count), ("tree_buildings", tree_count)):
         for number, done in enumerate(range(0, wanted, MAPS_PER_FILE)):
             maps = min(MAPS_PER_FILE, wanted - done)
@@ -70,24 +64,21 @@ def make_buildings(work: Path, count: int, tree_count: int, seed: int) -> None:
             first += maps
 
 
-def train_networks(work: Path, cases: Path, seconds: float, fold_seconds: float, seed: int) -> None:
-    """One network on simulated maps, from it one for each fold left out, and one on all maps."""
+def network_file(work: Path, seed: int, fold: int) -> Path:
+    """Network of a seed that did not see a fold."""
+    return work / f"networks/seed{seed}_{'all' if fold == ALL else f'fold{fold}'}"
+
+
+def train_networks(work: Path, cases: Path, seconds: float, fold_seconds: float, seeds: int) -> None:
+    """One network on simulated maps, and from it for each seed one for each fold left out, and one on all."""
     common = ("--simulated", work / "buildings", "--keep", work / "rasters")
     base = work / "networks/simulated"
-    run_tool("train_network.py", base, *common, "--seconds", seconds, "--seed", seed)
-    real = (
-        "--cases",
-        cases,
-        "--real-share",
-        0.5,
-        "--start",
-        base.with_suffix(".pt"),
-        "--seconds",
-        fold_seconds,
-    )
-    for fold in (*range(FOLDS), -2):  # no map is in fold -2: it leaves out nothing
-        out = work / f"networks/{f'fold{fold}' if fold >= 0 else 'all'}"
-        run_tool("train_network.py", out, *common, *real, "--leave-out", fold, "--seed", seed)
+    run_tool("train_network.py", base, *common, "--seconds", seconds)
+    real = ("--cases", cases, "--real-share", REAL_SHARE, "--start", base.with_suffix(".pt"))
+    for seed in range(seeds):
+        for fold in (*range(FOLDS), *([ALL] if seed == 0 else [])):
+            options = ("--seconds", fold_seconds, "--leave-out", fold, "--seed", seed)
+            run_tool("train_network.py", network_file(work, seed, fold), *common, *real, *options)
 
 
 def samples_of(examples: Sequence[Example], parameters: TreeParameters, seed: int) -> list[list[Samples]]:
@@ -106,24 +97,51 @@ def fit_on(parts: Sequence[Sequence[Samples]], parameters: TreeParameters, seed:
     return fit_trees(samples, columns_of(SHAPE_FEATURES), parameters, seed)
 
 
-def summed(trees: BoostedTrees) -> JoinStrength:
-    """The strength as the package uses it."""
-    return JoinStrength(trees, REGIONS.answer_weight, REGIONS.answer_scale)
+def regions_of(examples: Sequence[Example], trees: BoostedTrees) -> list[NDArray[np.int64]]:
+    """Region of each atom of each map, joined as the package does."""
+    strength = JoinStrength(trees, REGIONS.answer_weight, REGIONS.answer_scale)
+    return [join_regions(e.graph, strength, REGIONS.detail).regions(REGIONS.detail) for e in examples]
 
 
-def room_of_atoms(example: Example, region: NDArray[np.int64], rule: BoostedTrees) -> NDArray[np.int64]:
-    """Room 1.. of each atom, 0 for what is outside or too small."""
-    regions, _ = example.graph.joined(region)
-    return rooms_of(regions, rule, REGIONS)[0][region]
+def fit_seed(
+    work: Path,
+    maps: list[PreparedMap],
+    simulated: list[PreparedMap],
+    parameters: TreeParameters,
+    seed: int,
+) -> None:
+    """Fit the trees and the rule for outside of a seed, for each fold and on all maps."""
+    networks = {fold: network_file(work, seed, fold).with_suffix(".onnx") for fold in range(FOLDS)}
+    everything = network_file(work, 0, ALL).with_suffix(".onnx")
+    answers = kept(work / f"answers/seed{seed}.pkl", lambda: answered(maps, networks))
+    made_answers = kept(work / "answers/simulated.pkl", lambda: answered(simulated, {-1: everything}))
+    real = examples_of(maps, answers)
+    made = examples_of(simulated, made_answers, SIMULATED_WEIGHT)
+    parts = kept(work / f"samples/seed{seed}.pkl", lambda: samples_of(real, parameters, seed))
+    made_parts = kept(work / f"samples/simulated{seed}.pkl", lambda: samples_of(made, parameters, seed))
+    for fold in (*range(FOLDS), *([ALL] if seed == 0 else [])):
+        folder = work / f"seed{seed}/{'all' if fold == ALL else f'fold{fold}'}"
+        if (folder / NETWORK).exists():
+            continue
+        seen = [k for k, one in enumerate(maps) if one.fold != fold]
+        trees = fit_on([parts[k] for k in seen] + made_parts, parameters, seed)
+        write_trees(folder / JOINS, trees)
+        examples = [real[k] for k in seen] + made
+        rule = fit_outside(examples, regions_of(examples, trees), seed)
+        write_trees(folder / OUTSIDE, rule, REGION_FEATURES)
+        network = everything if fold == ALL else networks[fold]
+        (folder / NETWORK).write_bytes(network.read_bytes())
 
 
-def regions_of(examples: Sequence[Example], strength: Strength) -> list[NDArray[np.int64]]:
-    """Region of each atom of each map, joined as long as that is more likely right than wrong."""
-    return [join_regions(e.graph, strength, 0.0).regions(0.0) for e in examples]
+def write_manifest(folder: Path, facts: dict[str, object]) -> None:
+    """Name the files of a folder and how they were made."""
+    hashes = {name: sha256_of(folder / name) for name in (NETWORK, JOINS, OUTSIDE)}
+    text = json.dumps({"sha256": hashes, **facts}, indent=2)
+    (folder / MANIFEST).write_text(text + "\n", encoding="utf-8")
 
 
 def main() -> None:
-    """Make, train, fit, measure."""
+    """Make, train, fit."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("work", type=Path)
     parser.add_argument("--cases", type=Path, required=True)
@@ -132,52 +150,30 @@ def main() -> None:
     parser.add_argument("--network-seconds", type=float, default=7200.0)
     parser.add_argument("--fold-seconds", type=float, default=3600.0)
     parser.add_argument("--trees", type=int, default=250)
-    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--seeds", type=int, default=3)
     arguments = parser.parse_args()
     cv2.setNumThreads(1)
-    work, cases, seed = arguments.work, arguments.cases, arguments.seed
-    make_buildings(work, arguments.buildings, arguments.tree_buildings, seed)
-    train_networks(work, cases, arguments.network_seconds, arguments.fold_seconds, seed)
+    work, cases = arguments.work, arguments.cases
+    make_buildings(work, arguments.buildings, arguments.tree_buildings)
+    train_networks(work, cases, arguments.network_seconds, arguments.fold_seconds, arguments.seeds)
     maps = prepared_benchmark(load_benchmark(cases), work / "prepared/real.pkl")
     simulated: list[PreparedMap] = []
     for path in sorted((work / "tree_buildings").glob("*.npz")):
         simulated += prepared_simulated(path, work / f"prepared/simulated_{path.stem}.pkl")
-    networks = {fold: work / f"networks/fold{fold}.onnx" for fold in range(FOLDS)}
-    all_maps = work / "networks/all.onnx"
-    answers: list[NDArray[np.float32]] = kept(work / "answers.pkl", lambda: answered(maps, networks))
-    simulated_answers = kept(work / "tree_answers.pkl", lambda: answered(simulated, {-1: all_maps}))
     parameters = TreeParameters(trees=arguments.trees, leaves=16)
-    real = examples_of(maps, answers)
-    made = examples_of(simulated, simulated_answers, SIMULATED_WEIGHT)
-    parts = kept(work / "samples.pkl", lambda: samples_of(real, parameters, seed))
-    made_parts = kept(work / "tree_samples.pkl", lambda: samples_of(made, parameters, seed))
-    fold_of = np.array([one.fold for one in maps])
-    trees = [
-        fit_on([p for p, f in zip(parts, fold_of, strict=True) if f != fold] + made_parts, parameters, seed)
-        for fold in range(FOLDS)
-    ]
-    rows = {}
-    for name, strengths in (
-        ("network alone", [JoinStrength(None, 1.0, REGIONS.answer_scale)] * len(maps)),
-        ("trees alone", [trees[f] for f in fold_of]),
-        ("sum", [summed(trees[f]) for f in fold_of]),
-    ):
-        rows[name], _ = left_out_scores(maps, scores_at(real, strengths, LEVELS))
-    rows["sum, rule for outside"] = np.zeros(len(maps))
-    for fold in range(FOLDS):
-        regions = regions_of(real, summed(trees[fold]))
-        others = np.flatnonzero(fold_of != fold).tolist()
-        rule = fit_outside([real[k] for k in others], [regions[k] for k in others], seed)
-        for k in np.flatnonzero(fold_of == fold).tolist():
-            rooms = room_of_atoms(real[k], regions[k], rule)
-            rows["sum, rule for outside"][k] = best_iou_sym(maps[k].tables, rooms)
-    (work / "figures.md").write_text(figures_table(maps, rows) + "\n", encoding="utf-8")
-    final = fit_on(parts + made_parts, parameters, seed)
-    write_trees(work / "joins.npz", final)
-    regions = regions_of(real, summed(final))
-    write_trees(work / "outside.npz", fit_outside(real, regions, seed), REGION_FEATURES)
-    (work / "borders.onnx").write_bytes(all_maps.read_bytes())
-    print((work / "figures.md").read_text(encoding="utf-8"))
+    for seed in range(arguments.seeds):
+        fit_seed(work, maps, simulated, parameters, seed)
+    facts: dict[str, object] = {
+        "simulated maps for the network": len(list((work / "buildings").glob("*.npz")))
+        and arguments.buildings,
+        "simulated maps for the trees": len(simulated),
+        "real maps": len(maps),
+        "real buildings": len({one.building for one in maps}),
+        "folds": FOLDS,
+        "seeds": arguments.seeds,
+        "trees": arguments.trees,
+    }
+    write_manifest(work / "seed0/all", facts)
 
 
 if __name__ == "__main__":

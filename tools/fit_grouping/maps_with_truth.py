@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import re
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 
 from rose2_logs.config.parameters import OccupancyParameters
 from rose2_logs.evaluation.cases import load_cases
@@ -89,13 +87,11 @@ def building_of(group: str, name: str) -> str:
 
 def load_benchmark(cases: Path) -> list[TruthMap]:
     """Read all maps of a benchmark, with every truth that it lists."""
-    entries = json.loads(cases.read_text(encoding="utf-8"))["cases"]
     maps = []
-    for entry, case in zip(entries, load_cases(cases), strict=True):
+    for case in load_cases(cases):
         snapshot = case.snapshot()
         part = ExploredPart.of(snapshot.cells, snapshot.geometry, OccupancyParameters())
-        paths = [cases.parent / entry[key] for key in ("rooms", "rooms_other") if key in entry]
-        truths = tuple(_on_blocks(part, np.flipud(np.asarray(Image.open(path)))) for path in paths)
+        truths = tuple(_on_blocks(part, np.flipud(labels)) for labels in case.truths().values())
         maps.append(
             TruthMap(
                 case.group,

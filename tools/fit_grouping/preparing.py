@@ -57,9 +57,15 @@ def atoms_of(one: TruthMap, parameters: Parameters) -> Atoms:
     scored = find_structure(one.occupied, one.resolution_m, parameters.spectrum)
     direction = float(scored.directions_rad[0]) if len(scored.directions_rad) else 0.0
     walls = generous_walls(scored, one.resolution_m, parameters)
-    _, faces = generous_floor_plan(walls, one.free, direction, one.resolution_m, parameters)
+    plan = generous_floor_plan(walls, one.free, direction, one.resolution_m, parameters)
     return find_atoms(
-        one.free, one.occupied, scored.score, faces, direction, one.resolution_m, parameters.regions
+        one.free,
+        one.occupied,
+        scored.score,
+        plan.face_of_cell,
+        direction,
+        one.resolution_m,
+        parameters.regions,
     )
 
 

@@ -24,6 +24,8 @@ from rose2_logs.config.run_options import RunOptions
 from rose2_logs.errors import AlreadyWholeError, ParameterError, Rose2LogsError
 
 if TYPE_CHECKING:
+    from rose2_logs.runs.history import RunTotals
+    from rose2_logs.tracking.track_history import SnapshotRef
     from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot
     from rose2_logs.workflows.analyze import OnSnapshot, RunResult
 
@@ -99,18 +101,19 @@ def print_run(result: RunResult) -> None:
     left_out = f" ({totals.invalid} could not be analyzed)" if totals.invalid else ""
     table.add_row("maps", f"{totals.snapshots}{left_out}")
     table.add_row("coverage", f"{totals.coverage_first:.1%} to {totals.coverage_last:.1%}")
-    table.add_row("rooms at the end", f"{totals.rooms_last} ({totals.tracks} over the run)")
+    brief = len(result.summary.convergence.brief)
+    over_the_run = f"{totals.tracks} over the run" + (f", {brief} only briefly" if brief else "")
+    table.add_row("rooms at the end", f"{totals.rooms_last} ({over_the_run})")
     changes = ", ".join(f"{events[kind]} {kind}" for kind in ("split", "merged", "lost", "returned"))
     table.add_row("changes", changes)
     if events["shifted"]:
         table.add_row("shifts of the map", f"{events['shifted']}; see shifted in events.parquet")
-    if result.summary.layout_final is not None:
-        since = result.summary.layout_final
-        in_the_end = f"from {since.coverage:.1%} coverage on, {duration(since.time_s)}"
-        span_ns = (totals.last_log_time_ns or 0) - (totals.first_log_time_ns or 0)
-        if totals.snapshots > 1 and since.time_s == span_ns / 1e9:
-            in_the_end = "only in the last map: take the rooms as preliminary"
-        table.add_row("layout final", in_the_end)
+    for name, since in (
+        ("layout final", result.summary.layout_final),
+        ("known part final", result.summary.known_final),
+    ):
+        if since is not None:
+            table.add_row(name, _since(since, totals))
     if result.warnings.count:
         kinds = ", ".join(f"{found.count} {kind}" for kind, found in result.warnings.kinds.items())
         table.add_row("warnings", f"{kinds}; see warnings in summary.json")
@@ -119,3 +122,11 @@ def print_run(result: RunResult) -> None:
     print_line(f"results in [bold]{escape(str(result.folder))}[/]")
     for file in result.files:
         print_line(f"  {escape(file.name)}  {megabytes(file.stat().st_size)}")
+
+
+def _since(since: SnapshotRef, totals: RunTotals) -> str:
+    """Say from when on something held."""
+    span_ns = (totals.last_log_time_ns or 0) - (totals.first_log_time_ns or 0)
+    if totals.snapshots > 1 and since.time_s == span_ns / 1e9:
+        return "only in the last map: take the rooms as preliminary"
+    return f"from {since.coverage:.1%} coverage on, {duration(since.time_s)}"

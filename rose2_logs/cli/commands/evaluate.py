@@ -16,6 +16,8 @@ from rose2_logs.config.parameters import Parameters
 from rose2_logs.config.run_options import with_detail
 
 if TYPE_CHECKING:
+    from rich.table import Table
+
     from rose2_logs.evaluation.benchmark import CaseResult
     from rose2_logs.workflows.evaluate import Evaluation, OnCase
 
@@ -31,7 +33,9 @@ def evaluate(
             metavar="CASES.json",
             help="List of maps with true rooms: "
             '{"cases": \\[{"group", "name", "map", "rooms", "resolution_m"}, ...]}, '
-            "where map and rooms name images of the same size.",
+            "where map and rooms name images of the same size. A case may also have rooms_other, a second "
+            "image of true rooms: the one that agrees better counts, and the column truth names it; and "
+            "origin_xy_m, \\[x, y] of the lower left corner.",
         ),
     ],
     parameters: Parameters,
@@ -122,14 +126,24 @@ def print_figures(found: Evaluation) -> None:
     table.add_column("map", no_wrap=True)
     for heading in (*FIGURES, "rooms/true", "s"):
         table.add_column(heading, justify="right")
+    has_other = add_truth_column(table, found)
     for group, mean in found.groups.items():
         members = [result for result in found.maps if result.case.group == group]
         for result in members:
-            table.add_row(escape(result.case.name), *row(result.scores), f"{result.seconds:.1f}")
+            cells = [*row(result.scores), f"{result.seconds:.1f}", *[result.truth] * has_other]
+            table.add_row(escape(result.case.name), *cells)
         seconds = sum(result.seconds for result in members) / len(members)
         head = f"[bold]{escape(group)}, mean of {len(members)}"
         table.add_row(head, *row(mean), f"{seconds:.1f}", end_section=True)
     print_table(table)
+
+
+def add_truth_column(table: Table, found: Evaluation) -> bool:
+    """Add a column for the truth that counted; says whether a map has two truths, so that it is needed."""
+    has_other = any(result.case.rooms_other_path is not None for result in found.maps)
+    if has_other:
+        table.add_column("truth")
+    return has_other
 
 
 def print_along(found: Evaluation) -> None:
@@ -142,11 +156,13 @@ def print_along(found: Evaluation) -> None:
     table.add_column("map", no_wrap=True)
     for heading in ("coverage", *ALONG_FIGURES, "rooms found/true"):
         table.add_column(heading, justify="right")
+    has_other = add_truth_column(table, found)
     for group, points in found.runs.items():
         for point in points:
             figures = [f"{getattr(point.scores, name):.2f}" for name in ALONG_FIGURES]
             rooms = f"{point.scores.rooms_seg:.0f}/{point.scores.rooms_gt:.0f}"
-            table.add_row(escape(point.name), f"{point.coverage:.1%}", *figures, rooms)
+            cells = [f"{point.coverage:.1%}", *figures, rooms, *[point.truth] * has_other]
+            table.add_row(escape(point.name), *cells)
         mean = mean_scores(point.scores for point in points)
         figures = [f"{getattr(mean, name):.2f}" for name in ALONG_FIGURES]
         head = f"[bold]{escape(group)}, mean of {len(points)}"
@@ -162,6 +178,7 @@ def print_tracks(found: Evaluation) -> None:
     table.add_column("tracks of", no_wrap=True)
     for heading in ("IDF1", "at best", "IDP", "IDR", "switches", "fragmentations", "tracks found/true"):
         table.add_column(heading, justify="right")
+    has_other = add_truth_column(table, found)
     for group, run in found.tracks.items():
         table.add_row(f"[bold]{escape(group)}")
         rows = {
@@ -173,7 +190,8 @@ def print_tracks(found: Evaluation) -> None:
             shares = (scores.idf1, scores.idf1_bound, scores.idp, scores.idr)
             counts = (str(scores.id_switches), str(scores.fragmentations))
             number = f"{scores.tracks}/{scores.true_tracks}"
-            table.add_row(f"  {name}", *(f"{share:.2f}" for share in shares), *counts, number)
+            cells = [*(f"{share:.2f}" for share in shares), *counts, number, *[run.truth] * has_other]
+            table.add_row(f"  {name}", *cells)
     print_table(table)
     for group, run in found.tracks.items():
         print_line(

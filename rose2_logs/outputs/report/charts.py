@@ -15,6 +15,7 @@ from rose2_logs.model.occupancy import BoolArray, FloatArray, IntArray
 from rose2_logs.model.room_quality import UNSURE_SIGN, unsure_sign
 from rose2_logs.outputs.report.words import css, duration
 from rose2_logs.runs.run import Run
+from rose2_logs.system.text import percent
 
 BLUE, ORANGE, GREEN, VIOLET = (47, 126, 216), (224, 123, 26), (42, 157, 92), (138, 95, 208)
 AREAS_MOST = 8
@@ -74,7 +75,7 @@ def run_charts(results: Run) -> list[Chart]:
             title, meaning, tuple((name, css(color)) for name, _, color in curves), drawn[0], drawn[1]
         )
 
-    def percent(name: str) -> FloatArray:
+    def in_percent(name: str) -> FloatArray:
         return 100 * snapshots[name].astype(float)
 
     whole = (0.0, 100.0)
@@ -83,10 +84,11 @@ def run_charts(results: Run) -> list[Chart]:
     charts = [
         chart(
             "How much of the last layout was there",
-            "Share of the last layout in rooms that overlap their last shape by 0.8; mean overlap of all.",
+            _final_meaning(results),
             [
-                ("share of the layout, %", percent("final_share"), GREEN),
-                ("mean overlap, %", percent("final_iou"), BLUE),
+                ("share of the layout, %", in_percent("final_share"), GREEN),
+                ("share of the known part, %", in_percent("known_final_share"), ORANGE),
+                ("mean overlap, %", in_percent("final_iou"), BLUE),
             ],
             whole,
         ),
@@ -112,7 +114,7 @@ def run_charts(results: Run) -> list[Chart]:
                 ("rooms with predicted parts", snapshots["rooms_predicted_area_m2"].astype(float), ORANGE),
             ],
         ),
-        _coverage_chart(axes[1], percent("coverage")),
+        _coverage_chart(axes[1], in_percent("coverage")),
         chart(
             "Area of the largest rooms, m²",
             "As far as they were seen.",
@@ -122,6 +124,19 @@ def run_charts(results: Run) -> list[Chart]:
         else None,
     ]
     return [each for each in charts if each is not None] + _lanes(results, axes, numbers, present)
+
+
+def _final_meaning(results: Run) -> str:
+    """Say what counts as a final layout."""
+    tracking = results.parameters.tracking
+    return (
+        f"A room of the last map is there when a room overlaps it by {tracking.final_room_min_iou:g}. "
+        "Share of the last layout, by area, in rooms that are there; the same of the part known at the "
+        "time, as far as it was known, so that rooms not seen yet do not count; mean overlap of all rooms. "
+        f"The layout is final from the map on after which the first share stays at "
+        f"{percent(tracking.final_min_share)} or above: a few rooms at the frontier may still change. "
+        "The known part is final likewise, by the second share."
+    )
 
 
 def _drawn(

@@ -63,7 +63,6 @@ def tiles(results: Run, plan: RoomPlan) -> list[Tile]:
     found, layout = results.summary["results"], results.summary.get("layout", {})
     seen = sum(room.area_m2 for room in plan.rooms)
     shapes = sum(room.predicted_area_m2 for room in plan.rooms)
-    final = layout.get("final_since")
     sure = layout.get("wall_support_median")
     return [
         Tile(
@@ -71,16 +70,23 @@ def tiles(results: Run, plan: RoomPlan) -> list[Tile]:
             str(found["snapshots"]),
             f"{percent(found['coverage_first'])} to {percent(found['coverage_last'])} coverage",
         ),
-        Tile("Rooms at the end", str(found["rooms_last"]), f"{found['tracks']} followed over the run"),
+        Tile("Rooms at the end", str(found["rooms_last"]), _followed(found)),
         Tile("Floor in rooms", f"{seen:.0f} m²", f"{shapes:.0f} m² with predicted parts"),
         Tile("Doorways", str(len(plan.doorways)), "between rooms, last map"),
-        Tile("Layout final from", *_final(final, results.choose())),
+        Tile("Layout final from", *_final(layout.get("final_since"), results.choose())),
+        Tile("Known part final from", *_final(layout.get("known_final_since"), results.choose())),
         Tile(
             "Outlines supported by walls",
             MISSING if sure is None else percent(sure),
             "median of the last map's rooms",
         ),
     ]
+
+
+def _followed(found: dict[str, Any]) -> str:
+    """Say how many rooms had a number, and how many of them were soon gone."""
+    brief = found["brief_tracks"]
+    return f"{found['tracks']} followed over the run" + (f", {brief} only briefly" if brief else "")
 
 
 def is_last(final: dict[str, Any], last: int) -> bool:
@@ -127,14 +133,21 @@ def notes(results: Run, plan: RoomPlan) -> list[Note]:
 def _layout_notes(layout: dict[str, Any], last: int) -> list[Note]:
     final = layout.get("final_since")
     if _final(final, last)[0] == NOT_FINAL:
-        return [Note("The layout still changed up to the last map: take the rooms as preliminary.")]
-    if final is not None and final["coverage"] > LATE_COVERAGE:
-        late = (
+        said = "The layout still changed up to the last map: take the rooms as preliminary."
+    elif final is not None and final["coverage"] > LATE_COVERAGE:
+        said = (
             f"The layout became final only at {percent(final['coverage'])} coverage: "
             "with more exploration it might change again."
         )
-        return [Note(late)]
-    return []
+    else:
+        return []
+    known = layout.get("known_final_since")
+    if known is not None and not is_last(known, last) and known["coverage"] <= LATE_COVERAGE:
+        said += (
+            f" What was known of it was right from {percent(known['coverage'])} coverage on: "
+            "what came late are rooms that were seen late."
+        )
+    return [Note(said)]
 
 
 def _room_notes(plan: RoomPlan) -> list[Note]:

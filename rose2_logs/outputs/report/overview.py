@@ -6,6 +6,7 @@ import csv
 import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 from urllib.parse import quote
 
 from rose2_logs.drawing.pixels import as_pixels
@@ -144,6 +145,10 @@ def _table(rows: list[tuple[Cell, ...]]) -> Table:
         Column(
             "final from", "coverage from which on the layout was as in the end; none if only the last map was"
         ),
+        Column(
+            "known part final from",
+            "coverage from which on what was known of it was as in the end; none if only the last map was",
+        ),
         Column("splits"),
         Column("merges"),
         Column("shifts", "of the whole map"),
@@ -153,9 +158,14 @@ def _table(rows: list[tuple[Cell, ...]]) -> Table:
     return Table("Logs", columns, tuple(rows))
 
 
+def _since(final: dict[str, Any] | None, results: Run) -> Cell:
+    """Coverage from which on a layout was final, unless only the last map was."""
+    return share(None if final is None or is_last(final, results.choose()) else final["coverage"])
+
+
 def _row(results: Run, name: str) -> tuple[Cell, ...]:
     found, layout = results.summary["results"], results.summary.get("layout", {})
-    events, final = found.get("events", {}), layout.get("final_since")
+    events = found.get("events", {})
     first_ns, last_ns = found.get("first_log_time_ns"), found.get("last_log_time_ns")
     span = None if first_ns is None or last_ns is None else (last_ns - first_ns) / 1e9
     return (
@@ -166,7 +176,8 @@ def _row(results: Run, name: str) -> tuple[Cell, ...]:
         share(found["coverage_first"]),
         count(found["rooms_last"]),
         count(found["tracks"]),
-        share(None if final is None or is_last(final, results.choose()) else final["coverage"]),
+        _since(layout.get("final_since"), results),
+        _since(layout.get("known_final_since"), results),
         count(events.get("split", 0)),
         count(events.get("merged", 0)),
         count(events.get("shifted", 0)),

@@ -11,7 +11,7 @@ import rerun.blueprint as rrb
 from rose2_logs.config.run_options import RECORDING_LAYERS
 from rose2_logs.model.occupancy import FloatArray
 from rose2_logs.outputs.rerun.back_projected import BACK_PROJECTED, SEEN_SHARE
-from rose2_logs.outputs.rerun.lanes import FINAL_IOU, FINAL_SHARE, LANES, SHIFTS
+from rose2_logs.outputs.rerun.lanes import FINAL_IOU, FINAL_SHARE, KNOWN_FINAL_SHARE, LANES, SHIFTS
 from rose2_logs.outputs.rerun.world import (
     BORDERS,
     CLEAN,
@@ -89,7 +89,7 @@ def make_blueprint(
             rrb.Vertical(
                 _curves(
                     "Agreement with the final layout",
-                    ("/run/coverage", FINAL_SHARE, FINAL_IOU, SHIFTS),
+                    ("/run/coverage", FINAL_SHARE, KNOWN_FINAL_SHARE, FINAL_IOU, SHIFTS),
                     (0.0, 1.05),
                 ),
                 rrb.Tabs(

@@ -12,7 +12,8 @@ from rose2_logs.outputs.rerun.layers import Instant, time_columns
 from rose2_logs.tracking.convergence import Convergence
 from rose2_logs.tracking.track_history import SnapshotRef
 
-LANES, FINAL_SHARE, FINAL_IOU = "/room", "/run/final_share", "/run/final_iou"
+LANES = "/room"
+FINAL_SHARE, KNOWN_FINAL_SHARE, FINAL_IOU = "/run/final_share", "/run/known_final_share", "/run/final_iou"
 SHIFTS = "/run/map_shifted"
 """Marks upon the curve of coverage where the whole map shifted."""
 LOST = ""
@@ -64,6 +65,7 @@ class TrackLanes:
             self._recording.send_columns(path, times, states)
         for path, figures in (
             (FINAL_SHARE, convergence.final_share),
+            (KNOWN_FINAL_SHARE, convergence.known_final_share),
             (FINAL_IOU, convergence.final_iou),
         ):
             known = [(at, figures.get(at.snapshot)) for at in instants]

@@ -18,7 +18,7 @@ from rose2_logs.outputs.rerun.back_projected import BackProjectedWorld
 from rose2_logs.outputs.rerun.blueprint import COVERAGE_UNIT, make_blueprint, view_side_m
 from rose2_logs.outputs.rerun.columns import Entry, Scalar
 from rose2_logs.outputs.rerun.disk import abandon, require_space
-from rose2_logs.outputs.rerun.lanes import FINAL_IOU, FINAL_SHARE, SHIFTS, TrackLanes
+from rose2_logs.outputs.rerun.lanes import FINAL_IOU, FINAL_SHARE, KNOWN_FINAL_SHARE, SHIFTS, TrackLanes
 from rose2_logs.outputs.rerun.layers import CHUNK_BYTES, Layers
 from rose2_logs.outputs.rerun.summary import summary_text
 from rose2_logs.outputs.rerun.world import World
@@ -34,7 +34,8 @@ logger = logging.getLogger(__name__)
 FLUSH_TIMEOUT_S = 60.0
 CURVES = {
     "/run/coverage": ("coverage", (90, 190, 90)),
-    FINAL_SHARE: ("rooms in their final shape", (250, 160, 50)),
+    FINAL_SHARE: ("rooms as in the end", (250, 160, 50)),
+    KNOWN_FINAL_SHARE: ("the same of the known part", (170, 120, 220)),
     FINAL_IOU: ("overlap with the final layout", (90, 150, 250)),
     "/run/rooms": ("rooms", (190, 130, 250)),
     "/run/variation_bits": ("variation of information, bits", (250, 100, 100)),

@@ -33,7 +33,8 @@ def summary_text(info: RunInfo, summary: RunSummary) -> str:
     rooms = len(histories.in_last_map)
     text = [
         f"# {_cell(info.log_path.name)}",
-        f"**{counted(rooms, 'room')}** at the end, {len(histories.tracks)} over the run; "
+        f"**{counted(rooms, 'room')}** at the end, {len(histories.tracks)} over the run"
+        f"{f', {len(convergence.brief)} only briefly' if convergence.brief else ''}; "
         f"{counted(maps, 'map')}{minutes}.",
     ]
     final = summary.layout_final
@@ -44,6 +45,12 @@ def summary_text(info: RunInfo, summary: RunSummary) -> str:
         else f"The layout was as in the end **from {_percent(final.coverage)} coverage on** "
         f"({_duration(final.time_s)})."
     )
+    known = summary.known_final
+    if known is not None and known.snapshot != last and known != final:
+        text[-1] += (
+            f" What was known of it was right **from {_percent(known.coverage)} coverage on** "
+            f"({_duration(known.time_s)})."
+        )
     text += _worth_a_look(histories)
     rows = [
         "| room | area, m² | first seen | shape final | area final | walls |",

@@ -29,6 +29,8 @@ class FloorPlanResult:
     Attributes
     ----------
     graph : FaceGraph
+    face_of_cell : (H, W) int32
+        1 + index of the face that holds each cell.
     evidence : EdgeEvidence
     seen : (F,) float
         Share of each face that is known to be free.
@@ -39,6 +41,7 @@ class FloorPlanResult:
     """
 
     graph: FaceGraph
+    face_of_cell: NDArray[np.int32]
     evidence: EdgeEvidence
     seen: FloatArray
     group: NDArray[np.int32]
@@ -73,7 +76,7 @@ def make_floor_plan(
     group = 1 + group_faces(graph.edge_faces, evidence, area, seen, widest, parameters)
     labels = np.concatenate([np.zeros(1, np.int32), group])[face_of_cell]
     labels[~free] = 0
-    return FloorPlanResult(graph, evidence, seen, group, labels)
+    return FloorPlanResult(graph, face_of_cell, evidence, seen, group, labels)
 
 
 def frame_along(

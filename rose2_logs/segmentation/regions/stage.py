@@ -155,11 +155,8 @@ def generous_walls(scored: StructureResult, resolution_m: float, parameters: Par
 
 def generous_floor_plan(
     built: WallResult, free: BoolArray, direction_rad: float, resolution_m: float, parameters: Parameters
-) -> tuple[FloorPlanResult, Labels]:
-    """Faces between the lines of `generous_walls`, and the face 1.. of each cell (H, W).
-
-    The faces know the weights of their edges, but are in no group yet.
-    """
+) -> FloorPlanResult:
+    """Faces between the lines of `generous_walls`, with the weights of their edges, in no group yet."""
     lines_m, walls = built.lines.ends_m, built.walls
     margin_m = parameters.floor_plan.frame_margin_m
     graph = build_faces(lines_m, frame_along(free | walls, direction_rad, resolution_m, margin_m))
@@ -168,8 +165,8 @@ def generous_floor_plan(
     face_of_cell = label_faces(graph, (free.shape[0], free.shape[1]), resolution_m)
     area = free_area(face_of_cell, free, count, resolution_m)
     seen = area / np.maximum(shapely.area(graph.polygons), 1e-12)
-    nothing = np.zeros(count, np.int32)
-    return FloorPlanResult(graph, evidence, seen, nothing, np.zeros(free.shape, np.int32)), face_of_cell
+    no_group, no_labels = np.zeros(count, np.int32), np.zeros(free.shape, np.int32)
+    return FloorPlanResult(graph, face_of_cell, evidence, seen, no_group, no_labels)
 
 
 def find_atoms(

@@ -1,15 +1,19 @@
-"""Shapes of rooms: their faces, or their cells where a split cut through faces."""
+"""Shapes of rooms: what was seen of them, and of the unseen what nothing known contradicts."""
 
 from __future__ import annotations
 
+from typing import Any
+
+import cv2
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from rose2_logs.model.labels import distinct_labels
+from rose2_logs.config.parameters import FloorPlanParameters
+from rose2_logs.model.labels import distinct_labels, label_sizes
+from rose2_logs.model.occupancy import BoolArray
 from rose2_logs.model.outlines import room_outlines
-from rose2_logs.segmentation.floor_plan.faces import FaceGraph
 from rose2_logs.segmentation.floor_plan.stage import FloorPlanResult
 
 
@@ -68,68 +72,165 @@ def most_seen_rooms(
 
 def room_shapes(
     labels: NDArray[np.int32],
-    plan: FloorPlanResult,
+    free: BoolArray,
+    occupied: BoolArray,
+    face_of_cell: NDArray[np.int32],
     room_of_face: NDArray[np.int32],
     resolution_m: float,
-    min_seen: float,
+    parameters: FloorPlanParameters,
 ) -> list[BaseGeometry]:
-    """Predicted shape of each room: its faces, or its cells where it has none.
+    """Predict the shape of each room.
 
     Parameters
     ----------
     labels : (H, W) int32
-        Rooms 1.. of the free cells.
-    plan : FloorPlanResult
-        The faces.
+        Rooms 1.. of the free cells, however they were found.
+    free, occupied : (H, W) bool
+        Free and occupied cells.
+    face_of_cell : (H, W) int32
+        1 + index of the face that holds each cell, 0 for none.
     room_of_face : (F,) int32
-        Room of each face, 0 for none.
+        Room of each face, 0 for none; of a face that rooms share, the one that has most of it.
     resolution_m : float
         Side of a cell.
-    min_seen : float
-        Faces less seen than this share are not part of a shape.
+    parameters : FloorPlanParameters
 
     Returns
     -------
     shapes : list of shapely geometries
-        Grid frame, meters.
+        Grid frame, meters. They do not overlap, but for what straightening their outlines moves.
     """
-    shown = np.where(plan.seen >= min_seen, room_of_face, 0)
-    shapes = list(predicted_shapes(plan.graph, shown, int(labels.max(initial=0))))
-    # Rooms that a split took from a face are as large as their cells.
-    without = np.array([False, *(shape.is_empty for shape in shapes)])
-    for room, shape in enumerate(room_outlines(np.where(without[labels], labels, 0), resolution_m)):
-        if not shape.is_empty:
-            shapes[room] = shape
-    return shapes
+    cells = predicted_cells(labels, free, occupied, face_of_cell, room_of_face, resolution_m, parameters)
+    outlines = room_outlines(cells, resolution_m)
+    return list(shapely.coverage_simplify(outlines, parameters.shape_simplify_m)) if outlines else []
 
 
-def predicted_shapes(
-    graph: FaceGraph, room_of_face: NDArray[np.int32], count: int
-) -> tuple[BaseGeometry, ...]:
-    """Join the faces of each room to one shape; gaps that it encloses belong to it.
+def predicted_cells(
+    labels: NDArray[np.int32],
+    free: BoolArray,
+    occupied: BoolArray,
+    face_of_cell: NDArray[np.int32],
+    room_of_face: NDArray[np.int32],
+    resolution_m: float,
+    parameters: FloorPlanParameters,
+) -> NDArray[np.int32]:
+    """Cells of the rooms' shapes: (H, W) int32 with rooms 1.., 0 for none.
 
-    Parameters
-    ----------
-    room_of_face : (F,) int32
-        Room 1..count of each face, 0 for none.
-
-    Returns
-    -------
-    shapes : tuple of `count` shapely geometries
-        Grid frame, meters; empty where a room has no face.
+    Each unseen cell is claimed by one room at most. The unseen cells of a room that hang together are a
+    pocket; it is the room's if it is open to what was seen of the room rather than walled off, or small. Of
+    the walls around, the room takes the side that is its own.
     """
-    shapes = [shapely.union_all(graph.polygons[room_of_face == room]) for room in range(1, count + 1)]
-    inner = graph.polygons[room_of_face > 0]
-    tree = shapely.STRtree(shapely.point_on_surface(inner))
-    return tuple(_without_empty_holes(shape, tree) for shape in shapes)
+    claim = _claims(labels, free, face_of_cell, room_of_face, resolution_m, parameters)
+    gap = round(parameters.shape_gap_m / resolution_m / 2)
+    wall = _dilated(occupied, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * gap + 1, 2 * gap + 1)))
+    wall &= labels == 0
+    pocket = _parts(claim, (claim > 0) & ~wall)
+    is_room = _open_pockets(labels, claim, pocket, wall, resolution_m, parameters)
+    cells = np.where(labels > 0, labels, np.where(is_room[pocket], claim, 0))
+    reach = gap + max(1, round(parameters.shape_wall_m / resolution_m))
+    beside = _dilated(cells > 0, np.ones((2 * reach + 1, 2 * reach + 1), np.uint8))
+    beside &= (claim > 0) & (pocket == 0)
+    np.copyto(cells, claim, where=beside)
+    part = _parts(cells, cells > 0)
+    was_seen = np.zeros(part.max() + 1, bool)
+    was_seen[part[labels > 0]] = True
+    cells[~was_seen[part] & (labels == 0)] = 0
+    _fill_small_holes(cells, resolution_m, parameters.shape_fill_max_m2)
+    return cells
 
 
-def _without_empty_holes(shape: BaseGeometry, face_points: shapely.STRtree) -> BaseGeometry:
-    """Fill the holes of a shape that hold no face of a room."""
-    rings, part = shapely.get_rings(shapely.get_parts(shape), return_index=True)
-    if len(rings) == len(shapely.get_parts(shape)):
-        return shape
-    first_of_part = np.concatenate([[True], part[1:] != part[:-1]])
-    holes = shapely.polygons(rings[~first_of_part])
-    taken = np.unique(face_points.query(holes, predicate="contains")[0])
-    return shapely.union_all([shape, *np.delete(holes, taken)])
+def _claims(
+    labels: NDArray[np.int32],
+    free: BoolArray,
+    face_of_cell: NDArray[np.int32],
+    room_of_face: NDArray[np.int32],
+    resolution_m: float,
+    parameters: FloorPlanParameters,
+) -> NDArray[np.int32]:
+    """Room (H, W) that may be predicted in each cell that is not free, 0 for none.
+
+    The room that was seen nearest, if it has a part of the face, else the room of the face.
+    """
+    claim = np.zeros_like(labels)
+    is_seen = labels > 0
+    seen = np.flatnonzero(is_seen)
+    if len(seen) == 0:
+        return claim
+    rooms, faces = int(labels.max()) + 1, len(room_of_face) + 1
+    room, face = labels.ravel()[seen], face_of_cell.ravel()
+    common = np.bincount(face[seen].astype(np.int64) * rooms + room, minlength=faces * rooms)
+    common = common.reshape(faces, rooms)
+    has_part = common >= np.maximum(parameters.shape_share_of_face * common.sum(1, keepdims=True), 1)
+    known = np.bincount(face_of_cell[free], minlength=faces)
+    is_known = known >= parameters.shape_min_seen * np.maximum(label_sizes(face_of_cell, faces - 1), 1)
+    is_known[0] = False
+    has_part &= is_known[:, None]
+    room_of = np.where(is_known, np.concatenate([np.zeros(1, np.int32), room_of_face]), 0)
+    away, nearest = cv2.distanceTransformWithLabels(
+        (~is_seen).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
+    )
+    nearest = nearest.ravel()
+    room_of_seen = np.zeros(len(seen) + 1, np.int32)
+    room_of_seen[nearest[seen]] = room
+    unseen = np.flatnonzero((away <= parameters.shape_reach_m / resolution_m) & ~(is_seen | free))
+    face, room = face[unseen], room_of_seen[nearest[unseen]]
+    claim.ravel()[unseen] = np.where(has_part[face, room], room, room_of[face])
+    return claim
+
+
+def _open_pockets(
+    labels: NDArray[np.int32],
+    claim: NDArray[np.int32],
+    pocket: NDArray[np.int32],
+    wall: BoolArray,
+    resolution_m: float,
+    parameters: FloorPlanParameters,
+) -> BoolArray:
+    """Which pockets (N,) are their rooms', by what is around them."""
+    inside = pocket > 0
+    number, room = pocket[inside], claim[inside]
+    count = int(number.max(initial=0)) + 1
+    is_wall = int(labels.max(initial=0)) + 1
+    beside = _beside(np.where(wall, np.int32(is_wall), labels), inside)
+    opening = np.bincount(number, (beside == room).sum(0), count)
+    walled = np.bincount(number, (beside == is_wall).sum(0), count)
+    small = np.bincount(number, minlength=count) * resolution_m**2 <= parameters.shape_fill_max_m2
+    is_open = opening >= parameters.shape_min_open * (opening + walled)
+    is_room: BoolArray = (opening > 0) & (small | is_open)
+    return is_room
+
+
+def _fill_small_holes(cells: NDArray[np.int32], resolution_m: float, largest_m2: float) -> None:
+    """Give holes up to some size to the one room that surrounds them, in place."""
+    empty = np.pad(cells == 0, 1, constant_values=True).astype(np.uint8)
+    count, hole, stats, _ = cv2.connectedComponentsWithStats(empty, connectivity=4)
+    hole = hole[1:-1, 1:-1]
+    small = stats[:, cv2.CC_STAT_AREA] * resolution_m**2 <= largest_m2
+    small[:2] = False  # the rooms themselves, and what is outside of them
+    inside = small[hole]
+    number, beside = hole[inside], _beside(cells, inside)
+    highest, lowest = np.zeros(count, np.int32), np.full(count, np.iinfo(np.int32).max, np.int32)
+    np.maximum.at(highest, number, beside.max(0, initial=0))
+    np.minimum.at(lowest, number, np.where(beside > 0, beside, lowest[0]).min(0, initial=lowest[0]))
+    cells[inside] = np.where(lowest == highest, highest, 0)[number]
+
+
+def _beside(image: NDArray[np.int32], mask: BoolArray) -> NDArray[np.int32]:
+    """Values (4, N) of an image beside each cell of a mask, in reading order; 0 beyond its edges."""
+    width = image.shape[1] + 2
+    around = np.pad(image, 1).ravel()
+    at = np.flatnonzero(np.pad(mask, 1))
+    return np.stack([around[at + step] for step in (-width, -1, 1, width)])
+
+
+def _parts(values: NDArray[np.int32], mask: BoolArray) -> NDArray[np.int32]:
+    """Number the parts of a mask in which a value hangs together; cells along a border of two get 0."""
+    inside = mask.copy()
+    inside[:, :-1] &= ~mask[:, 1:] | (values[:, :-1] == values[:, 1:])
+    inside[:-1] &= ~mask[1:] | (values[:-1] == values[1:])
+    _, part = cv2.connectedComponents(inside.astype(np.uint8), connectivity=4)
+    return part.astype(np.int32, copy=False)
+
+
+def _dilated(mask: BoolArray, kernel: NDArray[Any]) -> BoolArray:
+    return cv2.dilate(mask.astype(np.uint8), kernel) > 0

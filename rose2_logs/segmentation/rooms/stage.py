@@ -41,6 +41,7 @@ def make_rooms(
     labels: NDArray[np.int32],
     plan: FloorPlanResult,
     free: BoolArray,
+    occupied: BoolArray,
     resolution_m: float,
     parameters: FloorPlanParameters,
 ) -> RoomsResult:
@@ -52,8 +53,8 @@ def make_rooms(
         Split groups of faces of the free cells, 0 for none.
     plan : FloorPlanResult
         Result of stage C.
-    free : (H, W) bool
-        Free cells.
+    free, occupied : (H, W) bool
+        Free and occupied cells.
     resolution_m : float
         Side of a cell.
     parameters : FloorPlanParameters
@@ -64,15 +65,15 @@ def make_rooms(
     settled = renumber_in_place(settled, number)
     # Faces belong to the rooms whose labels they had before borders settled.
     room_of_face = rooms_of_faces(renumber_in_place(whole, number), plan)
-    shapes = room_shapes(settled, plan, room_of_face, resolution_m, parameters.shape_min_seen)
+    shapes = room_shapes(settled, free, occupied, plan.face_of_cell, room_of_face, resolution_m, parameters)
     return RoomsResult(settled, shapes, room_of_face)
 
 
 def finish_rooms(
     found: RegionsResult,
     plan: FloorPlanResult,
-    faces: NDArray[np.int32],
     free: BoolArray,
+    occupied: BoolArray,
     resolution_m: float,
     parameters: Parameters,
 ) -> tuple[RoomsResult, NDArray[np.int32]]:
@@ -84,10 +85,8 @@ def finish_rooms(
         Rooms of the free cells.
     plan : FloorPlanResult
         The faces.
-    faces : (H, W) int32
-        Face 1.. of each cell.
-    free : (H, W) bool
-        Free cells.
+    free, occupied : (H, W) bool
+        Free and occupied cells.
     resolution_m : float
         Side of a cell.
     parameters : Parameters
@@ -105,8 +104,10 @@ def finish_rooms(
     )
     number = number_rooms(pieces, len(room_of_piece) - 1, of_regions.room_min_area_m2, resolution_m)
     labels = renumber_in_place(pieces, number)
-    room_of_face = most_seen_rooms(labels, faces, len(plan.graph.polygons))
-    shapes = room_shapes(labels, plan, room_of_face, resolution_m, parameters.floor_plan.shape_min_seen)
+    room_of_face = most_seen_rooms(labels, plan.face_of_cell, len(plan.graph.polygons))
+    shapes = room_shapes(
+        labels, free, occupied, plan.face_of_cell, room_of_face, resolution_m, parameters.floor_plan
+    )
     found_as = np.zeros(int(number.max(initial=0)) + 1, np.int32)
     found_as[number] = np.where(number > 0, room_of_piece, 0)
     return RoomsResult(labels, shapes, room_of_face), found_as

@@ -58,6 +58,26 @@ def test_a_layout_that_came_late_is_said(changed, final, said, on_tile):
     assert tile.value == on_tile
 
 
+@pytest.mark.parametrize("final", [None, {"snapshot": 4, "time_s": 9.0, "coverage": 0.97}])
+def test_a_layout_that_came_late_though_what_was_known_was_right_is_said(changed, final):
+    """It was seen late; where the known part was late, too, nothing is said for it."""
+    early = {"snapshot": 2, "time_s": 9.0, "coverage": 0.6}
+    results = changed(layout={"final_since": final, "known_final_since": early})
+    assert "What was known of it was right from 60% coverage on" in told(results)
+    (tile,) = [tile for tile in tiles(results, two_rooms_plan()) if tile.name == "Known part final from"]
+    assert tile.value == "60% coverage"
+    for late in (None, early | {"coverage": 0.96}, early | {"snapshot": 5}):
+        assert "known of it" not in told(changed(layout={"final_since": final, "known_final_since": late}))
+
+
+def test_tracks_that_were_soon_gone_are_counted_apart(changed):
+    """Nothing is said of none."""
+    for brief, said in ((2, "9 followed over the run, 2 only briefly"), (0, "9 followed over the run")):
+        results = changed(results={"tracks": 9, "brief_tracks": brief})
+        (tile,) = [tile for tile in tiles(results, two_rooms_plan()) if tile.name == "Rooms at the end"]
+        assert tile.more == said
+
+
 def test_rooms_that_are_unsure_or_unseen_are_named(changed):
     """Also one without any wall; the right room was half seen, the left one wholly."""
     plan = two_rooms_plan()

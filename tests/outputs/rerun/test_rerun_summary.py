@@ -40,6 +40,11 @@ def test_the_summary_tells_rooms_and_since_when_they_were_right():
     assert "**from 80 % coverage on** (1 min 15 s)" in text
     assert "| 1 | 20.0 | 25 % | 50 % | 100 % | 90 % |" in text
     assert "| version of tool | 1 |" in text
+    assert "known" not in text
+    known = dataclasses.replace(convergence, known_final=SnapshotRef(2, 20.0, 0.4), brief=(2,))
+    text = told(info, histories, known, 10)
+    assert "2 over the run, 1 only briefly; 10 maps" in text
+    assert "What was known of it was right **from 40 % coverage on** (20 s)." in text
     late = dataclasses.replace(convergence, layout_final=last)
     for never in (late, dataclasses.replace(convergence, layout_final=None)):
         assert "still changed up to the last map" in told(info, histories, never, 10)

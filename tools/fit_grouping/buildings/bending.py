@@ -16,11 +16,18 @@ FloatImage = NDArray[np.float32]
 
 KINDS = {"none": 0.62, "slant": 0.14, "arc": 0.06, "bend": 0.18}
 """Shares of the ways to bend a building."""
+OTHER_KINDS = {
+    "villa": {"none": 0.93, "slant": 0.04, "arc": 0.0, "bend": 0.03},
+    "hall": {"none": 0.5, "slant": 0.14, "arc": 0.16, "bend": 0.2},
+    "passage": {"none": 0.74, "slant": 0.1, "arc": 0.08, "bend": 0.08},
+}
+"""The same for kinds of plans that differ: wings of villas are turned anyway, halls may lie in an arc."""
 
 
 def bent(rng: Generator, walled: WalledPlan, furniture: Mask) -> tuple[WalledPlan, Mask]:
     """Bend a building and what stands in it in a random way."""
-    kind = rng.choice(list(KINDS), p=list(KINDS.values()))
+    shares = OTHER_KINDS.get(walled.plan.kind, KINDS)
+    kind = rng.choice(list(shares), p=list(shares.values()))
     if kind == "none":
         return walled, furniture
     height, width = furniture.shape
@@ -87,15 +94,17 @@ def _bend(rng: Generator, width: int, height: int) -> tuple[FloatImage, FloatIma
     center_y = np.float32(height + between(rng, 0.5, 6.0))
     middle = np.float32(center_y - height / 2)
     """Radius at which the arc is as long as the piece of the building that it takes."""
-    reach = int(np.ceil(width - at + height + center_y))
-    rows = int(np.ceil(max(center_y + np.sin(angle) * reach, height)))
-    y, x = np.mgrid[: min(rows, 2 * height + width), : int(at) + reach].astype(np.float32)
+    along = angle * middle
+    beyond = max(float(width - at - along), 0.0)
+    sine, cosine = np.sin(angle), np.cos(angle)
+    columns = int(np.ceil(at + sine * center_y + max(cosine, 0) * beyond))
+    rows = int(np.ceil(max(height, center_y + sine * beyond - cosine * (center_y - height))))
+    y, x = np.mgrid[:rows, :columns].astype(np.float32)
     dx, dy = x - at, center_y - y
     turn = np.arctan2(dx, dy)
     radius = np.hypot(dx, dy)
-    along = angle * middle
-    beyond_x = np.cos(angle) * dx - np.sin(angle) * dy
-    beyond_y = np.sin(angle) * dx + np.cos(angle) * dy
+    beyond_x = cosine * dx - sine * dy
+    beyond_y = sine * dx + cosine * dy
     straight = (dx <= 0) & (dy > 0)
     curved = (turn >= 0) & (turn <= angle)
     source_x = np.where(straight, x, np.where(curved, at + turn * middle, at + along + beyond_x))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -14,8 +15,61 @@ from fit_grouping.buildings.walls import WalledPlan
 
 STYLES = ("none", "survey", "home", "office", "dense")
 """Ways to furnish: not at all, dots and boxes as drawn by hand, as in homes, as in offices, and cluttered."""
+HALLS = {
+    "rows": 0.2,
+    "pillars": 0.1,
+    "tables": 0.15,
+    "boxes": 0.1,
+    "mixed": 0.15,
+    "stands": 0.14,
+    "pallets": 0.1,
+    "empty": 0.06,
+}
+"""What halls are full of, and how often."""
 KEEP_CLEAR_M = 0.55
 """Furniture stays this far from openings, most of the time."""
+FRONTS = {"home": 0.35, "office": 1.3, "dense": 1.4}
+"""Fronts of furniture along the walls of a room of each style, on average."""
+ISLAND_FROM_WALL_M = 0.6
+FRONTS_MIN_M2 = 5.0
+FRAME_GAIN = 1.15
+"""A room has a frame of its own where that is filled better by this factor than the box of its cells."""
+
+
+@dataclass(frozen=True, eq=False)
+class RoomFrame:
+    """The rectangle of a room that stands at a slant.
+
+    Attributes
+    ----------
+    shape : tuple of int
+        Rows and columns of the rectangle, in cells.
+    to_plan : (2, 3) float64
+        Leads its cells to those of the room's box.
+    """
+
+    shape: tuple[int, int]
+    to_plan: NDArray[np.float64]
+
+    def back(self, drawn: Mask, shape: tuple[int, ...]) -> Mask:
+        """What is drawn in the frame, in the room's box."""
+        size = (shape[1], shape[0])
+        return cv2.warpAffine(drawn, self.to_plan, size, flags=cv2.INTER_NEAREST).astype(np.uint8)
+
+
+def room_frame(inside: NDArray[np.bool_]) -> RoomFrame | None:
+    """The slanting rectangle of a room; None where it lies along the axes."""
+    if not inside.any():
+        return None
+    points = cv2.findNonZero(inside.astype(np.uint8))
+    (x, y), (width, height), angle = cv2.minAreaRect(points)
+    if width * height * FRAME_GAIN > inside.size:
+        return None
+    shape = (max(1, round(height)), max(1, round(width)))
+    c, s = np.cos(np.deg2rad(angle)), np.sin(np.deg2rad(angle))
+    turn = np.array([[c, -s], [s, c]])
+    shift = np.array([x, y]) - turn @ np.array([width, height]) / 2
+    return RoomFrame(shape, np.column_stack([turn, shift]))
 
 
 class Furnisher:
@@ -45,20 +99,29 @@ class Furnisher:
                 continue
             x0, y0, x1, y1 = box
             inside = self.rooms[y0:y1, x0:x1] == number
-            area = np.count_nonzero(inside) * CELL_M**2
             target = self.solid[y0:y1, x0:x1]
-            drawn = np.zeros_like(target)
-            if number in way:
-                self._corridor(drawn, area)
-            elif number in self.walled.plan.halls or area > 70:
-                self._hall(drawn, area)
-            elif self.style == "survey":
-                self._survey_room(drawn)
+            frame = room_frame(inside)
+            if frame is None:
+                drawn = np.zeros_like(target)
+                self._fill(drawn, number, np.count_nonzero(inside) * CELL_M**2, corridor=number in way)
             else:
-                self._room(drawn, area)
+                in_frame = np.zeros(frame.shape, np.uint8)
+                self._fill(in_frame, number, np.count_nonzero(inside) * CELL_M**2, corridor=number in way)
+                drawn = frame.back(in_frame, target.shape)
             keep = ~self.clear[y0:y1, x0:x1] if chance(self.rng, 0.85) else True
             target[(drawn > 0) & inside & keep] = 1
         return self.solid
+
+    def _fill(self, drawn: Mask, number: int, area_m2: float, *, corridor: bool) -> None:
+        """Furnish one room."""
+        if corridor:
+            self._corridor(drawn, area_m2)
+        elif number in self.walled.plan.halls or area_m2 > 70:
+            self._hall(drawn, area_m2)
+        elif self.style == "survey":
+            self._survey_room(drawn)
+        else:
+            self._room(drawn, area_m2)
 
     def _corridor(self, drawn: Mask, area_m2: float) -> None:
         rng = self.rng
@@ -73,9 +136,11 @@ class Furnisher:
 
     def _hall(self, drawn: Mask, area_m2: float) -> None:
         rng = self.rng
-        kind = rng.choice(
-            ["rows", "pillars", "tables", "boxes", "mixed", "empty"], p=[0.25, 0.15, 0.2, 0.15, 0.15, 0.1]
-        )
+        kind = rng.choice(list(HALLS), p=list(HALLS.values()))
+        if kind == "stands":
+            self._stands(drawn, area_m2)
+        if kind == "pallets":
+            self._pallets(drawn)
         if kind in ("rows", "mixed"):
             self._rows(drawn, rng.uniform(0.3, 1.0), rng.uniform(1.2, 3.0))
         if kind in ("tables", "mixed"):
@@ -99,6 +164,55 @@ class Furnisher:
         if chance(rng, 0.4):
             self._along_walls(drawn, area_m2 / 20)
         self._noise(drawn, min(area_m2, 300) / 30 * rng.random())
+
+    def _stands(self, drawn: Mask, area_m2: float) -> None:
+        """Dozens of stands and screens at all angles, as in a museum: blocks, bars and angles."""
+        rng = self.rng
+        per_stand_m2 = rng.uniform(7, 18)
+        slants = not chance(rng, 0.25)
+        thick = int(rng.integers(1, 4))
+        for _ in range(rng.poisson(min(area_m2, 900) / per_stand_m2)):
+            angle = rng.uniform(0, 180) if slants else 90.0 * rng.integers(2)
+            long, deep = rng.uniform(1.0, 4.5) / CELL_M, rng.uniform(0.2, 1.6) / CELL_M
+            corners = cv2.boxPoints((self._spot(drawn), (long, deep), angle)).astype(np.int32)
+            if chance(rng, 0.5):
+                cv2.fillPoly(drawn, [corners], 1)
+            else:  # a frame with one side or two left open
+                cv2.polylines(drawn, [corners[: rng.integers(2, 5)]], chance(rng, 0.3), 1, thick)
+
+    def _pallets(self, drawn: Mask) -> None:
+        """Pallets and racks in a grid over a part of the hall: outlines with feet, posts beyond."""
+        rng = self.rng
+        height, width = drawn.shape
+        low_x, low_y = int(width * rng.uniform(0, 0.5)), int(height * rng.uniform(0, 0.5))
+        part = drawn[low_y : low_y + round(height * rng.uniform(0.4, 0.9)), low_x:]
+        half = between(rng, 0.4, 0.7), between(rng, 0.4, 0.8)
+        legs_only = chance(rng, 0.4)
+
+        def put(spot: tuple[int, int]) -> None:
+            low, high = (spot[0] - half[0], spot[1] - half[1]), (spot[0] + half[0], spot[1] + half[1])
+            if legs_only:
+                self._legs(part, spot, 2 * half[0] * CELL_M, 2 * half[1] * CELL_M)
+            else:
+                cv2.rectangle(part, low, high, 1, int(rng.integers(1, 3)))
+
+        self._grid(part, rng.uniform(1.6, 3.2), rng.uniform(1.6, 3.2), put, share=rng.uniform(0.5, 1.0))
+        step = rng.uniform(3, 8)
+        self._grid(drawn, step, step, lambda p: cv2.circle(drawn, p, int(rng.integers(1, 4)), 1, -1))
+
+    def _front(self, drawn: Mask) -> None:
+        """Desks, shelves or wardrobes side by side along most of a wall: the floor ends before it."""
+        rng = self.rng
+        image = np.rot90(drawn, int(rng.integers(4)))
+        width = image.shape[1]
+        at, end = int(width * rng.uniform(0, 0.4)), int(width * rng.uniform(0.6, 1.0))
+        usual = rng.uniform(0.3, 0.9)
+        while at < end:
+            piece = between(rng, 0.4, 1.8)
+            deep = max(1, cells(usual * rng.uniform(0.75, 1.15)))
+            if chance(rng, 0.88):
+                image[:deep, at : min(at + piece, end)] = 1
+            at += piece
 
     def _survey_room(self, drawn: Mask) -> None:
         """Chairs as dots on a grid, boxes in corners."""
@@ -127,7 +241,9 @@ class Furnisher:
         density = {"home": 1.2, "office": 1.2, "dense": 2.2}[self.style] * rng.uniform(0.3, 1.5)
         if chance(rng, 0.12):
             return
-        self._along_walls(drawn, density * min(area_m2, 60) / 4)
+        self._along_walls(drawn, density * min(area_m2, 60) / (6 if self.style == "home" else 4))
+        for _ in range(rng.poisson(FRONTS[self.style] if area_m2 > FRONTS_MIN_M2 else 0)):
+            self._front(drawn)
         for _ in range(rng.poisson(density * min(area_m2, 60) / 9)):
             kind = rng.choice(
                 ["table", "box", "legs", "chair", "screen", "disc"], p=[0.3, 0.2, 0.15, 0.2, 0.07, 0.08]
@@ -158,12 +274,10 @@ class Furnisher:
         """Sofas and islands in the middle, counters that stand out from a wall like a wall."""
         rng = self.rng
         height, width = drawn.shape
-        for _ in range(rng.poisson(1.2)):
-            long, deep = between(rng, 1.4, 3.0), between(rng, 0.6, 1.1)
-            if chance(rng, 0.5):
-                long, deep = deep, long
-            x, y = self._spot(drawn)
-            drawn[y : y + deep, x : x + long] = 1
+        for _ in range(rng.poisson(1.4)):
+            self._island(drawn)
+        if chance(rng, 0.45):
+            self._dining_table(drawn)
         for _ in range(rng.poisson(0.6)):
             reach, deep = between(rng, 1.2, 3.0), between(rng, 0.5, 0.8)
             side = rng.integers(4)
@@ -175,6 +289,39 @@ class Furnisher:
                 x = int(rng.integers(max(1, width - deep)))
                 y = 0 if side == 2 else max(0, height - reach)
                 drawn[y : y + reach, x : x + deep] = 1
+
+    def _island(self, drawn: Mask) -> None:
+        """A sofa, counter or bed that can be walked around, at a slant at times."""
+        rng = self.rng
+        height, width = drawn.shape
+        rim = cells(ISLAND_FROM_WALL_M)
+        long, deep = between(rng, 1.0, 3.0), between(rng, 0.5, 1.2)
+        if chance(rng, 0.5):
+            long, deep = deep, long
+        if width < long + 2 * rim or height < deep + 2 * rim:
+            return
+        x = float(rng.integers(rim + long // 2, width - rim - long // 2 + 1))
+        y = float(rng.integers(rim + deep // 2, height - rim - deep // 2 + 1))
+        angle = rng.uniform(-40, 40) if chance(rng, 0.25) else 0.0
+        corners = cv2.boxPoints(((x, y), (long, deep), angle)).astype(np.int32)
+        cv2.fillPoly(drawn, [corners], 1)
+
+    def _dining_table(self, drawn: Mask) -> None:
+        """Rows of chairs, four dots each, at both sides of a table of which the legs or all can be seen."""
+        rng = self.rng
+        step, chairs = cells(rng.uniform(0.5, 0.75)), int(rng.integers(2, 6))
+        half = cells(rng.uniform(0.4, 0.75))
+        image = drawn if chance(rng, 0.5) else drawn.T
+        x, y = self._spot(image)
+        for number in range(chairs):
+            for side in (-1, 1):
+                seat = (x + number * step, y + side * (half + cells(0.15)))
+                for corner in cv2.boxPoints((seat, (cells(0.35), cells(0.35)), rng.normal(0, 15))):
+                    column, row = int(corner[0]), int(corner[1])
+                    if 0 <= row < image.shape[0] and 0 <= column < image.shape[1]:
+                        image[row, column] = 1
+        if chance(rng, 0.3):
+            image[max(0, y - half // 2) : max(0, y + half // 2), x : x + (chairs - 1) * step] = 1
 
     def _spot(self, drawn: Mask) -> tuple[int, int]:
         return int(self.rng.integers(drawn.shape[1])), int(self.rng.integers(drawn.shape[0]))
@@ -232,7 +379,7 @@ class Furnisher:
             cv2.circle(drawn, (int(corner[0]), int(corner[1])), radius, 1, -1)
 
     def _chair(self, drawn: Mask, spot: tuple[int, int]) -> None:
-        if chance(self.rng, 0.3):  # five legs as a star
+        if chance(self.rng, 0.35):  # five legs as a star
             angle = self.rng.uniform(0, 2)
             for k in range(5):
                 tip = angle + 2 * np.pi * k / 5

@@ -19,16 +19,18 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from fit_grouping.buildings.bending import bent
 from fit_grouping.buildings.furniture import STYLES, Furnisher
-from fit_grouping.buildings.plans import make_plan
+from fit_grouping.buildings.makers import make_plan
 from fit_grouping.buildings.sensing import SimulatedMap, make_map
 from fit_grouping.buildings.walls import build_walls
 from rose2_logs.system.files import replacing
 
 FURNISHING = {
+    "villa": ([0.06, 0.02, 0.77, 0.0, 0.15]),
     "home": ([0.12, 0.08, 0.6, 0.0, 0.2]),
-    "office": ([0.2, 0.25, 0.0, 0.4, 0.15]),
+    "office": ([0.13, 0.2, 0.0, 0.45, 0.22]),
     "cubicles": ([0.25, 0.55, 0.0, 0.2, 0.0]),
-    "campus": ([0.25, 0.05, 0.0, 0.55, 0.15]),
+    "campus": ([0.2, 0.05, 0.0, 0.58, 0.17]),
+    "passage": ([0.5, 0.0, 0.0, 0.4, 0.1]),
     "hall": ([0.1, 0.0, 0.0, 0.6, 0.3]),
 }
 """Shares of the furnishing styles for each kind of plan, in the order of `furniture.STYLES`."""

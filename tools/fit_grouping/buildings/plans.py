@@ -16,6 +16,8 @@ Rectangle = tuple[int, int, int, int]
 """x0, y0, x1, y1 in cells."""
 MARGIN_M = 3.0
 """Room around a building for rays that leave it."""
+PUBLIC_MIN_M2 = 8.0
+"""Smaller rooms of a home are closed by doors."""
 ROOM_MIN_M2 = 0.9
 ROOM_MIN_WIDTH_M = 0.8
 """Pieces of rooms below are taken by a neighbor."""
@@ -31,8 +33,8 @@ class Plan:
         Name of the maker.
     rooms : (H, W) int32
         Room of each cell, walls not yet taken off; 0 outside.
-    corridors, halls : set of int
-        Rooms of these kinds.
+    corridors, halls, public : set of int
+        Rooms of these kinds; public ones open widely to each other.
     open_fronts : float
         Share of doors that are openings of most of the wall.
     """
@@ -41,6 +43,7 @@ class Plan:
     rooms: Labels
     corridors: set[int] = field(default_factory=set)
     halls: set[int] = field(default_factory=set)
+    public: set[int] = field(default_factory=set)
     open_fronts: float = 0.05
 
     @classmethod
@@ -79,7 +82,7 @@ class Plan:
     def merge(self, one: int, other: int) -> None:
         """Make two rooms one."""
         self.rooms[self.rooms == other] = one
-        for kinds in (self.corridors, self.halls):
+        for kinds in (self.corridors, self.halls, self.public):
             if other in kinds:
                 kinds.discard(other)
                 kinds.add(one)
@@ -104,6 +107,7 @@ class Plan:
         number[0] = 0
         self.corridors = {int(n) for n in number if n and was[n] in self.corridors}
         self.halls = {int(n) for n in number if n and was[n] in self.halls}
+        self.public = {int(n) for n in number if n and was[n] in self.public}
         self.rooms = number[pieces].astype(np.int32)
 
 
@@ -292,6 +296,10 @@ def home(rng: Generator) -> Plan:
     united_rooms(rng, plan, rng.choice([0.03, 0.06, 0.15]))
     unvisited(rng, plan, rng.choice([0.0, 0.1, 0.25]))
     alcoves(rng, plan, rng.choice([0.0, 0.3, 0.8]))
+    openness = rng.choice([0.0, 0.3, 0.7])
+    number, size = np.unique(plan.rooms, return_counts=True)
+    large = number[(number > 0) & (size * CELL_M**2 > PUBLIC_MIN_M2)]
+    plan.public = {int(n) for n in large if chance(rng, openness)}
     return plan
 
 
@@ -350,7 +358,7 @@ def office(rng: Generator) -> Plan:
     frame = (area[1], area[0], area[3], area[2]) if flip else area
     turned: Callable[[Rectangle], Rectangle] = lambda r: (r[1], r[0], r[3], r[2]) if flip else r  # noqa: E731
     segments = [turned(s) for s in _segments(rng, frame, width, depth)]
-    parted = chance(rng, 0.45)
+    parted = chance(rng, 0.2)
     numbers = []
     for x0, y0, x1, y1 in segments:
         lies = x1 - x0 >= y1 - y0
@@ -514,9 +522,79 @@ def campus(rng: Generator) -> Plan:
     return plan
 
 
+def _path(rng: Generator, width: int) -> list[Rectangle]:
+    """Pieces of a corridor that turns at right angles, from its beginning on."""
+    pieces: list[Rectangle] = []
+    x = y = 0
+    lies = chance(rng, 0.5)
+    for _ in range(rng.integers(1, 5)):
+        long = between(rng, 6, 32) * int(rng.choice([-1, 1], p=[0.25, 0.75]))
+        end_x, end_y = (x + long, y) if lies else (x, y + long)
+        pieces.append((min(x, end_x), min(y, end_y), max(x, end_x) + width, max(y, end_y) + width))
+        x, y, lies = end_x, end_y, not lies
+    return pieces
+
+
+def passage(rng: Generator) -> Plan:
+    """One long corridor with bays before its doors, round corners, and few of the rooms beside it."""
+    width = between(rng, 1.5, 3.4)
+    pieces = _path(rng, width)
+    side = between(rng, 5, 9)
+    left, low = (min(p[k] for p in pieces) - side for k in (0, 1))
+    right, high = (max(p[k] for p in pieces) + side for k in (2, 3))
+    plan = Plan.empty("passage", right - left, high - low)
+    margin = cells(MARGIN_M)
+    moved_to = [(a - left, b - low, c - left, d - low) for a, b, c, d in pieces]
+    pieces = [(a + margin, b + margin, c + margin, d + margin) for a, b, c, d in moved_to]
+    number = plan.corridor(pieces[0])
+    for piece in pieces[1:]:
+        plan.merge(number, plan.corridor(piece))
+    for piece in pieces:
+        for beside in (-1, 1):
+            _row_of_bays(rng, plan, number, piece, beside)
+    kept = rng.choice([0.15, 0.5, 0.9])
+    for x0, y0, x1, y1 in pieces:
+        deep = between(rng, 2.5, 6.5)
+        lies = x1 - x0 >= y1 - y0
+        for a, b in ((-deep, 0), (width, width + deep)):
+            before = int(plan.rooms.max())
+            strip = (x0, y0 + a, x1, y0 + b) if lies else (x0 + a, y0, x0 + b, y1)
+            row_of_rooms(rng, plan, strip, rng.uniform(2.5, 7), regular=chance(rng, 0.5))
+            for room in range(before + 1, int(plan.rooms.max()) + 1):
+                if not chance(rng, kept):
+                    plan.rooms[plan.rooms == room] = 0
+    if chance(rng, 0.4):  # a hall at its end
+        x0, y0, x1, y1 = pieces[-1]
+        half = between(rng, 3, 5)
+        x, y = (x0, y0) if chance(rng, 0.5) else (x1, y1)
+        plan.hall((x - half, y - half, x + half, y + half))
+    plan.open_fronts = rng.choice([0.02, 0.3])
+    return plan
+
+
+def _row_of_bays(rng: Generator, plan: Plan, number: int, piece: Rectangle, beside: int) -> None:
+    """Bays at a side of a corridor: at equal steps, of equal size."""
+    if chance(rng, 0.3):
+        return
+    x0, y0, x1, y1 = piece
+    lies = x1 - x0 >= y1 - y0
+    wide, deep = between(rng, 0.8, 2.6), between(rng, 0.15, 0.9)
+    step = wide + between(rng, 0.6, 5.0)
+    low, high = (x0, x1) if lies else (y0, y1)
+    for at in range(low + between(rng, 0.3, 3.0), high - wide, step):
+        if chance(rng, 0.15):
+            continue
+        if lies:
+            bay = (at, y0 - deep, at + wide, y0) if beside < 0 else (at, y1, at + wide, y1 + deep)
+        else:
+            bay = (x0 - deep, at, x0, at + wide) if beside < 0 else (x1, at, x1 + deep, at + wide)
+        plan.merge(number, plan.paint(bay))
+
+
 def hall(rng: Generator) -> Plan:
     """A shop, depot, arena or hall: one or two large rooms, small ones at their sides."""
-    plan = Plan.empty("hall", between(rng, 6, 34), between(rng, 6, 28))
+    sides_m = [((4, 10), (4, 10)), ((6, 34), (6, 28)), ((28, 55), (9, 16))][rng.choice(3, p=[0.2, 0.6, 0.2])]
+    plan = Plan.empty("hall", between(rng, *sides_m[0]), between(rng, *sides_m[1]))
     x0, y0, x1, y1 = plan.inner
     for _ in range(rng.poisson(1.2)):
         depth = between(rng, 2, 6)
@@ -535,23 +613,4 @@ def hall(rng: Generator) -> Plan:
         x, y = round(x0 + (x1 - x0) * rng.uniform(0.3, 0.5)), round(y0 + (y1 - y0) * rng.uniform(0.3, 0.5))
         plan.paint((x, y, x + between(rng, 2.5, 7), y + between(rng, 2.5, 6)), over=True)
     notches(rng, plan, 0.8)
-    return plan
-
-
-MAKERS: tuple[tuple[Callable[[Generator], Plan], float], ...] = (
-    (home, 0.34),
-    (office, 0.32),
-    (cubicles, 0.09),
-    (campus, 0.14),
-    (hall, 0.11),
-)
-"""Makers of plans and their shares."""
-
-
-def make_plan(rng: Generator) -> Plan:
-    """Lay out a building of a random kind."""
-    makers, shares = zip(*MAKERS, strict=True)
-    plan: Plan = makers[rng.choice(len(makers), p=np.array(shares) / sum(shares))](rng)
-    chamfers(rng, plan, 0.35, 0.25)
-    plan.tidy()
     return plan

@@ -11,13 +11,22 @@ from numpy.typing import NDArray
 
 from fit_grouping.buildings.bending import moved
 from fit_grouping.buildings.raster import CELL_M, Generator, Labels, Mask, between, cells, chance
-from fit_grouping.buildings.walls import WalledPlan
+from fit_grouping.buildings.walls import HOMES, WalledPlan
 
 FREE, UNKNOWN, OCCUPIED = 254, 205, 0
 """Gray values of the ROS map convention."""
 RAYS_PER_VIEW = 720
 """Rays of a view: a lidar's usual half degree, so that far things show as fans."""
-VIEWS_MAX = 100
+LOST_FROM = 0.15
+"""Rays that meet nothing are known to at least this share of the sensor's reach."""
+REACHES_M = (4.0, 6.0, 8.0, 12.0, 18.0)
+USUAL_REACHES, HOME_REACHES = (0.15, 0.25, 0.25, 0.2, 0.15), (0.06, 0.24, 0.35, 0.25, 0.1)
+"""How far sensors see, and how often, in homes and elsewhere."""
+VIEWS_MAX = 110
+THOROUGH_HOMES, THOROUGH = 0.75, 0.45
+"""Share of the maps for which robots looked into every corner."""
+HOME_DAMAGE = 0.5
+"""Faint walls and gaps in homes, relative to elsewhere."""
 ROOM_SEEN_MIN_M2 = 0.5
 """Rooms of which less was seen are none in the truth."""
 
@@ -55,10 +64,12 @@ class Sensor:
         self.pad = reach + 4
         self.solid = np.pad(solid, self.pad)
         self.unglazed = np.pad(solid & (1 - glass), self.pad)
-        self.transmission = rng.uniform(0.3, 1.0)
+        self.transmission = rng.uniform(0.05, 0.8)
         """Share of the rays that pass glass."""
         self.stride = self.solid.shape[1]
         self.evidence = np.zeros(self.solid.shape, np.float32)
+        self.ragged = chance(rng, 0.6)
+        """Whether rays that meet nothing are lost at any length."""
         self.range_noise = rng.choice([0.0, 0.3, 0.6, 1.0])
         self.pose_noise = rng.choice([0.0, 0.3, 0.6, 1.1], p=[0.25, 0.35, 0.25, 0.15])
         self.hit_weight = np.float32(rng.choice([2.0, 3.0, 6.0]))
@@ -79,7 +90,11 @@ class Sensor:
         noise = rng.normal(0, self.range_noise, len(first)) if self.range_noise else np.zeros(len(first))
         seen_to = np.maximum(first + np.round(noise), 0).astype(int)
         ends = np.clip(seen_to[hit] + 1, 1, reach - 1) - 1
-        free = index[np.arange(reach - 1) < np.minimum(seen_to, first)[:, None]]
+        known_to = np.minimum(seen_to, first)
+        if self.ragged:
+            lost = first >= reach - 1
+            known_to[lost] = known_to[lost] * rng.uniform(LOST_FROM, 1.0, np.count_nonzero(lost))
+        free = index[np.arange(reach - 1) < known_to[:, None]]
         down, right = np.round(rng.normal(0, self.pose_noise, 2)).astype(int) if self.pose_noise else (0, 0)
         move = int(np.clip(down, -3, 3)) * self.stride + int(np.clip(right, -3, 3))
         flat = self.evidence.ravel()
@@ -96,7 +111,7 @@ def make_map(rng: Generator, walled: WalledPlan, furniture: Mask, furnishing: st
     """Map a furnished building in a random way; None where nothing was seen."""
     rooms = walled.plan.rooms
     solid = (walled.walls | furniture | _outdoors(rng, rooms)).astype(np.uint8)
-    drawn_share = 0.75 if furnishing == "survey" else 0.12
+    drawn_share = 0.75 if furnishing == "survey" else 0.05 if walled.plan.kind == "villa" else 0.12
     if chance(rng, drawn_share):
         kind, gray = "drawing", _drawing(rng, walled, furniture)
     else:
@@ -104,7 +119,7 @@ def make_map(rng: Generator, walled: WalledPlan, furniture: Mask, furnishing: st
         if seen is None:
             return None
         gray = seen
-    gray = _damaged(rng, gray)
+    gray = _damaged(rng, gray, HOME_DAMAGE if walled.plan.kind in HOMES else 1.0)
     rooms, other, gray = _warped(rng, rooms, walled.other, gray)
     window = _known_window(gray, rooms)
     gray, rooms, other = gray[window], rooms[window], other[window]
@@ -139,10 +154,10 @@ def _outdoors(rng: Generator, rooms: Labels) -> Mask:
 def _sensed(rng: Generator, walled: WalledPlan, solid: Mask) -> tuple[str, NDArray[np.uint8] | None]:
     """Drive through rooms that can be reached, all or the first of them, and look around."""
     rooms, neighbors = walled.plan.rooms, walled.neighbors
-    reach_m = float(rng.choice([4.0, 6.0, 8.0, 12.0, 18.0], p=[0.2, 0.25, 0.25, 0.2, 0.1]))
+    reach_m = float(rng.choice(REACHES_M, p=HOME_REACHES if walled.plan.kind in HOMES else USUAL_REACHES))
     numbers = list(neighbors)
     start = numbers[rng.integers(len(numbers))]
-    share = 1.0 if chance(rng, 0.55) else rng.uniform(0.15, 0.9)
+    share = 1.0 if chance(rng, 0.75 if walled.plan.kind in HOMES else 0.62) else rng.uniform(0.15, 0.9)
     order, queue, met = [], [start], {start}
     while queue:
         room = queue.pop(int(rng.integers(len(queue))))
@@ -151,26 +166,30 @@ def _sensed(rng: Generator, walled: WalledPlan, solid: Mask) -> tuple[str, NDArr
             if beside not in met:
                 met.add(beside)
                 queue.append(beside)
-    if len(order) < len(numbers) and chance(rng, 0.6):
+    if len(order) < len(numbers) and share == 1.0 and chance(rng, 0.8):
         order += [n for n in numbers if n not in met]
     order = order[: max(1, round(share * len(order)))]
     kind = "whole" if share == 1.0 else "part"
     away = cv2.erode((solid == 0).astype(np.uint8), np.ones((7, 7), np.uint8)) > 0
     rows, columns = np.nonzero(away & (rooms > 0))
-    place = np.argsort(rooms[rows, columns], kind="stable")
+    place = np.argsort(rooms[rows, columns].astype(np.uint16), kind="stable")
     rows, columns = rows[place], columns[place]
     bounds = np.searchsorted(rooms[rows, columns], [*order, *[n + 1 for n in order]])
     # Share of the rooms that are seen through their doors only.
-    skip = rng.choice([0.0, 0.06, 0.3, 0.6], p=[0.6, 0.3, 0.1, 0.0] if walled.plan.kind == "home" else None)
+    skip = rng.choice([0.0, 0.06, 0.3, 0.6], p=[0.7, 0.24, 0.06, 0.0] if walled.plan.kind in HOMES else None)
     views = []
     per_view_m2 = rng.uniform(6, 16)
+    thorough = chance(rng, THOROUGH_HOMES if walled.plan.kind in HOMES else THOROUGH)
+    apart = 0.25 if thorough else 0.6
     for low, high, room in zip(bounds[: len(order)], bounds[len(order) :], order, strict=True):
         inside = room in walled.plan.corridors or room in walled.plan.halls or len(order) == 1
         if high <= low or (not inside and chance(rng, skip)):
             continue
-        spread_m2 = max(per_view_m2, 0.6 * reach_m**2) / rng.uniform(1, 2)
+        spread_m2 = max(per_view_m2, apart * reach_m**2) / rng.uniform(1, 2)
         count = int(np.ceil((high - low) * CELL_M**2 / spread_m2))
-        at = rng.integers(low, high, max(count, 2))
+        length = max(int(np.ptp(rows[low:high])), int(np.ptp(columns[low:high])))
+        count = max(count, 4 if thorough else 2, round(length / cells(0.7 * reach_m)))
+        at = low + _spread(rng, rows[low:high], columns[low:high], count)
         views += list(zip(rows[at].tolist(), columns[at].tolist(), strict=True))
     if not views:
         return kind, None
@@ -191,14 +210,24 @@ def _sensed(rng: Generator, walled: WalledPlan, solid: Mask) -> tuple[str, NDArr
     return kind, gray
 
 
-def _damaged(rng: Generator, gray: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Gaps in walls, spots, unknown holes, and a second, shifted copy of a part of the walls."""
+def _spread(
+    rng: Generator, rows: NDArray[np.intp], columns: NDArray[np.intp], count: int
+) -> NDArray[np.intp]:
+    """Random cells of a room, one in each of equal parts along its longer side."""
+    longer = rows if np.ptp(rows) > np.ptp(columns) else columns
+    order = np.argsort(longer.astype(np.uint16), kind="stable")  # 16 bits are sorted fastest
+    place = (np.arange(count) + rng.random(count)) / count * len(order)
+    return order[place.astype(np.intp)]
+
+
+def _damaged(rng: Generator, gray: NDArray[np.uint8], usual: float) -> NDArray[np.uint8]:
+    """Gaps in walls, spots, unknown holes, and a second, slightly turned copy of a part of the walls."""
     gray = gray.copy()
     occupied = gray == OCCUPIED
-    if chance(rng, 0.35):  # faint walls
+    if chance(rng, 0.35 * usual):  # faint walls
         lost = rng.uniform(0, 0.3)
         gray[occupied & (rng.random(gray.shape) < lost)] = rng.choice([UNKNOWN, FREE])
-    if chance(rng, 0.3):  # gaps as a robot vacuum leaves them
+    if chance(rng, 0.3 * usual):  # gaps as a robot vacuum leaves them
         rows, columns = np.nonzero(occupied)
         for _ in range(rng.poisson(len(rows) * CELL_M / 25)):
             at = rng.integers(len(rows))
@@ -213,14 +242,22 @@ def _damaged(rng: Generator, gray: NDArray[np.uint8]) -> NDArray[np.uint8]:
     if chance(rng, 0.25):
         spots = (rng.random(gray.shape) < rng.uniform(0, 0.02)) & (gray == FREE)
         gray[spots] = UNKNOWN
-    if chance(rng, 0.15):
-        down, right = rng.integers(-4, 5, 2)
-        width = gray.shape[1]
-        low = int(rng.integers(0, width // 2))
-        again = np.roll(gray, (down, right), (0, 1))[:, low : low + width // 2] == OCCUPIED
-        part = gray[:, low : low + width // 2]
-        part[again & (part != OCCUPIED)] = OCCUPIED
+    if chance(rng, 0.2):
+        _doubled(rng, gray)
     return gray
+
+
+def _doubled(rng: Generator, gray: NDArray[np.uint8]) -> None:
+    """Draw a part of the walls again, shifted and turned a little, as after a poor closing of a loop."""
+    height, width = gray.shape
+    low, high = np.sort(rng.integers(0, width, 2))
+    center = float(low + high) / 2, height / 2
+    turn = cv2.getRotationMatrix2D(center, rng.normal(0, 0.6), 1.0)
+    turn[:, 2] = turn[:, 2] + rng.uniform(-3, 3, 2)
+    walls = (gray == OCCUPIED).astype(np.uint8)
+    again = cv2.warpAffine(walls, turn, (width, height), flags=cv2.INTER_NEAREST) > 0
+    again[:, :low] = again[:, high:] = False
+    gray[again] = OCCUPIED
 
 
 def _warped(

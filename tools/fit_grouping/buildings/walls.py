@@ -2,13 +2,34 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from fit_grouping.buildings.plans import Plan
 from fit_grouping.buildings.raster import Generator, Labels, Mask, between, cells, chance
+
+HOMES = frozenset({"home", "villa"})
+"""Kinds of plans that people live in."""
+DOOR_PLACE_MIN_M = 0.9
+"""A border that is as long has place for a door."""
+AXIS_SHARE_MIN = 0.4
+"""A border lies along the axes where its longest straight run is this share of it; else it may slant."""
+SLANT_TRIES, SLANT_NEAR_M, SLANT_TOLERANCE_CELLS = 4, 0.6, 1.5
+"""A slanting border is followed from this many of its points: the direction is that of the points around, and
+what is no farther from the line is on it."""
+WIDE_MAX_M = 4.0
+STUB_MIN_M = 0.2
+SHOULDER_MIN_M = 0.4
+"""Rooms without a jamb between them are parted where one is wider by this."""
+LOOK_ALONG_M = 8.0
+PUBLIC_AGAIN = 0.4
+"""Probability of one more opening between living rooms that are joined already."""
+WINDOWS, HOME_WINDOWS = 2.0, 2.5
+"""Windows of a building, on average."""
 
 
 @dataclass(frozen=True)
@@ -81,24 +102,147 @@ def border_runs(rooms: Labels) -> dict[tuple[int, int], list[Run]]:
     return runs
 
 
-def _clear(walls: Mask, run: Run, low: int, high: int, thickness: int) -> None:
-    reach = thickness // 2 + 2
-    across = slice(max(0, run.at - reach), run.at + reach + 2)
-    along = slice(low, high)
-    walls[(along, across) if run.upright else (across, along)] = 0
+@dataclass(frozen=True)
+class Stretch:
+    """A straight piece of border at any angle.
+
+    Attributes
+    ----------
+    start, direction : tuple of float
+        x, y of its beginning, in cells, and the unit vector along it.
+    length : int
+        In cells.
+    """
+
+    start: tuple[float, float]
+    direction: tuple[float, float]
+    length: int
+
+    def point(self, along: float, aside: float = 0.0) -> tuple[float, float]:
+        """x, y at a length along it and a distance to its left."""
+        (x, y), (u, v) = self.start, self.direction
+        return x + along * u - aside * v, y + along * v + aside * u
 
 
-def _leaf(rng: Generator, walls: Mask, run: Run, low: int, high: int) -> None:
+def straight_stretch(rng: Generator, runs: list[Run]) -> Stretch:
+    """A straight piece of a border: one along an axis where there is a long one, else at a slant."""
+    lengths = np.array([r.length for r in runs], float)
+    if lengths.max() >= cells(DOOR_PLACE_MIN_M) and lengths.max() >= AXIS_SHARE_MIN * lengths.sum():
+        run = runs[rng.choice(len(lengths), p=lengths**2 / (lengths**2).sum())]
+        start = (run.at + 0.5, float(run.low)) if run.upright else (float(run.low), run.at + 0.5)
+        return Stretch(start, (0.0, 1.0) if run.upright else (1.0, 0.0), run.length)
+    points = np.vstack([_points(run) for run in runs])
+    found = [_straight_around(points, int(seed)) for seed in rng.integers(0, len(points), SLANT_TRIES)]
+    return max(found, key=lambda stretch: stretch.length)
+
+
+def _points(run: Run) -> NDArray[np.float64]:
+    along = np.arange(run.low, run.high, dtype=float)
+    across = np.full(len(along), run.at + 0.5)
+    return np.column_stack([across, along] if run.upright else [along, across])
+
+
+def _straight_around(points: NDArray[np.float64], seed: int) -> Stretch:
+    """The straight piece of a border through one of its points."""
+    offset = points - points[seed]
+    near = offset[(offset**2).sum(1) <= cells(SLANT_NEAR_M) ** 2]
+    u, v = np.linalg.svd(near - near.mean(0), full_matrices=False)[2][0].tolist()
+    beside = offset @ np.array([-v, u])
+    along = np.sort((offset @ np.array([u, v]))[np.abs(beside) <= SLANT_TOLERANCE_CELLS])
+    gaps = np.flatnonzero(np.diff(along) > 2 * SLANT_TOLERANCE_CELLS)
+    pieces = np.split(along, gaps + 1)
+    piece = max(pieces, key=len)
+    x, y = points[seed] + piece[0] * np.array([u, v])
+    return Stretch((float(x), float(y)), (u, v), int(piece[-1] - piece[0]))
+
+
+def _clear(walls: Mask, stretch: Stretch, low: int, high: int, thickness: int) -> None:
+    reach = thickness // 2 + 2.5
+    ends = [(low, -reach), (high - 1, -reach), (high - 1, reach), (low, reach)]
+    corners = np.round([stretch.point(*end) for end in ends]).astype(np.int32)
+    cv2.fillPoly(walls, [corners], 0)
+
+
+def _leaf(rng: Generator, walls: Mask, stretch: Stretch, low: int, high: int) -> None:
     """A door leaf that stands open at an angle."""
     width = high - low
     angle = np.deg2rad(rng.uniform(40, 115))
     hinge, way = (low, 1) if chance(rng, 0.5) else (high - 1, -1)
     side = rng.choice([-1, 1])
-    tip = (hinge + way * width * np.cos(angle), run.at + side * width * np.sin(angle))
-    ends = [(hinge, run.at), (round(tip[0]), round(tip[1]))]
-    if run.upright:
-        ends = [(b, a) for a, b in ends]
+    tip = stretch.point(hinge + way * width * np.cos(angle), side * width * np.sin(angle))
+    ends = [(round(x), round(y)) for x, y in (stretch.point(hinge), tip)]
     cv2.line(walls, ends[0], ends[1], 1, 1)
+
+
+def _opening_kind(rng: Generator, plan: Plan, a: int, b: int) -> str:
+    """Door, wide opening, one with a jamb at one side, one that leaves stubs, or no jamb at all."""
+    if a in plan.corridors and b in plan.corridors and not (a in plan.public and b in plan.public):
+        return str(rng.choice(["door", "wide", "stub", "open"], p=[0.4, 0.25, 0.25, 0.1]))
+    if a in plan.public and b in plan.public:
+        return str(rng.choice(["door", "wide", "one side", "stub", "open"], p=[0.26, 0.26, 0.16, 0.16, 0.16]))
+    if chance(rng, plan.open_fronts):
+        return str(rng.choice(["wide", "stub", "open"], p=[0.55, 0.38, 0.07]))
+    return "door"
+
+
+def _opening(rng: Generator, kind: str, stretch: Stretch, thickness: int, usual_m: float) -> tuple[int, int]:
+    """First cell of an opening along a piece of border, and the one after its last."""
+    room_for = stretch.length - 2 * thickness
+    if kind == "door" or room_for < cells(1.5):
+        width = min(max(between(rng, usual_m * 0.9, usual_m * 1.15), cells(0.6)), room_for)
+        if chance(rng, 0.06):
+            width = min(2 * width, room_for)
+        last = stretch.length - width - thickness
+        stub = int(rng.integers(0, last + 1)) if chance(rng, 0.5) else int(rng.choice([thickness, last]))
+        low = max(thickness // 2 + 1, stub)
+    elif kind == "wide":
+        width = min(max(round(room_for * rng.uniform(0.3, 0.85)), cells(1.0)), cells(WIDE_MAX_M))
+        low = thickness + int(rng.integers(0, room_for - width + 1))
+    elif kind == "one side":
+        width = round(room_for * rng.uniform(0.45, 0.9))
+        low = thickness // 2 if chance(rng, 0.5) else stretch.length - width - thickness // 2
+    elif kind == "stub":
+        width = max(cells(0.8), room_for - 2 * cells(STUB_MIN_M) - between(rng, 0, 0.6))
+        low = (stretch.length - width) // 2
+    else:
+        low, width = thickness // 2, stretch.length - thickness
+    return low, min(low + width, stretch.length - thickness // 2)
+
+
+def _width_beside(rooms: Labels, stretch: Stretch, side: int) -> int:
+    """How far a room reaches along a piece of its border, half a meter from it, in cells."""
+    reach = cells(LOOK_ALONG_M)
+    along = np.arange(-reach, reach + 1) + stretch.length / 2
+    x, y = stretch.point(along, side * cells(0.5))  # type: ignore[arg-type]
+    x = np.clip(np.round(x).astype(int), 0, rooms.shape[1] - 1)
+    y = np.clip(np.round(y).astype(int), 0, rooms.shape[0] - 1)
+    same = rooms[y, x] == rooms[y[reach], x[reach]]
+    before = np.flatnonzero(~same[:reach])
+    after = np.flatnonzero(~same[reach:])
+    first = before[-1] + 1 if len(before) else 0
+    last = reach + after[0] if len(after) else len(same)
+    return int(last - first)
+
+
+def only_taste_parts(rooms: Labels, stretch: Stretch) -> bool:
+    """Whether two rooms that meet without jambs are of the same width there."""
+    widths = [_width_beside(rooms, stretch, side) for side in (-1, 1)]
+    return max(widths) < stretch.length + cells(SHOULDER_MIN_M)
+
+
+class _Groups:
+    """Sets of rooms that are united one by one."""
+
+    def __init__(self, rooms: Iterable[int]) -> None:
+        self.parent = {n: n for n in rooms}
+
+    def of(self, n: int) -> int:
+        while self.parent[n] != n:
+            n = self.parent[n]
+        return n
+
+    def unite(self, a: int, b: int) -> None:
+        self.parent[self.of(a)] = self.of(b)
 
 
 def build_walls(rng: Generator, plan: Plan) -> WalledPlan:
@@ -115,91 +259,70 @@ def build_walls(rng: Generator, plan: Plan) -> WalledPlan:
     inner_side = (walls * outer).astype(np.uint8)
     runs = border_runs(rooms)
     neighbors: dict[int, list[int]] = {int(n): [] for n in np.unique(rooms[rooms > 0])}
-    root = {n: n for n in neighbors}
-    taste = {n: n for n in neighbors}
-
-    def find(tree: dict[int, int], n: int) -> int:
-        while tree[n] != n:
-            n = tree[n]
-        return n
-
-    pairs = [p for p, parts in runs.items() if p[0] > 0 and max(r.length for r in parts) >= cells(0.9)]
-    ways = plan.corridors | plan.halls
+    reached, taste = _Groups(neighbors), _Groups(neighbors)
+    place_min = cells(DOOR_PLACE_MIN_M)
+    pairs = [p for p, parts in runs.items() if p[0] > 0 and sum(r.length for r in parts) >= place_min]
+    ways = plan.corridors | plan.halls | plan.public
     order = sorted(pairs, key=lambda p: (not (p[0] in ways or p[1] in ways)) + rng.uniform(0, 0.9))
     usual_m = rng.uniform(0.75, 1.1)
     leaves = rng.choice([0.0, 0.15, 0.4])
     for a, b in order:
         both_corridors = a in plan.corridors and b in plan.corridors
-        toward_way = (a in ways) != (b in ways)
-        joined = find(root, a) == find(root, b)
-        if joined and not both_corridors and not chance(rng, 0.1 if toward_way else 0.05):
+        again = (
+            PUBLIC_AGAIN
+            if a in plan.public and b in plan.public
+            else 0.1
+            if (a in ways) != (b in ways)
+            else 0.05
+        )
+        joined = reached.of(a) == reached.of(b)
+        if joined and not both_corridors and not chance(rng, again):
             continue
-        lengths = np.array([r.length for r in runs[a, b]], float)
-        run = runs[a, b][rng.choice(len(lengths), p=lengths**2 / (lengths**2).sum())]
-        room_for = run.length - 2 * thickness
-        if room_for < cells(0.6):
+        stretch = straight_stretch(rng, runs[a, b])
+        if stretch.length - 2 * thickness < cells(0.6):
             continue
-        if both_corridors:
-            kind = rng.choice(["door", "wide", "stub", "open"], p=[0.3, 0.25, 0.3, 0.15])
-        elif chance(rng, plan.open_fronts):
-            kind = rng.choice(["wide", "stub", "open"], p=[0.55, 0.38, 0.07])
-        else:
-            kind = "door"
-        least_stub = cells(0.2)
-        if kind == "door" or room_for < cells(1.5):
-            width = min(max(between(rng, usual_m * 0.9, usual_m * 1.15), cells(0.6)), room_for)
-            if chance(rng, 0.06):
-                width = min(2 * width, room_for)
-            stub = int(rng.integers(0, run.length - width - thickness + 1)) if chance(rng, 0.5) else None
-            stub = stub if stub is not None else rng.choice([thickness, run.length - width - thickness])
-            low = run.low + max(thickness // 2 + 1, int(stub))
-        elif kind == "wide":
-            width = round(room_for * rng.uniform(0.3, 0.8))
-            low = run.low + thickness + int(rng.integers(0, room_for - width + 1))
-        elif kind == "stub":
-            width = max(cells(0.8), room_for - 2 * least_stub - between(rng, 0, 0.6))
-            low = run.low + (run.length - width) // 2
-        else:
-            low, width = run.low + thickness // 2, run.length - thickness
-            taste[find(taste, a)] = find(taste, b)
-        high = min(low + width, run.high - thickness // 2)
-        _clear(walls, run, low, high, thickness)
+        kind = _opening_kind(rng, plan, a, b)
+        low, high = _opening(rng, kind, stretch, thickness, usual_m)
+        if kind == "open" and (both_corridors or only_taste_parts(rooms, stretch)):
+            taste.unite(a, b)
+        _clear(walls, stretch, low, high, thickness)
         if kind == "door" and high - low < cells(1.3) and chance(rng, leaves):
-            _leaf(rng, walls, run, low, high)
-        root[find(root, a)] = find(root, b)
+            _leaf(rng, walls, stretch, low, high)
+        reached.unite(a, b)
         neighbors[a].append(b)
         neighbors[b].append(a)
     for (low_room, _), parts in runs.items():
         if low_room == 0 and chance(rng, 0.04):
-            run = max(parts, key=lambda r: r.length)
-            if run.length > cells(1.6):
-                middle = (run.low + run.high) // 2
-                _clear(walls, run, middle - cells(0.45), middle + cells(0.45), thickness)
-    _stubs(rng, walls, thickness, rng.poisson(1.5 if plan.kind == "home" else 4))
-    glass = _glass(rng, walls, inner_side)
-    united = np.array([0, *(find(taste, n) for n in sorted(taste))], np.int32)
+            stretch = straight_stretch(rng, parts)
+            if stretch.length > cells(1.6):
+                middle = stretch.length // 2
+                _clear(walls, stretch, middle - cells(0.45), middle + cells(0.45), thickness)
+    mean, longest_m = (1.5, 0.8) if plan.kind in HOMES else (rng.choice([3, 14]), 1.5)
+    _stubs(rng, walls, thickness, rng.poisson(mean), longest_m)
+    glass = _glass(rng, walls, inner_side, HOME_WINDOWS if plan.kind in HOMES else WINDOWS)
     number = np.zeros(int(rooms.max()) + 1, np.int32)
-    number[[0, *sorted(taste)]] = united
+    for room in neighbors:
+        number[room] = taste.of(room)
     return WalledPlan(plan, walls, glass, neighbors, number[rooms])
 
 
-def _stubs(rng: Generator, walls: Mask, thickness: int, count: int) -> None:
+def _stubs(rng: Generator, walls: Mask, thickness: int, count: int, longest_m: float) -> None:
     """Pillars and short pieces of wall that stand into rooms."""
     rows, columns = np.nonzero(walls)
     for _ in range(count):
         at = int(rng.integers(len(rows)))
         along = [(1, 0), (-1, 0), (0, 1), (0, -1)][rng.integers(4)]
-        reach = between(rng, 0.2, 0.8)
+        reach = between(rng, 0.2, longest_m)
         end = (int(columns[at] + along[0] * reach), int(rows[at] + along[1] * reach))
         cv2.line(walls, (int(columns[at]), int(rows[at])), end, 1, max(1, thickness - 1))
 
 
-def _glass(rng: Generator, walls: Mask, outer_walls: Mask) -> Mask:
+def _glass(rng: Generator, walls: Mask, outer_walls: Mask, windows: float) -> Mask:
     """Stretches of wall that rays pass: windows mostly, panes of inner walls at times."""
-    if chance(rng, 0.05):  # a front of glass
+    if chance(rng, 0.01):  # a front of glass
         return outer_walls.copy()
     glass = np.zeros_like(walls)
-    for mask, mean, low_m, high_m in ((outer_walls, 2.0, 0.3, 1.5), (walls, 0.5, 0.3, 0.8)):
+    for mask, mean, low_m, high_m in ((outer_walls, windows, 0.3, 2.0), (walls, 0.5, 0.3, 0.8)):
         rows, columns = np.nonzero(mask)
         if len(rows) == 0 or chance(rng, 0.5):
             continue

@@ -1,0 +1,34 @@
+"""Which plans are made, and how often."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from fit_grouping.buildings.plans import Plan, campus, chamfers, cubicles, hall, home, office, passage
+from fit_grouping.buildings.raster import Generator
+from fit_grouping.buildings.villas import villa
+
+MAKERS: tuple[tuple[Callable[[Generator], Plan], float], ...] = (
+    (villa, 0.25),
+    (home, 0.15),
+    (office, 0.25),
+    (cubicles, 0.06),
+    (campus, 0.12),
+    (passage, 0.05),
+    (hall, 0.12),
+)
+"""Makers of plans and their shares."""
+TIDY_CORNERS = {"villa": (0.0, 0.0), "passage": (0.0, 0.0), "hall": (0.5, 0.0)}
+"""How many corners are cut off a building of a kind and how many of its rooms are cut in two, on average."""
+USUAL_CORNERS = (0.35, 0.15)
+
+
+def make_plan(rng: Generator) -> Plan:
+    """Lay out a building of a random kind."""
+    makers, shares = zip(*MAKERS, strict=True)
+    plan: Plan = makers[rng.choice(len(makers), p=np.array(shares) / sum(shares))](rng)
+    chamfers(rng, plan, *TIDY_CORNERS.get(plan.kind, USUAL_CORNERS))
+    plan.tidy()
+    return plan
