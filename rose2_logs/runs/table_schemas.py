@@ -28,6 +28,7 @@ _NULLABLE = frozenset(
         "changed_share",
         "final_iou",
         "final_share",
+        "known_final_share",
         "shift_x_m",
         "shift_y_m",
         "turn_rad",
