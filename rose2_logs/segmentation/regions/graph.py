@@ -223,7 +223,7 @@ def _border_records(
     if answers is not None:
         for k, (down, right) in enumerate(OFFSETS):
             a = atoms[down:, right:]
-            b = atoms[: atoms.shape[0] - down, : atoms.shape[1] - right]
+            b = atoms[: max(atoms.shape[0] - down, 0), : max(atoms.shape[1] - right, 0)]
             asked = (a != b) & (a > 0) & (b > 0)
             key, index = np.unique(_pair_key(a[asked], b[asked], count), return_inverse=True)
             record = np.zeros((len(key), len(BORDER_SUMS)))
