@@ -23,12 +23,10 @@ from rose2_logs.config.baselines import (
 )
 from rose2_logs.config.comparison import ComparisonParameters
 from rose2_logs.config.fields import ParameterBlock, choice, number
+from rose2_logs.config.regions import RegionParameters
 from rose2_logs.config.tracking import QualityParameters, TrackingParameters
 from rose2_logs.errors import ParameterError
 from rose2_logs.system.files import reason_of
-
-DETAIL_MOST = 20.0
-"""Greatest and, negative, least detail, log odds: surer than any answer."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -319,63 +317,6 @@ class FloorPlanParameters(ParameterBlock):
     )
     room_min_area_m2: float = number(3.0, "m2", "Smaller pieces of free space are not rooms.", 0.0)
     room_min_clearance_m: float = number(0.6, "m", "Half the width of the narrowest room.", 0.0)
-
-
-@dataclass(frozen=True, repr=False)
-class RegionParameters(ParameterBlock):
-    """Stage C with fitted borders: atoms of the floor, and how far they are joined."""
-
-    block: ClassVar[str] = "regions"
-
-    clean_min_score: float = number(
-        0.35,
-        "score",
-        "Clean map that the atoms' faces come from: a wall that goes on for a third of a room's side.",
-        0,
-        1,
-    )
-    speck_max_m: float = number(0.25, "m", "Shorter occupied pieces bound no basin: legs, noise.", 0.0)
-    summit_reach_m: float = number(
-        0.5, "m", "Summits of the clearance are this far apart at least: half of the narrowest room.", 0.0
-    )
-    clearance_blur_m: float = number(0.05, "m", "Blur of the clearance: a cell of 5 cm.", 0.001)
-    atom_min_m2: float = number(
-        0.15,
-        "m2",
-        "Smaller pieces go to the neighbor that they touch most: less than the floor of any closet.",
-        0.0,
-    )
-    answer_weight: float = number(
-        1.0, "1", "Weight of the network's answers beside the trees' 1; equal was best on maps left out.", 0.0
-    )
-    answer_scale: float = number(
-        12.0,
-        "1",
-        "Log odds per difference of the mean answer from one half, of the order of the trees' own.",
-        0.0,
-    )
-    detail: float = number(
-        0.0,
-        "log odds",
-        "Regions are joined if that is likelier right than wrong; more detail asks for surer joins and gives "
-        "more and smaller rooms, less gives fewer.",
-        -DETAIL_MOST,
-        DETAIL_MOST,
-    )
-    room_min_log_odds: float = number(
-        0.0, "log odds", "Regions are rooms rather than outside from even odds on.", -20, 20
-    )
-    outside_max_share: float = number(
-        0.8, "share", "Where more than this share of a map would be outside, nothing is.", 0, 1
-    )
-    room_min_area_m2: float = number(1.0, "m2", "Smaller regions are not rooms: a toilet has 1 m2.", 0.0)
-    loose_reach_m: float = number(
-        0.5, "m", "Free cells too few for an atom belong to the room this near.", 0.0
-    )
-    piece_gap_m: float = number(
-        0.3, "m", "Pieces of a room hang together across gaps of this much noise; others are rooms.", 0.0
-    )
-    door_max_width_m: float = number(1.4, "m", "Wider openings between rooms are not doors.", 0.0)
 
 
 @dataclass(frozen=True, repr=False)

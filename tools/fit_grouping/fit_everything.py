@@ -30,7 +30,7 @@ from fit_grouping.outside import fit_outside
 from fit_grouping.preparing import PreparedMap, answered, prepared_benchmark, prepared_simulated
 from fit_grouping.sampling import Samples, by_hand
 from fit_grouping.tree_files import write_trees
-from rose2_logs.config.parameters import RegionParameters
+from rose2_logs.config.regions import RegionParameters
 from rose2_logs.segmentation.regions.features import REGION_FEATURES, SHAPE_FEATURES
 from rose2_logs.segmentation.regions.fitted import JOINS, MANIFEST, NETWORK, OUTSIDE, sha256_of
 from rose2_logs.segmentation.regions.joining import join_regions

@@ -71,6 +71,8 @@ def gather(examples: Sequence[Example], strength: Strength, noise: float, seed: 
         s = sample_joins(example.graph, example.tables, strength, noise, seed + k)
         if len(s.right):
             parts.append((s.features, s.right, s.weight * example.weight / s.weight.sum()))
+    if not parts:
+        return Samples(np.zeros((0, len(FEATURES))), np.zeros(0, bool), np.zeros(0))
     features, right, weight = (np.concatenate(p) for p in zip(*parts, strict=True))
     return Samples(features, right, weight)
 

@@ -18,7 +18,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from fit_grouping.maps_with_truth import load_benchmark
 from fit_grouping.preparing import atoms_of
 from fit_grouping.scores import overlap_table, upper_bound
-from rose2_logs.config.parameters import Parameters, RegionParameters
+from rose2_logs.config.parameters import Parameters
+from rose2_logs.config.regions import RegionParameters
 
 
 def main() -> None:

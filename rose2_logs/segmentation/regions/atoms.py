@@ -9,7 +9,7 @@ from scipy import ndimage
 from skimage.measure import label
 from skimage.segmentation import watershed
 
-from rose2_logs.config.parameters import RegionParameters
+from rose2_logs.config.regions import RegionParameters
 from rose2_logs.model.labels import contacts
 from rose2_logs.model.occupancy import BoolArray
 from rose2_logs.segmentation.regions.plan_frame import Labels, PlanFrame, grown_labels, without_specks

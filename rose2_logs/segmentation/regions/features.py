@@ -41,37 +41,83 @@ OCTAGON_CORNER = 0.5
 
 def joinable(graph: RegionGraph) -> NDArray[np.bool_]:
     """Borders (M,) along which regions touch, or face one another with nothing known between."""
-    contact = graph.border_sums[:, 0] + graph.border_sums[:, 1]
+    contact = _contact(graph)
     can: NDArray[np.bool_] = (contact >= CONTACT_MIN_M) | (graph.border_sums[:, 3] >= FACING_MIN_M)
     return can
 
 
 def join_features(graph: RegionGraph, which: NDArray[np.intp]) -> FloatArray:
     """Features (K, len(FEATURES)) of the borders of the given numbers (K,)."""
-    n = {name: graph.node_sums[:, k] for k, name in enumerate(NODE_SUMS)}
-    top = {name: graph.node_maxima[:, k] for k, name in enumerate(NODE_MAXIMA)}
-    s = {name: graph.border_sums[which, k] for k, name in enumerate(BORDER_SUMS)}
-    m = {name: graph.border_maxima[which, k] for k, name in enumerate(BORDER_MAXIMA)}
+    area = graph.node_sums[:, NODE_SUMS.index("area")]
     ends = graph.ends[which]
-    swap = n["area"][ends[:, 0]] > n["area"][ends[:, 1]]
+    swap = area[ends[:, 0]] > area[ends[:, 1]]
     small, large = np.where(swap, ends[:, 1], ends[:, 0]), np.where(swap, ends[:, 0], ends[:, 1])
-    all_contact = graph.border_sums[:, 0] + graph.border_sums[:, 1]
-    open_edges = _at_ends(graph, all_contact)
-    neighbors = _at_ends(graph, (all_contact > 0.1).astype(float))
-    outline = n["wall_edges"] + n["unknown_edges"] + open_edges + 0.01
+    columns = [
+        *_contact_columns(graph, which, small, large),
+        *_clearance_columns(graph, which, small, large),
+        *_form_columns(graph, which, small, large),
+        *_answer_columns(graph, which, small, large),
+    ]
+    return np.stack(columns, axis=1)
+
+
+def _named(values: FloatArray, names: tuple[str, ...]) -> dict[str, FloatArray]:
+    return {name: values[:, k] for k, name in enumerate(names)}
+
+
+def _contact_columns(
+    graph: RegionGraph, which: NDArray[np.intp], small: NDArray[np.int64], large: NDArray[np.int64]
+) -> list[FloatArray]:
+    """How two regions meet: from `log_contact` to `line_long`."""
+    n = _named(graph.node_sums, NODE_SUMS)
+    s, m = _named(graph.border_sums[which], BORDER_SUMS), _named(graph.border_maxima[which], BORDER_MAXIMA)
+    outline = _outline(graph)
     contact = s["upright"] + s["level"]
-    some = contact > 0
-    per_contact = np.where(some, 1 / np.maximum(contact, 1e-9), 0.0)
-
-    def finite(values: FloatArray) -> FloatArray:
-        return np.where(some, values, 0.0)
-
-    width, height = (finite(m[f"{a}_high"] + m[f"{a}_low"]) for a in "xy")
+    per_contact = np.where(contact > 0, 1 / np.maximum(contact, 1e-9), 0.0)
+    width, height = (np.where(contact > 0, m[f"{a}_high"] + m[f"{a}_low"], 0.0) for a in "xy")
     chord = np.hypot(width, height) + 0.01
     side = np.hypot(s["upright"], s["level"])
-    saddle, strong = np.minimum(finite(m["saddle"]), 4.0), np.minimum(finite(m["saddle_strong"]), 4.0)
-    clear = [top["clear"][small], top["clear"][large]]
-    clear_strong = [top["clear_strong"][small], top["clear_strong"][large]]
+    facing = s["facing_wall"] + s["facing_unknown"]
+    return [
+        np.log(contact + 0.05),
+        contact / outline[small],
+        contact / outline[large],
+        side / np.sqrt(n["area"][small]),
+        contact / (contact + facing + 0.01),
+        np.minimum(side / chord, 4.0),
+        np.log(chord + 0.05),
+        s["on_face"] * per_contact,
+        s["line_0"] * per_contact,
+        s["line_1"] * per_contact,
+        s["line_2"] * per_contact,
+    ]
+
+
+def _clearance_columns(
+    graph: RegionGraph, which: NDArray[np.intp], small: NDArray[np.int64], large: NDArray[np.int64]
+) -> list[FloatArray]:
+    """How narrow the passage is: from `saddle` to `strong_saddle_per_clear_high`."""
+    top = _named(graph.node_maxima, NODE_MAXIMA)
+    s, m = _named(graph.border_sums[which], BORDER_SUMS), _named(graph.border_maxima[which], BORDER_MAXIMA)
+    contact = s["upright"] + s["level"]
+    per_contact = np.where(contact > 0, 1 / np.maximum(contact, 1e-9), 0.0)
+    columns = []
+    for saddle_name, clear_name in (("saddle", "clear"), ("saddle_strong", "clear_strong")):
+        saddle = np.minimum(np.where(contact > 0, m[saddle_name], 0.0), 4.0)
+        low = np.minimum(top[clear_name][small], top[clear_name][large])
+        high = np.maximum(top[clear_name][small], top[clear_name][large])
+        columns += [saddle, np.minimum(saddle / (low + 0.02), 1.5), np.minimum(saddle / (high + 0.02), 1.5)]
+        if saddle_name == "saddle":
+            columns.append(s["clear"] * per_contact / (saddle + 0.02))
+    return columns
+
+
+def _form_columns(
+    graph: RegionGraph, which: NDArray[np.intp], small: NDArray[np.int64], large: NDArray[np.int64]
+) -> list[FloatArray]:
+    """Sizes and forms of two regions and of what they would be together: from `log_area_small` on."""
+    n, s = _named(graph.node_sums, NODE_SUMS), _named(graph.border_sums[which], BORDER_SUMS)
+    outline, neighbors = _outline(graph), _at_ends(graph, (_contact(graph) > 0.1).astype(float))
     box = _boxes(graph.node_maxima)
     box_small, box_large = box[small], box[large]
     union_maxima = np.maximum(graph.node_maxima[small], graph.node_maxima[large])
@@ -90,26 +136,7 @@ def join_features(graph: RegionGraph, which: NDArray[np.intp]) -> FloatArray:
 
     # A border that takes the whole side of a region leaves no wall beside it.
     spans = [np.maximum(s["upright"] / b[:, 1], s["level"] / b[:, 0]) for b in (box_small, box_large)]
-    facing = s["facing_wall"] + s["facing_unknown"]
-    columns = [
-        np.log(contact + 0.05),
-        contact / outline[small],
-        contact / outline[large],
-        side / np.sqrt(area_small),
-        contact / (contact + facing + 0.01),
-        np.minimum(side / chord, 4.0),
-        np.log(chord + 0.05),
-        s["on_face"] * per_contact,
-        s["line_0"] * per_contact,
-        s["line_1"] * per_contact,
-        s["line_2"] * per_contact,
-        saddle,
-        np.minimum(saddle / (np.minimum(*clear) + 0.02), 1.5),
-        np.minimum(saddle / (np.maximum(*clear) + 0.02), 1.5),
-        s["clear"] * per_contact / (saddle + 0.02),
-        strong,
-        np.minimum(strong / (np.minimum(*clear_strong) + 0.02), 1.5),
-        np.minimum(strong / (np.maximum(*clear_strong) + 0.02), 1.5),
+    return [
         np.log(area_small + 0.01),
         np.log(area_large + 0.01),
         area_small / area_large,
@@ -132,16 +159,35 @@ def join_features(graph: RegionGraph, which: NDArray[np.intp]) -> FloatArray:
         n["wide"][small] / area_small,
         n["wide"][large] / area_large,
     ]
+
+
+def _answer_columns(
+    graph: RegionGraph, which: NDArray[np.intp], small: NDArray[np.int64], large: NDArray[np.int64]
+) -> list[FloatArray]:
+    """What the network says: from `different_near` on."""
+    n, s = _named(graph.node_sums, NODE_SUMS), _named(graph.border_sums[which], BORDER_SUMS)
     different = np.stack([s[f"different_{k}"] for k in range(3)])
     pairs = np.stack([s[f"pairs_{k}"] for k in range(3)])
-    columns += [_ratio(d, p) for d, p in zip(different, pairs, strict=True)]
-    columns += [
+    return [
+        *(_ratio(d, p) for d, p in zip(different, pairs, strict=True)),
         _ratio(different.sum(0), pairs.sum(0)),
         np.log(pairs.sum(0) + 1),
-        n["outside"][small] / area_small,
-        n["outside"][large] / area_large,
+        n["outside"][small] / n["area"][small],
+        n["outside"][large] / n["area"][large],
     ]
-    return np.stack(columns, axis=1)
+
+
+def _contact(graph: RegionGraph) -> FloatArray:
+    """Length (M,) along which the regions of each border touch."""
+    contact: FloatArray = graph.border_sums[:, 0] + graph.border_sums[:, 1]
+    return contact
+
+
+def _outline(graph: RegionGraph) -> FloatArray:
+    """Length (N,) of the outline of each region."""
+    n = _named(graph.node_sums, NODE_SUMS)
+    outline: FloatArray = n["wall_edges"] + n["unknown_edges"] + _at_ends(graph, _contact(graph)) + 0.01
+    return outline
 
 
 def _at_ends(graph: RegionGraph, values: FloatArray) -> FloatArray:
@@ -182,11 +228,8 @@ REGION_FEATURES = (
 
 def region_features(graph: RegionGraph) -> FloatArray:
     """Features (N, len(REGION_FEATURES)) of the regions of a graph."""
-    n = {name: graph.node_sums[:, k] for k, name in enumerate(NODE_SUMS)}
-    contact = graph.border_sums[:, 0] + graph.border_sums[:, 1]
-    open_edges = _at_ends(graph, contact)
-    outline = n["wall_edges"] + n["unknown_edges"] + open_edges + 0.01
-    area = n["area"]
+    n = _named(graph.node_sums, NODE_SUMS)
+    open_edges, outline, area = _at_ends(graph, _contact(graph)), _outline(graph), n["area"]
     columns = [
         np.log(area + 0.01),
         n["outside"] / area,

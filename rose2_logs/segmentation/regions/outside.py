@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rose2_logs.config.parameters import RegionParameters
+from rose2_logs.config.regions import RegionParameters
 from rose2_logs.model.occupancy import BoolArray
 from rose2_logs.segmentation.regions.features import region_features
 from rose2_logs.segmentation.regions.graph import RegionGraph

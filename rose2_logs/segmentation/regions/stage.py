@@ -10,7 +10,8 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from rose2_logs.config.parameters import DETAIL_MOST, Parameters, RegionParameters
+from rose2_logs.config.parameters import Parameters
+from rose2_logs.config.regions import DETAIL_MOST, RegionParameters
 from rose2_logs.model.labels import label_sizes
 from rose2_logs.model.occupancy import BoolArray
 from rose2_logs.segmentation.floor_plan.edge_weights import edge_evidence
