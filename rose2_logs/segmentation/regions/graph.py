@@ -244,9 +244,10 @@ def _wall_along(wall: BoolArray, upright: bool, length_m: float, cell_m: float) 
     """Share of a window along a line through each cell in which there is wall, a cell beside it counted."""
     size = 2 * round(length_m / cell_m / 2) + 1
     across = np.ones((1, 3), np.uint8) if upright else np.ones((3, 1), np.uint8)
-    near = cv2.dilate(wall.astype(np.uint8), across).astype(np.float32)
+    near = cv2.dilate(wall.astype(np.uint8), across)
     window = (1, size) if upright else (size, 1)
-    return cv2.blur(near, window, borderType=cv2.BORDER_CONSTANT).astype(np.float32)
+    cells = cv2.boxFilter(near, cv2.CV_32S, window, normalize=False, borderType=cv2.BORDER_CONSTANT)
+    return (cells / np.float32(size)).astype(np.float32)
 
 
 def _clearance(blocked: BoolArray, cell_m: float) -> NDArray[np.float32]:

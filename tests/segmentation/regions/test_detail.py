@@ -6,6 +6,8 @@ import dataclasses
 import itertools
 import pickle
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from drawn_maps import office, snapshot
@@ -34,7 +36,7 @@ def grown() -> RoomTree:
 def test_more_detail_never_joins_what_less_detail_parts(grown: RoomTree, strength):
     tree = grown.tree
     if strength is not None:
-        tree = RegionTree(tree.cells, tree.free, tree.resolution_m, tree.graph, strength, tree.parameters)
+        tree = replace(tree, strength=strength)
     found = [tree.rooms(detail).labels for detail in DETAILS]
     of_atoms = tree.cells > 0
     for coarse, fine in itertools.pairwise(found):
