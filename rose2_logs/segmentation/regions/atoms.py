@@ -47,8 +47,9 @@ def cut_atoms(
     atoms : (H, W) int32
         1.. on the free cells, 0 elsewhere and on loose cells.
     """
-    solid = frame.share(without_specks(occupied, parameters.speck_max_m / resolution_m)) > 0
-    open_cells = (frame.share(free) > 0) & ~solid
+    walls = without_specks(occupied, parameters.speck_max_m / resolution_m)
+    solid, open_cells = frame.shares(walls, free) > 0
+    open_cells &= ~solid
     basins = grown_labels(
         clearance_basins(open_cells, solid, frame.cell_m, parameters), BASIN_REACH_M / frame.cell_m
     )
