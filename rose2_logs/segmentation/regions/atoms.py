@@ -64,8 +64,10 @@ def clearance_basins(
 ) -> Labels:
     """Basins (H, W) of the clearance on the free cells: each belongs to one summit."""
     distance = cv2.distanceTransform((~blocked).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
-    steps = np.minimum(np.rint(distance * CLEARANCE_STEPS), np.iinfo(np.uint16).max).astype(np.uint16)
-    smooth = cv2.GaussianBlur(steps, (0, 0), parameters.clearance_blur_m / cell_m).astype(np.int32)
+    # No clearance is larger than what 16 bits tell.
+    steps = np.rint(np.minimum(distance, np.iinfo(np.uint16).max // CLEARANCE_STEPS) * CLEARANCE_STEPS)
+    sigma = parameters.clearance_blur_m / cell_m
+    smooth = cv2.GaussianBlur(steps.astype(np.uint16), (0, 0), sigma).astype(np.int32)
     height = np.where(free, smooth, -1).astype(np.float32)
     width = 2 * max(1, round(parameters.summit_reach_m / cell_m)) + 1
     summits = free & (height == cv2.dilate(height, np.ones((width, width), np.uint8)))

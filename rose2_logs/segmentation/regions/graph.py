@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import chain
 
 import cv2
 import numpy as np
@@ -155,9 +157,9 @@ def build_graph(
     node_maxima = np.full((count, len(NODE_MAXIMA)), -np.inf)
     x, y = (column + 0.5) * cell_m, (row + 0.5) * cell_m
     half = cell_m / 2
-    values = [clear[row, column], clear_strong[row, column], x + half, half - x, y + half, half - y]
-    values += [x + y + cell_m, cell_m - x - y, x - y + cell_m, cell_m - x + y]
-    _fill_maxima(node_maxima, node, values)
+    reaches = ((1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, -1), (1, -1), (-1, 1))
+    extents = (a * x + b * y + half * (abs(a) + abs(b)) for a, b in reaches)
+    _fill_maxima(node_maxima, node, chain((c[row, column] for c in (clear, clear_strong)), extents))
     # An atom that no center of a plan cell meets.
     missed = np.isinf(node_maxima[:, 0])
     node_maxima[missed] = 0
@@ -166,13 +168,13 @@ def build_graph(
     key, index = np.unique(keys, return_inverse=True)
     border_maxima = np.full((len(key), len(BORDER_MAXIMA)), -np.inf)
     touching = np.isfinite(maxima[:, 0])
-    _fill_maxima(border_maxima, index[touching], list(maxima[touching].T))
+    _fill_maxima(border_maxima, index[touching], maxima[touching].T)
     ends = np.column_stack(np.divmod(key, max(count, 1)))
     return RegionGraph(node_sums, node_maxima, ends, _summed(sums, index, len(key)), border_maxima)
 
 
-def _fill_maxima(out: FloatArray, index: NDArray[np.int64], values: list[NDArray[np.floating]]) -> None:
-    """Greatest of the values of each index, by sorting once."""
+def _fill_maxima(out: FloatArray, index: NDArray[np.int64], values: Iterable[NDArray[np.floating]]) -> None:
+    """Greatest of the values of each index, a column at a time, by sorting once."""
     if len(index) == 0:
         return
     order = np.argsort(index, kind="stable")
@@ -223,7 +225,7 @@ def _border_records(
     if answers is not None:
         for k, (down, right) in enumerate(OFFSETS):
             a = atoms[down:, right:]
-            b = atoms[: atoms.shape[0] - down, : atoms.shape[1] - right]
+            b = atoms[: max(0, atoms.shape[0] - down), : max(0, atoms.shape[1] - right)]
             asked = (a != b) & (a > 0) & (b > 0)
             key, index = np.unique(_pair_key(a[asked], b[asked], count), return_inverse=True)
             record = np.zeros((len(key), len(BORDER_SUMS)))
