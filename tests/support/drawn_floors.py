@@ -1,4 +1,4 @@
-"""Floors drawn from rectangles in meters, with their rooms: grids of rooms, offices with toilets, outsides."""
+"""Floors drawn from rectangles in meters, with their rooms: grids of rooms, offices, white around them."""
 
 from __future__ import annotations
 
@@ -72,7 +72,9 @@ def room_grid(rows: int, columns: int, side_m: float, door_m: float = 0.8) -> Fl
     """Square rooms in a grid, a door in the middle of every wall between two of them: all in line."""
     step = side_m + WALL_M
     rooms = [
-        (c * step, r * step, c * step + side_m, r * step + side_m) for r in range(rows) for c in range(columns)
+        (c * step, r * step, c * step + side_m, r * step + side_m)
+        for r in range(rows)
+        for c in range(columns)
     ]
     first, last = (side_m - door_m) / 2, (side_m + door_m) / 2
     doors = [
@@ -111,7 +113,7 @@ def corridor_of_offices(
 
 
 def turned(floor: Floor, degrees: float) -> Floor:
-    """The floor turned about its middle on a canvas that holds all of it: nearest cells, unknown beside it."""
+    """The floor turned about its middle: the nearest cells, unknown where none is."""
     angle = np.radians(degrees)
     c, s = np.cos(angle), np.sin(angle)
     height, width = floor.cells.shape

@@ -33,10 +33,10 @@ def edge_shares(atoms: Labels, raster: PlanRaster, count: int) -> FloatArray:
         Number of atoms.
     """
     known = ((raster.wall > 0) | (raster.free > 0)).astype(np.uint8)
-    points = cv2.findNonZero(known)
-    if points is None:
+    if not known.any():
         return np.zeros(count)
-    edge = cv2.polylines(np.zeros_like(known), [cv2.convexHull(points)], isClosed=True, color=1) > 0
+    hull = cv2.convexHull(cv2.findNonZero(known))
+    edge = cv2.polylines(np.zeros_like(known), [hull], isClosed=True, color=1) > 0
     beside = np.where(raster.wall > 0, 0, grown_labels(atoms, EDGE_REACH_CELLS))[edge]
     return np.bincount(beside, minlength=count + 1)[1:] / len(beside)
 

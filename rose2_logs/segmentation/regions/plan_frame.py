@@ -70,7 +70,8 @@ class PlanFrame:
 
     def share(self, mask: BoolArray, per_side: int = 3) -> NDArray[np.float32]:
         """Share of each plan cell that a mask of the map covers, of `per_side` squared points."""
-        return self.shares(mask, per_side=per_side)[0]
+        (share,) = self.shares(mask, per_side=per_side)
+        return np.asarray(share, np.float32)
 
     def shares(self, *masks: BoolArray, per_side: int = 3) -> NDArray[np.float32]:
         """Share (M, P, Q) of each plan cell that each of some masks of the map covers, see `share`."""

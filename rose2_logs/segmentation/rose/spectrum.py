@@ -155,6 +155,9 @@ def dominant_directions(energy: FloatArray, parameters: SpectrumParameters) -> t
     curvature = left - 2 * center + right
     shift = np.divide(left - right, 2 * curvature, out=np.zeros(len(peaks)), where=curvature < 0)
     step = np.rint((peaks + shift) / bins * DIRECTION_STEPS) % DIRECTION_STEPS
-    directions, strengths = step * (np.pi / DIRECTION_STEPS), np.rint(center * STRENGTH_STEPS) / STRENGTH_STEPS
+    directions, strengths = (
+        step * (np.pi / DIRECTION_STEPS),
+        np.rint(center * STRENGTH_STEPS) / STRENGTH_STEPS,
+    )
     order = np.lexsort((directions, -strengths))
     return directions[order], strengths[order]

@@ -20,7 +20,9 @@ from rose2_logs.segmentation.regions.plan_raster import (
 @pytest.fixture(scope="module")
 def raster():
     cells = room_grid(6, 8, 3.0).cells[::2, ::2]
-    return PlanRaster(((cells > 0) * SHARE_STEPS).astype(np.uint8), ((cells == 0) * SHARE_STEPS).astype(np.uint8))
+    return PlanRaster(
+        ((cells > 0) * SHARE_STEPS).astype(np.uint8), ((cells == 0) * SHARE_STEPS).astype(np.uint8)
+    )
 
 
 @pytest.fixture(scope="module")

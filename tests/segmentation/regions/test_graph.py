@@ -12,7 +12,13 @@ from rose2_logs.segmentation.regions.features import (
     joinable,
     region_features,
 )
-from rose2_logs.segmentation.regions.graph import BORDER_MAXIMA, BORDER_SUMS, NODE_MAXIMA, NODE_SUMS, build_graph
+from rose2_logs.segmentation.regions.graph import (
+    BORDER_MAXIMA,
+    BORDER_SUMS,
+    NODE_MAXIMA,
+    NODE_SUMS,
+    build_graph,
+)
 from rose2_logs.segmentation.regions.plan_raster import OUTPUTS, PlanRaster
 
 CELL_M = 0.1
@@ -86,7 +92,13 @@ def test_sums_of_joined_regions_are_those_of_the_joined_atoms(atoms, answers, da
     joined, border = graph.joined(root)
     relabeled = np.concatenate([[0], root + 1])[atoms.on_plan].astype(np.int32)
     again = build_graph(
-        relabeled, atoms.raster, atoms.strong, atoms.faces_on_plan, answers, atoms.frame.cell_m, root.max() + 1
+        relabeled,
+        atoms.raster,
+        atoms.strong,
+        atoms.faces_on_plan,
+        answers,
+        atoms.frame.cell_m,
+        root.max() + 1,
     )
     assert np.array_equal(joined.ends, again.ends)
     for name in ("node_sums", "node_maxima", "border_sums", "border_maxima"):
@@ -107,6 +119,9 @@ def test_features_are_finite_with_answers_and_without(atoms, answers):
 
 
 def test_features_do_not_hang_on_which_region_has_the_lower_number():
-    one, other = drawn_graph(["111111222"] * 5 + ["#########"]), drawn_graph(["222222111"] * 5 + ["#########"])
+    one, other = (
+        drawn_graph(["111111222"] * 5 + ["#########"]),
+        drawn_graph(["222222111"] * 5 + ["#########"]),
+    )
     first = np.array([0])
     np.testing.assert_allclose(join_features(one, first), join_features(other, first), atol=1e-9)

@@ -22,7 +22,9 @@ def graph_of(contacts, count):
     node_sums[:, 0] = 1.0
     border_sums = np.zeros((len(ends), len(BORDER_SUMS)))
     border_sums[:, 0] = [contacts[pair] for pair in sorted(contacts)]
-    return RegionGraph(node_sums, np.ones((count, len(NODE_MAXIMA))), ends, border_sums, np.zeros((len(ends), 6)))
+    return RegionGraph(
+        node_sums, np.ones((count, len(NODE_MAXIMA))), ends, border_sums, np.zeros((len(ends), 6))
+    )
 
 
 def groups(region):

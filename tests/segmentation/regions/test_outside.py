@@ -5,7 +5,13 @@ import pytest
 from drawn_floors import corridor_of_offices, turned
 
 from rose2_logs.config.parameters import RegionParameters
-from rose2_logs.segmentation.regions.graph import BORDER_MAXIMA, BORDER_SUMS, NODE_MAXIMA, NODE_SUMS, RegionGraph
+from rose2_logs.segmentation.regions.graph import (
+    BORDER_MAXIMA,
+    BORDER_SUMS,
+    NODE_MAXIMA,
+    NODE_SUMS,
+    RegionGraph,
+)
 from rose2_logs.segmentation.regions.outside import edge_shares, rooms_of, surroundings
 from rose2_logs.segmentation.regions.plan_frame import PlanFrame
 from rose2_logs.segmentation.regions.plan_raster import PlanRaster
