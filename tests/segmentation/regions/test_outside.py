@@ -34,8 +34,8 @@ def lone_regions(*area_m2):
 
 def rooms(area_m2, log_odds, edge_share=None):
     edge = np.zeros(len(area_m2)) if edge_share is None else np.array(edge_share)
-    room, outside_m2 = rooms_of(lone_regions(*area_m2), edge, lambda _: np.array(log_odds), PARAMETERS)
-    return room.tolist(), outside_m2
+    room, outside = rooms_of(lone_regions(*area_m2), edge, lambda _: np.array(log_odds), PARAMETERS)
+    return room.tolist(), float(np.array(area_m2)[outside].sum())
 
 
 def test_rooms_are_numbered_and_what_is_outside_is_measured():
