@@ -31,9 +31,9 @@ def atoms(two_rooms: Floor) -> Atoms:
     scored = find_structure(occupied, two_rooms.resolution_m, parameters.spectrum)
     direction = float(scored.directions_rad[0])
     walls = generous_walls(scored, two_rooms.resolution_m, parameters)
-    _, faces = generous_floor_plan(walls, free, direction, two_rooms.resolution_m, parameters)
+    plan = generous_floor_plan(walls, free, direction, two_rooms.resolution_m, parameters)
     return find_atoms(
-        free, occupied, scored.score, faces, direction, two_rooms.resolution_m, parameters.regions
+        free, occupied, scored.score, plan.face_of_cell, direction, two_rooms.resolution_m, parameters.regions
     )
 
 
