@@ -136,7 +136,7 @@ class RegionTree:
         joins = self._to_even_odds if detail >= EVEN_ODDS else self._to_the_end
         region = joins.regions(detail)
         regions, _ = self.graph.joined(region)
-        edge_share = np.bincount(region, self.edge_share)
+        edge_share = np.bincount(region, self.edge_share).astype(float)
         room, outside = rooms_of(regions, edge_share, fitted.outside_trees(), self.parameters)
         cells_of_atom = label_sizes(self.cells, len(region))[1:]
         outside_m2 = float(cells_of_atom[outside[region]].sum()) * self.resolution_m**2
