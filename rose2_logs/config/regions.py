@@ -58,6 +58,21 @@ class RegionParameters(ParameterBlock):
     outside_max_share: float = number(
         0.8, "share", "Where more than this share of a map would be outside, nothing is.", 0, 1
     )
+    surroundings_min_edge: float = number(
+        0.25,
+        "share",
+        "A region on this share of the map's edge is white around a drawn building, if such regions hold "
+        "twice as much together; rooms are behind walls.",
+        0,
+        1,
+    )
+    building_min_share: float = number(
+        0.03,
+        "share",
+        "A building takes at least this share of its drawing; where less would be left, nothing lies around.",
+        0,
+        1,
+    )
     room_min_area_m2: float = number(1.0, "m2", "Smaller regions are not rooms: a toilet has 1 m2.", 0.0)
     loose_reach_m: float = number(
         0.5, "m", "Free cells too few for an atom belong to the room this near.", 0.0

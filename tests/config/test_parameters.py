@@ -56,7 +56,7 @@ def test_numbers_beyond_their_bounds_are_refused():
         ),
         (
             lambda: FloorPlanParameters(grouping="dbscann"),
-            "floor_plan.grouping is 'dbscann'; it must be one of agglomerative, dbscan",
+            "floor_plan.grouping is 'dbscann'; it must be one of fitted, walls, dbscan",
         ),
         (
             lambda: WallParameters(extension_m=math.nan),

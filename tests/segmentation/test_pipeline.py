@@ -164,8 +164,10 @@ def test_an_analysis_needs_no_options_and_shows_itself_in_one_line():
 
 def test_parameters_are_taken_by_dotted_names():
     cells, _ = office()
-    by_name = analyze(snapshot(cells), {"floor_plan.room_min_area_m2": 1000})
+    by_name = analyze(snapshot(cells), {"regions.room_min_area_m2": 1000})
     assert len(by_name.rooms) == 0
+    by_walls = {"floor_plan.grouping": "walls", "floor_plan.room_min_area_m2": 1000}
+    assert len(analyze(snapshot(cells), by_walls).rooms) == 0
 
 
 def test_a_tracked_snapshot_gives_its_rooms_and_labels():

@@ -38,81 +38,11 @@ def prepared(two_rooms):
     return prepare(one, Parameters(), 0)
 
 
-def answers_of(prepared):
-    from rose2_logs.segmentation.regions.plan_raster import OUTPUTS
-
-    rng = np.random.default_rng(0)
-    return rng.random((OUTPUTS, *prepared.atoms.on_plan.shape)).astype(np.float32)
-
-
 def test_atoms_of_two_rooms_do_not_cross_the_wall(prepared):
     from fit_grouping.scores import upper_bound
 
     assert len(prepared.tables[0]) > 2
     assert upper_bound(prepared.tables) > 98
-
-
-def test_small_pieces_go_to_the_neighbor_that_they_touch_most():
-    from rose2_logs.segmentation.regions.atoms import absorb_small
-
-    pieces = np.zeros((10, 30), np.int32)
-    pieces[:, :14], pieces[:, 15:29], pieces[:6, 14], pieces[9, 29] = 1, 2, 3, 4
-    pieces[6:, 14] = 2
-    absorbed = absorb_small(pieces, 20)
-    assert set(np.unique(absorbed)) == {1, 2} or set(np.unique(absorbed)) == {0, 1, 2}
-    assert absorbed[0, 14] > 0
-
-
-@pytest.mark.parametrize("angle", [0.0, 0.4, -1.2])
-def test_plan_frame_keeps_areas_and_leads_back(angle):
-    from rose2_logs.segmentation.regions.plan_frame import PlanFrame
-
-    mask = np.zeros((120, 160), bool)
-    mask[20:100, 30:140] = True
-    frame = PlanFrame.of(mask, angle, 0.05, 0.1)
-    share = frame.share(mask)
-    assert share.sum() * 0.01 == pytest.approx(mask.sum() * 0.0025, rel=0.01)
-    labels = frame.sampled(mask.astype(np.int32) * 7)
-    back = frame.back(labels, mask.shape)
-    assert np.mean((back == 7) == mask) > 0.97
-
-
-def test_sums_of_joined_regions_are_those_of_the_joined_atoms(prepared):
-    """Whatever is joined, the graph is the one that is built from the joined regions."""
-    from rose2_logs.segmentation.regions.graph import build_graph
-
-    answers = answers_of(prepared)
-    count = len(prepared.tables[0]) - 1
-    graph = prepared.graph(answers)
-    root = np.random.default_rng(1).integers(0, max(count // 2, 1), count)
-    root = np.unique(root, return_inverse=True)[1]
-    joined, border = graph.joined(root)
-    relabeled = np.concatenate([[0], root + 1])[prepared.atoms.on_plan].astype(np.int32)
-    again = build_graph(
-        relabeled,
-        prepared.atoms.raster,
-        prepared.atoms.strong,
-        prepared.atoms.faces_on_plan,
-        answers,
-        prepared.atoms.frame.cell_m,
-        root.max() + 1,
-    )
-    assert np.array_equal(joined.ends, again.ends)
-    np.testing.assert_allclose(joined.node_sums, again.node_sums, atol=1e-4)
-    np.testing.assert_allclose(joined.node_maxima, again.node_maxima, atol=1e-4)
-    np.testing.assert_allclose(joined.border_sums, again.border_sums, atol=1e-4)
-    np.testing.assert_allclose(joined.border_maxima, again.border_maxima, atol=1e-4)
-    assert set(border[border >= 0]) == set(range(len(joined.ends)))
-
-
-def test_features_are_finite(prepared):
-    from rose2_logs.segmentation.regions.features import FEATURES, join_features, joinable
-
-    graph = prepared.graph(answers_of(prepared))
-    which = np.flatnonzero(joinable(graph))
-    features = join_features(graph, which)
-    assert features.shape == (len(which), len(FEATURES))
-    assert np.isfinite(features).all()
 
 
 def test_a_lower_level_joins_more(prepared):
@@ -193,16 +123,6 @@ def test_maps_without_free_floor_have_no_rooms():
     map_without_floor = prepare(one, Parameters(), 0)
     examples = examples_of([map_without_floor], [None])
     assert scores_at(examples, [by_hand], [0.0]).tolist() == [[0.0]]
-
-
-def test_strength_weighs_trees_and_answers():
-    from rose2_logs.segmentation.regions.features import FEATURES
-    from rose2_logs.segmentation.regions.strengths import DIFFERENT, JoinStrength
-
-    features = np.zeros((3, len(FEATURES)))
-    features[:, DIFFERENT] = [0.0, 1.0, -1.0]
-    strength = JoinStrength(None, answer_weight=1.0, answer_scale=12.0)
-    np.testing.assert_allclose(strength(features), [6.0, -6.0, -6.0])
 
 
 @pytest.mark.parametrize("seed", range(6))

@@ -16,6 +16,8 @@ from rose2_logs.segmentation.regions.plan_frame import Labels, PlanFrame, grown_
 
 BASIN_REACH_M = 0.2
 """Cells of the map that no basin of the plan frame covers belong to one this near: two plan cells."""
+CLEARANCE_STEPS = 64
+"""The clearance is told in this many steps per plan cell: its summits are found without rounding errors."""
 ABSORBING_ROUNDS = 4
 """After this many rounds of absorbing, what is still small has no neighbor: it is loose."""
 
@@ -45,8 +47,9 @@ def cut_atoms(
     atoms : (H, W) int32
         1.. on the free cells, 0 elsewhere and on loose cells.
     """
-    solid = frame.share(without_specks(occupied, parameters.speck_max_m / resolution_m)) > 0
-    open_cells = (frame.share(free) > 0) & ~solid
+    walls = without_specks(occupied, parameters.speck_max_m / resolution_m)
+    solid, open_cells = frame.shares(walls, free) > 0
+    open_cells &= ~solid
     basins = grown_labels(
         clearance_basins(open_cells, solid, frame.cell_m, parameters), BASIN_REACH_M / frame.cell_m
     )
@@ -61,7 +64,10 @@ def clearance_basins(
 ) -> Labels:
     """Basins (H, W) of the clearance on the free cells: each belongs to one summit."""
     distance = cv2.distanceTransform((~blocked).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
-    smooth = cv2.GaussianBlur(distance, (0, 0), parameters.clearance_blur_m / cell_m) * cell_m
+    # No clearance is larger than what 16 bits tell.
+    steps = np.rint(np.minimum(distance, np.iinfo(np.uint16).max // CLEARANCE_STEPS) * CLEARANCE_STEPS)
+    sigma = parameters.clearance_blur_m / cell_m
+    smooth = cv2.GaussianBlur(steps.astype(np.uint16), (0, 0), sigma).astype(np.int32)
     height = np.where(free, smooth, -1).astype(np.float32)
     width = 2 * max(1, round(parameters.summit_reach_m / cell_m)) + 1
     summits = free & (height == cv2.dilate(height, np.ones((width, width), np.uint8)))

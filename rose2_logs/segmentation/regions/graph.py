@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import chain
 
 import cv2
 import numpy as np
@@ -155,9 +157,9 @@ def build_graph(
     node_maxima = np.full((count, len(NODE_MAXIMA)), -np.inf)
     x, y = (column + 0.5) * cell_m, (row + 0.5) * cell_m
     half = cell_m / 2
-    values = [clear[row, column], clear_strong[row, column], x + half, half - x, y + half, half - y]
-    values += [x + y + cell_m, cell_m - x - y, x - y + cell_m, cell_m - x + y]
-    _fill_maxima(node_maxima, node, values)
+    reaches = ((1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, -1), (1, -1), (-1, 1))
+    extents = (a * x + b * y + half * (abs(a) + abs(b)) for a, b in reaches)
+    _fill_maxima(node_maxima, node, chain((c[row, column] for c in (clear, clear_strong)), extents))
     # An atom that no center of a plan cell meets.
     missed = np.isinf(node_maxima[:, 0])
     node_maxima[missed] = 0
@@ -166,13 +168,13 @@ def build_graph(
     key, index = np.unique(keys, return_inverse=True)
     border_maxima = np.full((len(key), len(BORDER_MAXIMA)), -np.inf)
     touching = np.isfinite(maxima[:, 0])
-    _fill_maxima(border_maxima, index[touching], list(maxima[touching].T))
+    _fill_maxima(border_maxima, index[touching], maxima[touching].T)
     ends = np.column_stack(np.divmod(key, max(count, 1)))
     return RegionGraph(node_sums, node_maxima, ends, _summed(sums, index, len(key)), border_maxima)
 
 
-def _fill_maxima(out: FloatArray, index: NDArray[np.int64], values: list[NDArray[np.floating]]) -> None:
-    """Greatest of the values of each index, by sorting once."""
+def _fill_maxima(out: FloatArray, index: NDArray[np.int64], values: Iterable[NDArray[np.floating]]) -> None:
+    """Greatest of the values of each index, a column at a time, by sorting once."""
     if len(index) == 0:
         return
     order = np.argsort(index, kind="stable")
@@ -244,9 +246,10 @@ def _wall_along(wall: BoolArray, upright: bool, length_m: float, cell_m: float) 
     """Share of a window along a line through each cell in which there is wall, a cell beside it counted."""
     size = 2 * round(length_m / cell_m / 2) + 1
     across = np.ones((1, 3), np.uint8) if upright else np.ones((3, 1), np.uint8)
-    near = cv2.dilate(wall.astype(np.uint8), across).astype(np.float32)
+    near = cv2.dilate(wall.astype(np.uint8), across)
     window = (1, size) if upright else (size, 1)
-    return cv2.blur(near, window, borderType=cv2.BORDER_CONSTANT).astype(np.float32)
+    cells = cv2.boxFilter(near, cv2.CV_32S, window, normalize=False, borderType=cv2.BORDER_CONSTANT)
+    return (cells / np.float32(size)).astype(np.float32)
 
 
 def _clearance(blocked: BoolArray, cell_m: float) -> NDArray[np.float32]:

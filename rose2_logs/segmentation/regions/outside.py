@@ -2,18 +2,58 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from rose2_logs.config.regions import RegionParameters
-from rose2_logs.model.occupancy import BoolArray
+from rose2_logs.model.occupancy import BoolArray, FloatArray
 from rose2_logs.segmentation.regions.features import region_features
 from rose2_logs.segmentation.regions.graph import RegionGraph
 from rose2_logs.segmentation.regions.joining import Strength
+from rose2_logs.segmentation.regions.plan_frame import Labels, grown_labels
+from rose2_logs.segmentation.regions.plan_raster import PlanRaster
+
+EDGE_REACH_CELLS = 1.5
+"""An atom reaches the edge of the map from the cell beside it: turned edges are ragged."""
+
+
+def edge_shares(atoms: Labels, raster: PlanRaster, count: int) -> FloatArray:
+    """Share (N,) of the edge of the known part's convex hull that each atom holds.
+
+    The walls of a building keep its rooms from that edge; the white around a drawing holds nearly all of it,
+    however the drawing is turned or padded.
+
+    Parameters
+    ----------
+    atoms : (H, W) int32
+        Atom 1..N of each plan cell, 0 for none.
+    raster : PlanRaster
+    count : int
+        Number of atoms.
+    """
+    known = ((raster.wall > 0) | (raster.free > 0)).astype(np.uint8)
+    if not known.any():
+        return np.zeros(count)
+    hull = cv2.convexHull(cv2.findNonZero(known))
+    edge = cv2.polylines(np.zeros_like(known), [hull], isClosed=True, color=1) > 0
+    beside = np.where(raster.wall > 0, 0, grown_labels(atoms, EDGE_REACH_CELLS))[edge]
+    return np.bincount(beside, minlength=count + 1)[1:] / len(beside)
+
+
+def surroundings(edge_share: FloatArray, area_m2: FloatArray, parameters: RegionParameters) -> BoolArray:
+    """Regions (N,) that lie around the building, from their share of the map's edge and their area."""
+    around: BoolArray = edge_share >= parameters.surroundings_min_edge
+    # A field or a hall without outer walls has nothing within, or several parts share its edge.
+    least = 2 * parameters.surroundings_min_edge
+    rest_m2 = area_m2[~around].sum()
+    if edge_share[around].sum() < least or rest_m2 < parameters.building_min_share * area_m2.sum():
+        return np.zeros(len(area_m2), bool)
+    return around
 
 
 def rooms_of(
-    graph: RegionGraph, is_room: Strength, parameters: RegionParameters
+    graph: RegionGraph, edge_share: FloatArray, is_room: Strength, parameters: RegionParameters
 ) -> tuple[NDArray[np.int64], BoolArray]:
     """Number the regions of a graph that are rooms.
 
@@ -21,6 +61,8 @@ def rooms_of(
     ----------
     graph : RegionGraph
         The final regions.
+    edge_share : (N,) float
+        Share of the map's edge that each region holds, see `edge_shares`.
     is_room : callable
         Log odds (N,) of `region_features` (N, F).
     parameters : RegionParameters
@@ -33,9 +75,11 @@ def rooms_of(
         Regions that are outside; those that are too small are not.
     """
     area = graph.node_sums[:, 0]
-    outside = is_room(region_features(graph)) < parameters.room_min_log_odds
+    around = surroundings(edge_share, area, parameters)
+    outside = ~around & (is_room(region_features(graph)) < parameters.room_min_log_odds)
     # An answer by which hardly anything is left is not believed.
-    if area[outside].sum() > parameters.outside_max_share * area.sum():
+    if area[outside].sum() > parameters.outside_max_share * area[~around].sum():
         outside[:] = False
+    outside |= around
     room = ~outside & (area >= parameters.room_min_area_m2)
     return np.where(room, np.cumsum(room), 0), outside

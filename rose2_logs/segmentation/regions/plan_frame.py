@@ -3,17 +3,26 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeVar
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rose2_logs.model.occupancy import BoolArray
+from rose2_logs.model.occupancy import BoolArray, FloatArray
 
 Labels = NDArray[np.int32]
+Number = TypeVar("Number", bound=np.integer)
 
 PLAN_CELL_M = 0.1
 """Side of a plan cell, meters. The network and the trees were fitted on cells of this size."""
+POSITION_BITS = 16
+POSITION_STEPS = 2**POSITION_BITS
+"""Positions on a map are told in this many steps per cell, far less than a map is good for."""
+BESIDE_STEPS = 64
+"""Points are looked at this many steps further, so that none lies on a side but for rounding errors."""
+CELLS_AT_ONCE = 2**17
+"""Cells that are looked up at once: their positions stay in a CPU's cache."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +41,7 @@ class PlanFrame:
 
     shape: tuple[int, int]
     cell_m: float
-    to_map: NDArray[np.float64]
+    to_map: FloatArray
 
     @classmethod
     def of(
@@ -56,30 +65,63 @@ class PlanFrame:
         return cls((int(size[1]), int(size[0])), cell_m, np.column_stack([linear, offset]))
 
     def sampled(self, image: Labels) -> Labels:
-        """Value of the map's cell below the center of each plan cell, 0 beside the map; labels below 2^24."""
-        flags = cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP
-        warped = cv2.warpAffine(image.astype(np.float32), self.to_map, self.shape[::-1], flags=flags)
-        return warped.astype(np.int32)
+        """Value of the map's cell below the center of each plan cell, 0 beside the map."""
+        return _looked_up(image, self.to_map, self.shape)
 
     def share(self, mask: BoolArray, per_side: int = 3) -> NDArray[np.float32]:
         """Share of each plan cell that a mask of the map covers, of `per_side` squared points."""
-        step = np.array([[1 / per_side, 0], [0, 1 / per_side]])
-        linear = self.to_map[:, :2] @ step
+        (share,) = self.shares(mask, per_side=per_side)
+        return np.asarray(share, np.float32)
+
+    def shares(self, *masks: BoolArray, per_side: int = 3) -> NDArray[np.float32]:
+        """Share (M, P, Q) of each plan cell that each of some masks of the map covers, see `share`."""
+        rows, columns = self.shape
+        linear = self.to_map[:, :2] / per_side
         offset = self.to_map[:, 2] + self.to_map[:, :2] @ np.full(2, (1 / per_side - 1) / 2)
-        size = (self.shape[1] * per_side, self.shape[0] * per_side)
-        fine = cv2.warpAffine(
-            mask.astype(np.uint8),
-            np.column_stack([linear, offset]),
-            size,
-            flags=cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP,
-        )
-        share = cv2.resize(fine.astype(np.float32), self.shape[::-1], interpolation=cv2.INTER_AREA)
-        return share.astype(np.float32)
+        # All masks are looked up at once, one in each bit.
+        packed = np.zeros(masks[0].shape, np.uint8)
+        for bit, mask in enumerate(masks):
+            packed |= mask.astype(np.uint8) << bit
+        fine = _looked_up(packed, np.column_stack([linear, offset]), (rows * per_side, columns * per_side))
+        shares = np.empty((len(masks), rows, columns), np.float32)
+        for bit in range(len(masks)):
+            covered = (fine >> bit & 1).astype(np.float32)
+            cv2.resize(covered, (columns, rows), dst=shares[bit], interpolation=cv2.INTER_AREA)
+        return shares
 
     def back(self, image: Labels, shape: tuple[int, int]) -> Labels:
-        """Plan labels below 2^24 at the cells of the map (H, W)."""
-        warped = cv2.warpAffine(image.astype(np.float32), self.to_map, shape[::-1], flags=cv2.INTER_NEAREST)
-        return warped.astype(np.int32)
+        """Plan labels at the cells of the map (H, W), 0 beside the plan frame."""
+        linear = np.linalg.inv(self.to_map[:, :2])
+        return _looked_up(image, np.column_stack([linear, -linear @ self.to_map[:, 2]]), shape)
+
+
+def _looked_up(image: NDArray[Number], to_image: FloatArray, shape: tuple[int, int]) -> NDArray[Number]:
+    """Value of the cell of an image in which each point (column, row) of a raster lies, 0 beside the image.
+
+    Positions are whole numbers of a cell's `POSITION_STEPS`, so that they are the same whatever instructions
+    a CPU has; points on the side between two cells, as where the frame lies along the map, are in the later.
+    """
+    height, width = image.shape
+    to_steps = to_image * POSITION_STEPS
+    to_steps[:, 2] += POSITION_STEPS / 2 + BESIDE_STEPS
+    column, row = np.arange(shape[1]), np.arange(shape[0])
+    # Half the time where positions fit into 32 bits.
+    farthest = np.abs(to_steps) @ (shape[1], shape[0], 1)
+    whole = np.int32 if max(farthest.max(), image.size) < np.iinfo(np.int32).max else np.int64
+    by_column = np.rint(to_steps[:, :1] * column).astype(whole)
+    by_row = np.rint(to_steps[:, 1:2] * row + to_steps[:, 2:]).astype(whole)
+    found = np.empty(shape, image.dtype)
+    values = image.ravel()
+    at_once = max(1, CELLS_AT_ONCE // shape[1])
+    for start in range(0, shape[0], at_once):
+        rows = slice(start, start + at_once)
+        x, y = ((by_row[axis, rows, None] + by_column[axis]) >> POSITION_BITS for axis in (0, 1))
+        beside = (x < 0) | (x >= width) | (y < 0) | (y >= height)
+        y *= width
+        y += x
+        values.take(y, out=found[rows], mode="clip")
+        found[rows][beside] = 0
+    return found
 
 
 def grown_labels(labels: Labels, reach_cells: float) -> Labels:

@@ -43,7 +43,7 @@ class PlanRaster:
     @classmethod
     def of(cls, free: BoolArray, occupied: BoolArray, frame: PlanFrame) -> PlanRaster:
         """Sample the masks (H, W) of a map."""
-        return cls(*(_steps(frame.share(mask, POINTS_PER_SIDE)) for mask in (occupied, free)))
+        return cls(*(_steps(share) for share in frame.shares(occupied, free, per_side=POINTS_PER_SIDE)))
 
 
 def _steps(share: FloatImage) -> NDArray[np.uint8]:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rose2_logs.config.parameters import Parameters
 from rose2_logs.config.regions import DETAIL_MOST, RegionParameters
 from rose2_logs.model.labels import label_sizes
-from rose2_logs.model.occupancy import BoolArray
+from rose2_logs.model.occupancy import BoolArray, FloatArray
 from rose2_logs.segmentation.floor_plan.edge_weights import edge_evidence
 from rose2_logs.segmentation.floor_plan.faces import build_faces, free_area, label_faces
 from rose2_logs.segmentation.floor_plan.stage import FloorPlanResult, frame_along
@@ -22,7 +22,7 @@ from rose2_logs.segmentation.regions.atoms import cut_atoms
 from rose2_logs.segmentation.regions.borders import border_strengths
 from rose2_logs.segmentation.regions.graph import STRONG_SCORE, RegionGraph, build_graph
 from rose2_logs.segmentation.regions.joining import Joins, Strength, join_regions
-from rose2_logs.segmentation.regions.outside import rooms_of
+from rose2_logs.segmentation.regions.outside import edge_shares, rooms_of
 from rose2_logs.segmentation.regions.plan_frame import Labels, PlanFrame
 from rose2_logs.segmentation.regions.plan_raster import PlanRaster
 from rose2_logs.segmentation.regions.strengths import JoinStrength
@@ -66,6 +66,10 @@ class Atoms:
             self.on_plan, self.raster, self.strong, self.faces_on_plan, answers, self.frame.cell_m, self.count
         )
 
+    def edge_shares(self) -> FloatArray:
+        """Share (N,) of the map's edge that each atom holds."""
+        return edge_shares(self.on_plan, self.raster, self.count)
+
 
 @dataclass(frozen=True, eq=False)
 class RegionsResult:
@@ -101,6 +105,8 @@ class RegionTree:
     resolution_m : float
     graph : RegionGraph
         Of the atoms.
+    edge_share : (N,) float
+        Share of the map's edge that each atom holds.
     strength : callable
         Log odds that two regions are one room.
     parameters : RegionParameters
@@ -110,6 +116,7 @@ class RegionTree:
     free: BoolArray
     resolution_m: float
     graph: RegionGraph
+    edge_share: FloatArray
     strength: Strength
     parameters: RegionParameters
 
@@ -130,7 +137,8 @@ class RegionTree:
         joins = self._to_even_odds if detail >= EVEN_ODDS else self._to_the_end
         region = joins.regions(detail)
         regions, _ = self.graph.joined(region)
-        room, outside = rooms_of(regions, fitted.outside_trees(), self.parameters)
+        edge_share = np.bincount(region, self.edge_share).astype(float)
+        room, outside = rooms_of(regions, edge_share, fitted.outside_trees(), self.parameters)
         cells_of_atom = label_sizes(self.cells, len(region))[1:]
         outside_m2 = float(cells_of_atom[outside[region]].sum()) * self.resolution_m**2
         labels = room_labels(
@@ -199,7 +207,7 @@ def region_tree(
     """Judge the borders of atoms, to join these to rooms."""
     graph = atoms.graph(fitted.answering_network()(atoms.raster) if atoms.count else None)
     strength = JoinStrength(fitted.join_trees(), parameters.answer_weight, parameters.answer_scale)
-    return RegionTree(atoms.cells, free, resolution_m, graph, strength, parameters)
+    return RegionTree(atoms.cells, free, resolution_m, graph, atoms.edge_shares(), strength, parameters)
 
 
 def room_labels(

@@ -16,6 +16,10 @@ UNASKED_ANSWER = -0.5
 """What the answer counts for regions that touch nowhere: they are in different rooms."""
 
 
+STRENGTH_STEPS = 1000
+"""Strengths are rounded to this many steps per unit of log odds, so that alike borders are equally strong."""
+
+
 @dataclass(frozen=True, eq=False)
 class BoostedTrees:
     """Trees as arrays with one row per tree.
@@ -118,4 +122,4 @@ class JoinStrength:
             answer = np.where(mean == NO_ANSWER, UNASKED_ANSWER, 0.5 - mean)
             total += self.answer_weight * self.answer_scale * answer
             weight += self.answer_weight
-        return total / weight
+        return np.rint(total / weight * STRENGTH_STEPS) / STRENGTH_STEPS

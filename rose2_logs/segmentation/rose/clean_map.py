@@ -12,6 +12,9 @@ from rose2_logs.config.parameters import SpectrumParameters
 from rose2_logs.model.occupancy import BoolArray, FloatArray
 from rose2_logs.segmentation.rose.spectrum import Spectrum
 
+SCORE_STEPS = 1000
+"""Scores are rounded to this many steps, so that they are the same whatever instructions a CPU has."""
+
 
 def structure_score(
     spectrum: Spectrum,
@@ -53,7 +56,11 @@ def structure_score(
         gain = np.exp(along, out=along)
         np.maximum(score, spectrum.filtered(gain, occupied.shape), out=score)
     score[~occupied] = 0
-    return np.clip(score, 0, 1, out=score)
+    np.clip(score, 0, 1, out=score)
+    score *= np.float32(SCORE_STEPS)
+    np.rint(score, out=score)
+    score /= np.float32(SCORE_STEPS)
+    return score
 
 
 def supported_cells(

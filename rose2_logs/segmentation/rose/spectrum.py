@@ -15,6 +15,11 @@ from rose2_logs.segmentation.circular_peaks import circular_peaks
 
 PICTURE_SIDE = 160
 """Pixels along a side of the spectrum's picture: enough to separate its ridges, and still small."""
+DIRECTION_STEPS = 36_000
+"""Directions are rounded to this many steps of half a turn, 0.005 degrees: Whatever
+instructions a CPU has, they are the same, and upright is upright."""
+STRENGTH_STEPS = 10_000
+"""Strengths are rounded to this many steps: of equal ones the first direction is the strongest."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,6 +154,10 @@ def dominant_directions(energy: FloatArray, parameters: SpectrumParameters) -> t
     left, center, right = heights[peaks - 1], heights[peaks], heights[(peaks + 1) % bins]
     curvature = left - 2 * center + right
     shift = np.divide(left - right, 2 * curvature, out=np.zeros(len(peaks)), where=curvature < 0)
-    directions = np.mod((peaks + shift) * np.pi / bins, np.pi)
-    order = np.lexsort((directions, -center))
-    return directions[order], center[order]
+    step = np.rint((peaks + shift) / bins * DIRECTION_STEPS) % DIRECTION_STEPS
+    directions, strengths = (
+        step * (np.pi / DIRECTION_STEPS),
+        np.rint(center * STRENGTH_STEPS) / STRENGTH_STEPS,
+    )
+    order = np.lexsort((directions, -strengths))
+    return directions[order], strengths[order]

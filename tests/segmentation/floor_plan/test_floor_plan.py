@@ -112,7 +112,7 @@ def make_quality(wall, is_open, passage, blind=0.0):
     return EdgeEvidence(wall, blind * wall, is_open, wall + is_open, np.array(passage, float))
 
 
-@pytest.mark.parametrize("grouping", ["agglomerative", "dbscan"])
+@pytest.mark.parametrize("grouping", ["walls", "dbscan"])
 @pytest.mark.parametrize("order", [[0, 1, 2], [2, 1, 0], [1, 2, 0]])
 def test_what_is_open_joins_and_a_door_does_not_in_any_order_of_edges(order, grouping):
     # Faces 0 and 1 are one room cut by a line; 2 lies behind a wall with a door.

@@ -12,7 +12,6 @@ from drawn_maps import office, snapshot
 
 import rose2_logs as rl
 from rose2_logs.segmentation.pipeline import RoomTree, analyze_with_tree
-from rose2_logs.segmentation.regions.stage import RegionTree
 
 DETAILS = (-20.0, -6.0, -2.0, -0.5, 0.0, 0.5, 2.0, 6.0, 20.0)
 
@@ -34,7 +33,7 @@ def grown() -> RoomTree:
 def test_more_detail_never_joins_what_less_detail_parts(grown: RoomTree, strength):
     tree = grown.tree
     if strength is not None:
-        tree = RegionTree(tree.cells, tree.free, tree.resolution_m, tree.graph, strength, tree.parameters)
+        tree = dataclasses.replace(tree, strength=strength)
     found = [tree.rooms(detail).labels for detail in DETAILS]
     of_atoms = tree.cells > 0
     for coarse, fine in itertools.pairwise(found):

@@ -1,0 +1,108 @@
+"""What is outside: white around a building, and what the fitted rule says, unless hardly anything is left."""
+
+import numpy as np
+import pytest
+from drawn_floors import corridor_of_offices, turned
+
+from rose2_logs.config.regions import RegionParameters
+from rose2_logs.segmentation.regions.graph import (
+    BORDER_MAXIMA,
+    BORDER_SUMS,
+    NODE_MAXIMA,
+    NODE_SUMS,
+    RegionGraph,
+)
+from rose2_logs.segmentation.regions.outside import edge_shares, rooms_of, surroundings
+from rose2_logs.segmentation.regions.plan_frame import PlanFrame
+from rose2_logs.segmentation.regions.plan_raster import PlanRaster
+
+PARAMETERS = RegionParameters()
+
+
+def lone_regions(*area_m2):
+    node_sums = np.zeros((len(area_m2), len(NODE_SUMS)))
+    node_sums[:, 0] = area_m2
+    node_maxima = np.ones((len(area_m2), len(NODE_MAXIMA)))
+    return RegionGraph(
+        node_sums,
+        node_maxima,
+        np.zeros((0, 2), np.int64),
+        np.zeros((0, len(BORDER_SUMS))),
+        np.zeros((0, len(BORDER_MAXIMA))),
+    )
+
+
+def rooms(area_m2, log_odds, edge_share=None):
+    edge = np.zeros(len(area_m2)) if edge_share is None else np.array(edge_share)
+    room, outside = rooms_of(lone_regions(*area_m2), edge, lambda _: np.array(log_odds), PARAMETERS)
+    return room.tolist(), float(np.array(area_m2)[outside].sum())
+
+
+def test_rooms_are_numbered_and_what_is_outside_is_measured():
+    assert rooms([10.0, 4.0, 20.0], [1.0, -1.0, 0.0]) == ([1, 0, 2], 4.0)
+
+
+@pytest.mark.parametrize(("area_m2", "room"), [(1.0, 1), (0.99, 0)])
+def test_what_is_too_small_is_no_room_but_not_outside(area_m2, room):
+    assert rooms([area_m2], [3.0]) == ([room], 0.0)
+
+
+@pytest.mark.parametrize(("outside_m2", "believed"), [(8.0, True), (8.1, False)])
+def test_an_answer_by_which_hardly_anything_is_left_is_not_used(outside_m2, believed):
+    found, left_out_m2 = rooms([outside_m2, 10 - outside_m2], [-9.0, 9.0])
+    assert found == ([0, 1] if believed else [1, 2])
+    assert left_out_m2 == (outside_m2 if believed else 0.0)
+
+
+def test_white_around_a_building_may_be_most_of_a_map():
+    assert rooms([900.0, 30.0, 30.0], [9.0] * 3, [1.0, 0.0, 0.0]) == ([0, 1, 2], 900.0)
+
+
+def test_the_fitted_rule_is_held_against_what_is_within_the_white():
+    """A ray of a tenth of the building is left out; the building would not be."""
+    assert rooms([900.0, 90.0, 10.0], [9.0, 9.0, -9.0], [1.0, 0.0, 0.0])[0] == [0, 1, 0]
+    assert rooms([900.0, 90.0, 10.0], [9.0, -9.0, 9.0], [1.0, 0.0, 0.0])[0] == [0, 1, 2]
+
+
+@pytest.mark.parametrize(
+    ("edge_share", "area_m2", "around"),
+    [
+        ([0.9, 0.0], [50, 50], [True, False]),
+        ([0.5, 0.0], [50, 50], [True, False]),
+        ([0.49, 0.0], [50, 50], [False, False]),  # a room with a side of glass
+        ([0.3, 0.3, 0.0], [30, 30, 40], [True, True, False]),  # the building parts the white
+        ([0.3, 0.2, 0.0], [30, 30, 40], [False, False, False]),
+        ([1.0], [90], [False]),  # a field
+        ([0.5, 0.5], [50, 50], [False, False]),  # a field with a wall across
+        ([1.0, 0.0], [97, 3], [True, False]),
+        ([1.0, 0.0], [97.1, 2.9], [False, False]),  # a field with a stall
+    ],
+)
+def test_regions_around_a_building_hold_the_edge_of_the_map(edge_share, area_m2, around):
+    found = surroundings(np.array(edge_share), np.array(area_m2, float), PARAMETERS)
+    assert found.tolist() == around
+
+
+@pytest.mark.parametrize("degrees", [0, 20, 45])
+@pytest.mark.parametrize("margin_m", [0.3, 5.0])
+def test_the_white_around_a_drawing_holds_its_edge_however_it_is_turned(degrees, margin_m):
+    floor = turned(corridor_of_offices(2, outside=0, margin_m=margin_m), degrees)
+    free, wall = floor.cells == 0, floor.cells > 0
+    frame = PlanFrame.of(free | wall, np.radians(degrees), floor.resolution_m)
+    white = frame.sampled(np.where(free, 1 + (floor.rooms > 0), 0).astype(np.int32))
+    around, inside = edge_shares(white, PlanRaster.of(free, wall, frame), 2)
+    assert around > 0.9
+    assert inside == 0
+
+
+def test_rooms_behind_walls_hold_nothing_of_the_edge():
+    floor = corridor_of_offices(2)
+    free, wall = floor.cells == 0, floor.cells > 0
+    frame = PlanFrame.of(free | wall, 0.0, floor.resolution_m)
+    atoms = frame.sampled(floor.rooms)
+    assert not edge_shares(atoms, PlanRaster.of(free, wall, frame), int(floor.rooms.max())).any()
+
+
+def test_a_map_of_which_nothing_is_known_has_no_edge():
+    nothing = np.zeros((3, 3), np.uint8)
+    assert edge_shares(nothing.astype(np.int32), PlanRaster(nothing, nothing), 2).tolist() == [0, 0]
