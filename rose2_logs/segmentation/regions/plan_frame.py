@@ -19,8 +19,10 @@ PLAN_CELL_M = 0.1
 POSITION_BITS = 16
 POSITION_STEPS = 2**POSITION_BITS
 """Positions on a map are told in this many steps per cell, far less than a map is good for."""
-BESIDE_STEPS = 64
-"""Points are looked at this many steps further, so that none lies on a side but for rounding errors."""
+ANGLE_DIGITS = 4
+"""Directions are rounded to this many digits of a radian: over 100 m a tenth of a cell of 0.1 m."""
+SIDE_SHARE = 0.01
+"""A frame lies this share of a map's cell off the sides of cells, always to the same side of its own axes."""
 CELLS_AT_ONCE = 2**17
 """Cells that are looked up at once: their positions stay in a CPU's cache."""
 
@@ -47,22 +49,37 @@ class PlanFrame:
     def of(
         cls, known: BoolArray, direction_rad: float, resolution_m: float, cell_m: float = PLAN_CELL_M
     ) -> PlanFrame:
-        """Frame around the known cells (H, W), turned by the direction; one cell where none is known."""
-        cos, sin = np.cos(direction_rad), np.sin(direction_rad)
-        turned = np.array([[cos, sin], [-sin, cos]])
+        """Frame around the known cells (H, W), turned by the direction; one cell where none is known.
+
+        It lies down, and most of the floor lies towards its first row and column: so a map that is mirrored
+        or turned by quarters looks the same on it.
+        """
         rows = np.flatnonzero(known.any(1))
         if len(rows) == 0:
             return cls((1, 1), cell_m, np.column_stack([np.eye(2), np.zeros(2)]))
+        within_quarter = round(direction_rad % (np.pi / 2), ANGLE_DIGITS)
+        cos, sin = np.cos(within_quarter), np.sin(within_quarter)
+        axes = np.array([[cos, sin], [-sin, cos]])
         # The extreme cells of each row hold the corners of the frame.
         first, last = known[rows].argmax(1), known.shape[1] - 1 - known[rows, ::-1].argmax(1)
         column, row = np.concatenate([first, last]), np.concatenate([rows, rows])
-        points = turned @ np.stack([column + 0.5, row + 0.5]) * resolution_m
-        low = np.floor(points.min(1) / cell_m) * cell_m - cell_m
+        corners = np.stack([column + 0.5, row + 0.5]) * resolution_m
+        across, along = np.ptp(axes @ corners, axis=1)
+        if along > across + cell_m:
+            axes = axes[::-1]
+        points = axes @ corners
+        middle = (points.min(1) + points.max(1)) / 2
+        in_columns, in_rows = known.sum(0), known.sum(1)
+        mean = [np.dot(sums, np.arange(len(sums)) + 0.5) / sums.sum() for sums in (in_columns, in_rows)]
+        beyond = axes @ mean * resolution_m > middle + SIDE_SHARE * resolution_m
+        axes = np.where(beyond, -1.0, 1.0)[:, None] * axes
+        points = axes @ corners
+        # From the side of the outermost cell, so that it does not matter where the map lies on its canvas.
+        low = points.min(1) - resolution_m * (0.5 - SIDE_SHARE) - cell_m
         size = np.ceil((points.max(1) - low) / cell_m).astype(int) + 1
         scale = cell_m / resolution_m
-        linear = turned.T * scale
-        offset = turned.T @ (low / resolution_m + scale / 2) - 0.5
-        return cls((int(size[1]), int(size[0])), cell_m, np.column_stack([linear, offset]))
+        offset = axes.T @ (low / resolution_m + scale / 2) - 0.5
+        return cls((int(size[1]), int(size[0])), cell_m, np.column_stack([axes.T * scale, offset]))
 
     def sampled(self, image: Labels) -> Labels:
         """Value of the map's cell below the center of each plan cell, 0 beside the map."""
@@ -99,11 +116,11 @@ def _looked_up(image: NDArray[Number], to_image: FloatArray, shape: tuple[int, i
     """Value of the cell of an image in which each point (column, row) of a raster lies, 0 beside the image.
 
     Positions are whole numbers of a cell's `POSITION_STEPS`, so that they are the same whatever instructions
-    a CPU has; points on the side between two cells, as where the frame lies along the map, are in the later.
+    a CPU has; none is on the side between two cells but by chance, for frames lie off the sides.
     """
     height, width = image.shape
     to_steps = to_image * POSITION_STEPS
-    to_steps[:, 2] += POSITION_STEPS / 2 + BESIDE_STEPS
+    to_steps[:, 2] += POSITION_STEPS / 2
     column, row = np.arange(shape[1]), np.arange(shape[0])
     # Half the time where positions fit into 32 bits.
     farthest = np.abs(to_steps) @ (shape[1], shape[0], 1)
