@@ -123,7 +123,8 @@ class Batches:
 
 def loss_of(network: nn.Module, batch: tuple[Tensor, Tensor, Tensor]) -> Tensor:
     """Sum over the outputs of the weighted mean cross-entropy."""
-    inputs, targets, weights = batch
+    device = next(network.parameters()).device
+    inputs, targets, weights = (part.to(device) for part in batch)
     loss = nn.functional.binary_cross_entropy_with_logits(network(inputs), targets, reduction="none")
     per_output = (loss * weights).sum((0, 2, 3)) / (weights.sum((0, 2, 3)) + 1)
     return per_output.sum()
@@ -146,13 +147,14 @@ def main() -> None:
     torch.set_num_threads(1)
     cv2.setNumThreads(1)
     torch.manual_seed(arguments.seed)
-    network = RoomNetwork()
+    device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
+    network = RoomNetwork().to(device)
     optimizer = torch.optim.AdamW(network.parameters(), arguments.learning_rate, weight_decay=WEIGHT_DECAY)
     steps, before = 0, 0.0
     checkpoint = arguments.out.with_suffix(".pt")
     mean = copy.deepcopy(network).eval()
     if checkpoint.exists():
-        state = torch.load(checkpoint)
+        state = torch.load(checkpoint, map_location=device)
         network.load_state_dict(state["network"])
         mean.load_state_dict(state["mean"])
         optimizer.load_state_dict(state["optimizer"])
@@ -160,7 +162,7 @@ def main() -> None:
         if before >= arguments.seconds:
             return
     elif arguments.start:
-        state = torch.load(arguments.start)
+        state = torch.load(arguments.start, map_location=device)
         network.load_state_dict(state["mean"])
         mean.load_state_dict(state["mean"])
     keep: Path | None = arguments.keep
@@ -233,7 +235,7 @@ def _save(
     }
     # The network first: where there is a checkpoint, there is the network that belongs to it or a later one.
     with replacing(path.with_suffix(".onnx")) as part:
-        export_onnx(mean, part)
+        export_onnx(copy.deepcopy(mean).cpu(), part)
     with replacing(path) as part:
         torch.save(state, part)
 
