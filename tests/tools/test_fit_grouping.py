@@ -270,13 +270,10 @@ def test_network_answers_the_same_from_its_file(tmp_path, prepared):
     assert (answers <= 1).all()
 
 
-def test_everything_is_fitted_by_one_command(tmp_path):
-    """A tiny run: three maps in three folds, trained on for a second."""
-    pytest.importorskip("torch", reason="the network is trained with torch, which is not installed")
+@pytest.fixture
+def three_homes(tmp_path):
+    """Cases of three simulated maps that are left out in three folds."""
     from fit_grouping.buildings.make_buildings import simulate
-
-    from rose2_logs.segmentation.regions.features import REGION_FEATURES
-    from rose2_logs.segmentation.regions.strengths import read_trees
 
     cases = []
     for number, seed in enumerate((2, 3, 8)):
@@ -287,17 +284,51 @@ def test_everything_is_fitted_by_one_command(tmp_path):
         images = {"map": f"{name}.png", "rooms": f"{name}.rooms.png"}
         cases.append({"group": "homes", "name": name, "resolution_m": 0.05, **images})
     (tmp_path / "cases.json").write_text(json.dumps({"cases": cases}), encoding="utf-8")
-    work = tmp_path / "work"
-    command = [sys.executable, TOOL, work, "--cases", tmp_path / "cases.json", "--buildings", "4"]
-    command += ["--tree-buildings", "2", "--network-seconds", "1", "--fold-seconds", "1", "--trees", "8"]
+    return tmp_path / "cases.json"
+
+
+def run(script, *arguments):
     one_thread = os.environ | {"OMP_NUM_THREADS": "1"}
-    subprocess.run(command, check=True, env=one_thread)
-    figures = (work / "figures.md").read_text(encoding="utf-8")
-    assert "| sum |" in figures
-    assert (work / "borders.onnx").stat().st_size > 0
-    assert len(read_trees(work / "joins.npz").feature) == 8
-    read_trees(work / "outside.npz", REGION_FEATURES)
+    command = [sys.executable, TOOL.parent / script, *map(str, arguments)]
+    return subprocess.run(command, check=True, env=one_thread, stdout=subprocess.PIPE, text=True).stdout
+
+
+def check_fitted(work, cases):
+    """The folder for the package is whole, and the analysis runs with what was fitted without each fold."""
+    from rose2_logs.segmentation.regions.features import REGION_FEATURES
+    from rose2_logs.segmentation.regions.fitted import JOINS, MANIFEST, NETWORK, OUTSIDE, sha256_of
+    from rose2_logs.segmentation.regions.strengths import read_trees
+
+    ships = work / "seed0/all"
+    manifest = json.loads((ships / MANIFEST).read_text(encoding="utf-8"))
+    assert manifest["sha256"] == {name: sha256_of(ships / name) for name in (NETWORK, JOINS, OUTSIDE)}
+    assert manifest["real maps"] == 3
+    assert len(read_trees(ships / JOINS).feature) == 8
+    read_trees(ships / OUTSIDE, REGION_FEATURES)
+    assert "| mean of the seeds |" in run("left_out_figures.py", work, "--cases", cases, "--seeds", 1)
+    assert len(list((work / "seed0/predictions/homes").glob("*.png"))) == 3
+
+
+SMALL = ("--tree-buildings", 2, "--trees", 8, "--seeds", 1)
+
+
+def test_trees_are_fitted_without_training_a_network(tmp_path, three_homes):
+    """The fit of a minute."""
+    from rose2_logs.segmentation.regions import fitted
+
+    work = tmp_path / "work"
+    arguments = (work, "--cases", three_homes, "--buildings", 0, "--network", fitted.FOLDER / fitted.NETWORK)
+    run("fit_everything.py", *arguments, *SMALL)
+    check_fitted(work, three_homes)
+
+
+def test_everything_is_fitted_by_one_command(tmp_path, three_homes):
+    """A tiny run: three maps in three folds, trained on for a second."""
+    pytest.importorskip("torch", reason="the network is trained with torch, which is not installed")
+    work = tmp_path / "work"
+    arguments = (work, "--cases", three_homes, "--buildings", 4, "--network-seconds", 1, "--fold-seconds", 1)
+    run("fit_everything.py", *arguments, *SMALL)
+    check_fitted(work, three_homes)
     made = {path: path.stat().st_mtime_ns for path in (work / "networks").iterdir()}
-    subprocess.run(command, check=True, env=one_thread)
+    run("fit_everything.py", *arguments, *SMALL)
     assert {path: path.stat().st_mtime_ns for path in (work / "networks").iterdir()} == made
-    assert (work / "figures.md").read_text(encoding="utf-8") == figures

@@ -81,6 +81,15 @@ def train_networks(work: Path, cases: Path, seconds: float, fold_seconds: float,
             run_tool("train_network.py", network_file(work, seed, fold), *common, *real, *options)
 
 
+def take_network(work: Path, network: Path, seeds: int) -> None:
+    """Take a network that there is instead of training any."""
+    for seed in range(seeds):
+        for fold in (*range(FOLDS), *([ALL] if seed == 0 else [])):
+            path = network_file(work, seed, fold).with_suffix(".onnx")
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(network.read_bytes())
+
+
 def samples_of(examples: Sequence[Example], parameters: TreeParameters, seed: int) -> list[list[Samples]]:
     """Decisions of each map under the strength by hand, once without and once with noise."""
     return [
@@ -149,13 +158,17 @@ def main() -> None:
     parser.add_argument("--tree-buildings", type=int, default=800)
     parser.add_argument("--network-seconds", type=float, default=7200.0)
     parser.add_argument("--fold-seconds", type=float, default=3600.0)
+    parser.add_argument("--network", type=Path, help="ONNX file to take instead of training one")
     parser.add_argument("--trees", type=int, default=250)
     parser.add_argument("--seeds", type=int, default=3)
     arguments = parser.parse_args()
     cv2.setNumThreads(1)
     work, cases = arguments.work, arguments.cases
     make_buildings(work, arguments.buildings, arguments.tree_buildings)
-    train_networks(work, cases, arguments.network_seconds, arguments.fold_seconds, arguments.seeds)
+    if arguments.network:
+        take_network(work, arguments.network, arguments.seeds)
+    else:
+        train_networks(work, cases, arguments.network_seconds, arguments.fold_seconds, arguments.seeds)
     maps = prepared_benchmark(load_benchmark(cases), work / "prepared/real.pkl")
     simulated: list[PreparedMap] = []
     for path in sorted((work / "tree_buildings").glob("*.npz")):
@@ -164,8 +177,7 @@ def main() -> None:
     for seed in range(arguments.seeds):
         fit_seed(work, maps, simulated, parameters, seed)
     facts: dict[str, object] = {
-        "simulated maps for the network": len(list((work / "buildings").glob("*.npz")))
-        and arguments.buildings,
+        "simulated maps for the network": arguments.buildings,
         "simulated maps for the trees": len(simulated),
         "real maps": len(maps),
         "real buildings": len({one.building for one in maps}),
