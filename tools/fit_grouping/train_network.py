@@ -5,8 +5,8 @@
 
 OUT.pt is the checkpoint (weights, their running mean, the optimizer's state, steps and seconds done), written
 every few minutes; a run whose OUT.pt exists goes on from it until it has trained for that long all told.
-OUT.onnx answers with the running mean of the weights, and, where it began with a checkpoint, with that one too:
-it holds the mean of both answers.
+OUT.onnx answers with the running mean of the weights, and, where it began with a checkpoint, with that one
+too: it holds the mean of both answers.
 """
 
 from __future__ import annotations
