@@ -31,7 +31,22 @@ IOU_SYM = {
     "places/depot": 52.559,
 }
 """Mean IoU in both directions, in percent, by group and name of the map, of rooms by walls."""
-LEFT_OUT: dict[str, float] = {}
+LEFT_OUT = {
+    "full/freiburg_building79": 89.297,
+    "full/map15": 86.340,
+    "full/map_with_clutter": 51.417,
+    "survey_empty/NLB": 93.840,
+    "survey_furnished/Freiburg79_scan_furnitures": 77.576,
+    "incremental_fr79/map06": 80.417,
+    "incremental_fr79/map12": 82.840,
+    "campus/floor1": 54.464,
+    "campus/floor4": 58.228,
+    "homes/a03": 94.321,
+    "homes/b09": 91.666,
+    "homes/b27": 96.507,
+    "places/cic": 85.046,
+    "places/museum": 58.894,
+}
 """The same of rooms by borders that were fitted without these buildings."""
 
 pytestmark = pytest.mark.skipif(not CASES.is_file(), reason="the benchmark's maps are not beside the project")
