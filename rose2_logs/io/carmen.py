@@ -1,17 +1,32 @@
-"""Read laser scans with corrected poses from a CARMEN log."""
+"""CARMEN logs: laser scans with poses, corrected or of the wheels, as text."""
 
 from __future__ import annotations
 
-import gzip
-from dataclasses import dataclass
+import logging
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rose2_logs.config.mapping import MappingParameters
+from rose2_logs.config.selection import Times
 from rose2_logs.errors import LogError
+from rose2_logs.io.carmen_format import CARMEN_FORMAT, opened_text
+from rose2_logs.io.placed_scans import PlacedScan
+from rose2_logs.io.source import LoggedMap, LogInfo, MessageSource, TopicInfo
+from rose2_logs.mapping.log_odds import beams_of
+from rose2_logs.model.occupancy import FloatArray
+from rose2_logs.system.warnings import log_warning
 
-FloatArray = NDArray[np.float64]
+logger = logging.getLogger(__name__)
+
+SCAN_TOPIC = "/carmen"
+"""What stands for a topic: CARMEN logs have none."""
+EPOCH_OF_UNSTAMPED_S = 1_000_000_000
+"""Where a log starts whose own stamps cannot be used: any fixed time."""
 DEFAULT_MAX_RANGE_M = 80.0
 """No return of a SICK LMS reads 81.83 or 81.91; used where a log does not say its laser's range."""
 MIN_DISTINCT_STAMPS = 0.9
@@ -32,7 +47,7 @@ class CarmenScan:
     bearings_rad : (B,) float
         Angle of each ray to the laser's heading.
     ranges_m : (B,) float
-        Measured ranges; NaN where nothing returned.
+        Measured ranges: infinite where nothing returned, NaN where nothing is known.
     """
 
     time_s: float
@@ -70,7 +85,7 @@ def read_carmen(path: Path, *, max_range_m: float | None = None) -> tuple[list[C
     odometry: FloatArray | None = None
     laser_max = max_range_m or DEFAULT_MAX_RANGE_M
     try:
-        with gzip.open(path, "rt") if path.suffix == ".gz" else path.open() as lines:
+        with opened_text(path) as lines:
             for number, line in enumerate(lines, 1):
                 words = line.split()
                 kind = words[0] if words else ""
@@ -87,7 +102,7 @@ def read_carmen(path: Path, *, max_range_m: float | None = None) -> tuple[list[C
                     raise LogError(
                         f"{path}: line {number} is no whole {kind} message; cut the log there"
                     ) from error
-    except (OSError, UnicodeDecodeError) as error:
+    except (OSError, EOFError, UnicodeDecodeError) as error:
         raise LogError(f"{path}: cannot be read as a CARMEN log ({error})") from error
     if not scans:
         raise LogError(f"{path}: holds no ROBOTLASER1 or FLASER message; give a CARMEN log with laser scans")
@@ -95,7 +110,81 @@ def read_carmen(path: Path, *, max_range_m: float | None = None) -> tuple[list[C
     stamped = bool(np.all(times > 0)) and len(np.unique(times)) >= MIN_DISTINCT_STAMPS * len(scans)
     if stamped:
         return [scans[i] for i in np.argsort(times, kind="stable")], True
-    return [_at(float(i), scan) for i, scan in enumerate(scans)], False
+    return [replace(scan, time_s=float(i)) for i, scan in enumerate(scans)], False
+
+
+class CarmenLog(MessageSource):
+    """A CARMEN log: scans with poses, and no maps.
+
+    Parameters
+    ----------
+    path : Path
+        The log.
+
+    Attributes
+    ----------
+    scans : list of CarmenScan
+        In the order of their stamps.
+
+    Raises
+    ------
+    LogError
+        As `read_carmen`.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.scans, self.stamped = read_carmen(path)
+        if not self.stamped:
+            text = f"{path}: its stamps are damaged; the scans count as one second apart, in the file's order"
+            log_warning(logger, "stamps_damaged", text, file=path)
+        first_ns, last_ns = self.time_ns(self.scans[0]), self.time_ns(self.scans[-1])
+        topic = TopicInfo(SCAN_TOPIC, "laser scans", len(self.scans), False, "carmen")
+        self.info = LogInfo(path, CARMEN_FORMAT, path.stat().st_size, first_ns, last_ns, (topic,), True)
+
+    def time_ns(self, scan: CarmenScan) -> int:
+        """When a scan was taken, nanoseconds since the epoch."""
+        whole_s = math.floor(scan.time_s)
+        zero_s = 0 if self.stamped else EPOCH_OF_UNSTAMPED_S
+        return (zero_s + whole_s) * 10**9 + round((scan.time_s - whole_s) * 1e9)
+
+    def log_times(self, topic: str) -> Times:
+        """Return no times: there are no maps."""
+        return np.zeros(0, np.int64)
+
+    def read(self, topics: Sequence[str], times: Times) -> Iterator[LoggedMap]:
+        """Yield nothing: there are no maps."""
+        return iter(())
+
+    def close(self) -> None:
+        """Do nothing: the file was read when the log was opened."""
+
+
+class CarmenScans:
+    """The scans of a CARMEN log at the poses that it gives, in the frame ``map``.
+
+    Parameters
+    ----------
+    log : CarmenLog
+        The log.
+    parameters : MappingParameters
+        What is trusted of beams.
+    """
+
+    topic = SCAN_TOPIC
+    frame_id = "map"
+
+    def __init__(self, log: CarmenLog, parameters: MappingParameters) -> None:
+        self._log = log
+        self._parameters = parameters
+
+    def __iter__(self) -> Iterator[PlacedScan]:
+        """Yield the scans in the order of their stamps."""
+        for scan in self._log.scans:
+            time_ns, pose = self._log.time_ns(scan), scan.laser_pose
+            angles = pose[2] + scan.bearings_rad
+            directions = np.stack([np.cos(angles), np.sin(angles)], 1)
+            beams = beams_of(pose[:2], directions, scan.ranges_m, self._parameters)
+            yield PlacedScan(time_ns, time_ns, beams)
 
 
 def _robot_laser(words: list[str], max_range_m: float | None) -> CarmenScan:
@@ -110,7 +199,7 @@ def _robot_laser(words: list[str], max_range_m: float | None) -> CarmenScan:
         laser_pose=poses[:3],
         robot_pose=poses[3:6],
         odometry=poses[3:6],
-        bearings_rad=start + step * np.arange(count, dtype=float),
+        bearings_rad=_bearings(start, step, count),
         ranges_m=_returned(np.array(words[9:after], float), max_range_m or laser_max),
     )
 
@@ -121,23 +210,25 @@ def _front_laser(words: list[str], max_range_m: float, odometry: FloatArray | No
     readings = np.array(words[2 : 2 + count], float)
     poses = np.array(words[2 + count : 8 + count], float)
     # 181 or 361 readings include both ends of the half turn, 180 or 360 leave the last one out.
-    step = float(np.pi) / (count - 1 if count % 2 else count)
+    step = math.pi / (count - 1 if count % 2 else count)
     return CarmenScan(
         time_s=float(words[8 + count]),
         laser_pose=poses[:3],
         robot_pose=poses[:3],
         odometry=poses[3:6] if odometry is None else odometry,
-        bearings_rad=step * np.arange(count, dtype=float) - float(np.pi / 2),
+        bearings_rad=_bearings(-math.pi / 2, step, count),
         ranges_m=_returned(readings, max_range_m),
     )
 
 
+@cache
+def _bearings(start_rad: float, step_rad: float, count: int) -> FloatArray:
+    """Angles (count,) of the beams; one array for all scans of a lidar."""
+    bearings = start_rad + step_rad * np.arange(count, dtype=float)
+    bearings.flags.writeable = False
+    return bearings
+
+
 def _returned(readings: FloatArray, max_range_m: float) -> FloatArray:
-    """Readings with NaN where nothing returned."""
-    return np.where((readings > 0) & (readings < max_range_m), readings, np.nan)
-
-
-def _at(time_s: float, scan: CarmenScan) -> CarmenScan:
-    return CarmenScan(
-        time_s, scan.laser_pose, scan.robot_pose, scan.odometry, scan.bearings_rad, scan.ranges_m
-    )
+    """Readings; infinite from the laser's range on, NaN where they are zero or less."""
+    return np.where(readings >= max_range_m, np.inf, np.where(readings > 0, readings, np.nan))
