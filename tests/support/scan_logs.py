@@ -31,8 +31,7 @@ class Scan:
     range_max: float = 30.0
     kind = "sensor_msgs/msg/LaserScan"
 
-    @property
-    def readings(self) -> list[Any]:
+    def readings(self, ros: int) -> list[Any]:
         return [self.ranges.astype(np.float32), np.zeros(0, np.float32)]
 
 
@@ -41,9 +40,8 @@ class Echoes(Scan):
 
     kind = "sensor_msgs/msg/MultiEchoLaserScan"
 
-    @property
-    def readings(self) -> list[Any]:
-        echo = typestore(2).types["sensor_msgs/msg/LaserEcho"]
+    def readings(self, ros: int) -> list[Any]:
+        echo = typestore(ros).types["sensor_msgs/msg/LaserEcho"]
         found = [[each, each + 1] if np.isfinite(each) else [] for each in self.ranges.tolist()]
         return [[echo(np.array(each, np.float32)) for each in found], []]
 
@@ -92,7 +90,7 @@ def _made(message: Scan | Move, ros: int) -> Any:
         step = (last - first) / (len(message.bearings) - 1)
         numbers = (first, last, step, message.increment_s, 0.1, message.range_min, message.range_max)
         header = _header(ros, message.time_s, message.frame)
-        return types[message.kind](header, *numbers, *message.readings)
+        return types[message.kind](header, *numbers, *message.readings(ros))
     transform = types["geometry_msgs/msg/Transform"](
         types["geometry_msgs/msg/Vector3"](*message.position),
         types["geometry_msgs/msg/Quaternion"](*message.quaternion),
