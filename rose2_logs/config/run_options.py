@@ -407,8 +407,8 @@ class RunOptions:
             )
         if self.topic is not None and self.map_from is not None:
             raise ParameterError(
-                f"topic={self.topic!r} reads recorded maps, map_from={self.map_from!r} builds maps; give one of "
-                "them"
+                f"topic={self.topic!r} reads recorded maps, map_from={self.map_from!r} builds them; give one "
+                "of the two"
             )
         if self.map_frame is not None and self.map_from is None:
             raise ParameterError(

@@ -100,7 +100,7 @@ def open_log(
     try:
         if map_from is not None or source.info.format == CARMEN_FORMAT:
             built = _with_maps(source, map_from, map_frame, selection, limits, mapping)
-            return LogReader(built, built.topic, selection)
+            return LogReader(built, topic or built.topic, selection)
         return LogReader(source, topic, selection)
     except BaseException:
         source.close()

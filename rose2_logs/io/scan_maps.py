@@ -111,12 +111,14 @@ class ScanMaps(MessageSource):
 
     def read(self, topics: Sequence[str], times: Times) -> Iterator[LoggedMap]:
         """Yield the maps at `times` (sorted, distinct), in log time order."""
-        if self.topic in topics:
-            wanted = set(times.tolist())
-            for number, each in enumerate(self._built(), start=1):
-                if each.log_time_ns in wanted:
-                    decode = partial(self._grid, each)
-                    yield LoggedMap(each.log_time_ns, self.topic, number, self.info.path, decode)
+        if self.topic not in topics:
+            yield from self._recorded.read(topics, times)
+            return
+        wanted = set(times.tolist())
+        for number, each in enumerate(self._built(), start=1):
+            if each.log_time_ns in wanted:
+                decode = partial(self._grid, each)
+                yield LoggedMap(each.log_time_ns, self.topic, number, self.info.path, decode)
 
     def stream(self, topics: Sequence[str]) -> Iterator[LoggedBytes]:
         """Yield all messages of topics of the log, one at a time, roughly in log time order."""
@@ -128,7 +130,8 @@ class ScanMaps(MessageSource):
 
     def _built(self) -> list[_Built]:
         if self._maps is None:
-            self._file = self._opened.enter_context(tempfile.TemporaryFile(prefix="rose2_logs_"))
+            file = tempfile.TemporaryFile(prefix="rose2_logs_")  # noqa: SIM115 (closed with the log)
+            self._file = self._opened.enter_context(file)
             self._maps = list(self._build(self._file))
             logger.info("%s: %d maps built on %s", self.info.path, len(self._maps), self.topic)
         return self._maps

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from rose2_logs.io.carmen_format import CARMEN_FORMAT
 from rose2_logs.io.messages import ros_type
 from rose2_logs.io.poses import TRANSFORM_TYPES
 from rose2_logs.io.source import LogInfo
@@ -26,3 +27,10 @@ def scan_topics(info: LogInfo) -> tuple[str, ...]:
 def transform_topics(info: LogInfo) -> tuple[str, ...]:
     """Topics with transforms that can be read."""
     return _topics(info, TRANSFORM_TYPES)
+
+
+def mappable_topics(info: LogInfo) -> tuple[str, ...]:
+    """Topics with laser scans from which maps can be built: the log also says where they were taken."""
+    if info.format == CARMEN_FORMAT:
+        return tuple(topic.name for topic in info.topics)
+    return scan_topics(info) if transform_topics(info) else ()

@@ -166,10 +166,18 @@ def without(logged, *topics):
 @pytest.mark.parametrize(
     ("logged", "options", "message"),
     [
-        (drive(), {"map_from": "/front"}, "/front is not a topic with laser scans; its scan topics are /scan"),
+        (
+            drive(),
+            {"map_from": "/front"},
+            "/front is not a topic with laser scans; its scan topics are /scan",
+        ),
         (without(drive(), "/tf", "/tf_static"), {}, r"has no transforms \(/tf\)"),
         (without(drive(), "/tf_static"), {}, "the scans are in the frame 'laser', which is not among those"),
-        (without(drive(), "/tf"), {}, r"no transforms lead from map or odom to the scans in laser, only from base"),
+        (
+            without(drive(), "/tf"),
+            {},
+            r"no transforms lead from map or odom to the scans in laser, only from base",
+        ),
         (drive(), {"map_frame": "world"}, "no transforms lead from world to the scans in laser"),
     ],
 )

@@ -53,7 +53,7 @@ def test_cells_of_a_beam_join_its_ends_without_gaps():
 def test_beams_that_start_at_several_places_are_mapped_from_there():
     builder = MapBuilder()
     starts = np.array([[0.01, 0.01], [0.01, 1.01]])
-    builder.add(Beams(starts, starts + [1.0, 0.0], np.array([True, True])))
+    builder.add(Beams(starts, starts + np.array([1.0, 0.0]), np.array([True, True])))
     cells, geometry = builder.trinary(), builder.geometry()
     for start in starts:
         row, column = geometry.world_to_cell(start)
@@ -95,7 +95,7 @@ def test_a_scan_far_away_is_refused_and_the_map_stays_as_it_was():
     builder = MapBuilder(most_cells=100_000)
     builder.add_scan(np.zeros(3), np.array([0.0]), np.array([1.0]))
     before = builder.trinary()
-    with pytest.raises(InvalidMapError, match="raise the parameter reading.map_max_cells"):
+    with pytest.raises(InvalidMapError, match=r"raise the parameter reading\.map_max_cells"):
         builder.add_scan(np.array([1e6, 0, 0]), np.array([0.0]), np.array([1.0]))
     assert np.array_equal(builder.trinary(), before)
 

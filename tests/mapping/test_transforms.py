@@ -31,9 +31,7 @@ def times(*values):
 def test_poses_of_a_chain_are_those_of_multiplied_matrices():
     rotations, positions = Rotation.random(3, random_state=4), RANDOM.normal(size=(3, 3))
     names = ["map", "odom", "base", "laser"]
-    links = [
-        transform(0, *names[k : k + 2], tuple(positions[k]), rotations[k]) for k in range(3)
-    ]
+    links = [transform(0, *names[k : k + 2], tuple(positions[k]), rotations[k]) for k in range(3)]
     tree = tree_of(fixed=links)
     found = tree.poses(tree.above("laser")["map"], times(5))
     expected = np.eye(4)
@@ -48,7 +46,8 @@ def test_poses_of_a_chain_are_those_of_multiplied_matrices():
 def test_each_time_gets_the_pose_between_its_neighbors():
     stamps = range(0, 1001, 100)
     moves = [
-        transform(t, "map", "laser", (t / 2000, 0, 0), Rotation.from_euler("z", 3.0 + t / 2500)) for t in stamps
+        transform(t, "map", "laser", (t / 2000, 0, 0), Rotation.from_euler("z", 3.0 + t / 2500))
+        for t in stamps
     ]
     tree = tree_of(*moves)
     asked = times(930, 10, 555, 100)
@@ -71,9 +70,7 @@ def test_nothing_is_extrapolated(asked):
         tree.poses((("map", "laser"),), times(*asked))
 
 
-@pytest.mark.parametrize(
-    ("position", "angle"), [((1.5, 0, 0), 0.0), ((0, 0, 0), 0.7)], ids=["step", "turn"]
-)
+@pytest.mark.parametrize(("position", "angle"), [((1.5, 0, 0), 0.0), ((0, 0, 0), 0.7)], ids=["step", "turn"])
 def test_jumps_are_not_interpolated(position, angle):
     later = transform(10, "map", "laser", position, Rotation.from_euler("z", angle))
     tree = tree_of(transform(0, "map", "laser"), later)
