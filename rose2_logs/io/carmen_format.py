@@ -8,23 +8,20 @@ from typing import IO
 
 CARMEN_FORMAT = "CARMEN log"
 GZIP_MAGIC = b"\x1f\x8b"
-_KINDS = ("PARAM", "SYNC", "ODOM", "TRUEPOS", "MARKER", "FLASER", "RLASER", "ROBOTLASER1", "ROBOTLASER2")
-"""First words of the lines of a log."""
+_KINDS = ("PARAM ", "ODOM ", "FLASER ", "RLASER ", "ROBOTLASER1 ")
+"""How lines of a log begin."""
 _LOOKED_AT = 1 << 16
-"""Characters within which the first line comes that is no comment."""
+"""Characters among which the first message is: comments and the edges of a graph may come before it."""
 
 
 def is_carmen(path: Path) -> bool:
-    """Whether a file begins like a CARMEN log: comments, then one of its messages."""
+    """Whether a message of CARMEN is among the first lines of a file."""
     try:
-        with opened_text(path) as lines:
-            for line in lines.read(_LOOKED_AT).splitlines():
-                words = line.split(maxsplit=1)
-                if words and not words[0].startswith("#"):
-                    return words[0] in _KINDS
+        with opened_text(path) as text:
+            lines = text.read(_LOOKED_AT).splitlines()
     except (OSError, EOFError, UnicodeDecodeError):
-        pass
-    return False
+        return False
+    return any(line.startswith(_KINDS) for line in lines)
 
 
 def opened_text(path: Path) -> IO[str]:
