@@ -83,7 +83,7 @@ def _header(ros: int, time_s: float, frame: str) -> Any:
     return types["std_msgs/msg/Header"](*((7,) if ros == 1 else ()), stamp, frame)
 
 
-def _made(message: Scan | Move, ros: int) -> Any:
+def made(message: Scan | Move, ros: int) -> Any:
     types = typestore(ros).types
     if isinstance(message, Scan):
         first, last = message.bearings[[0, -1]].tolist()
@@ -118,7 +118,7 @@ def write_scans(path: Path, logged: Sequence[Logged]) -> Path:
                 channels[topic] = writer.register_channel(topic, "cdr", schema)
             for topic, message in ordered:
                 time_ns = START_NS + round(message.time_s * 1e9)
-                data = bytes(store.serialize_cdr(_made(message, 2), message.kind))
+                data = bytes(store.serialize_cdr(made(message, 2), message.kind))
                 writer.add_message(channels[topic], time_ns, data, time_ns)
             writer.finish()
         return path
@@ -128,7 +128,7 @@ def write_scans(path: Path, logged: Sequence[Logged]) -> Path:
         }
         for topic, message in ordered:
             serialize = store.serialize_ros1 if ros == 1 else store.serialize_cdr
-            data = bytes(serialize(_made(message, ros), message.kind))
+            data = bytes(serialize(made(message, ros), message.kind))
             bag.write(connections[topic], START_NS + round(message.time_s * 1e9), data)
     return path
 
