@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
+import zlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
@@ -18,13 +19,14 @@ from rose2_logs.io.carmen_format import CARMEN_FORMAT, opened_text
 from rose2_logs.io.placed_scans import PlacedScan
 from rose2_logs.io.source import LoggedMap, LogInfo, MessageSource, TopicInfo
 from rose2_logs.mapping.log_odds import beams_of
-from rose2_logs.model.occupancy import FloatArray
+from rose2_logs.model.occupancy import FARTHEST_ORIGIN_M, FloatArray
 from rose2_logs.system.warnings import log_warning
 
 logger = logging.getLogger(__name__)
 
 SCAN_TOPIC = "/carmen"
 """What stands for a topic: CARMEN logs have none."""
+SCAN_KINDS = ("ROBOTLASER1", "FLASER")
 EPOCH_OF_UNSTAMPED_S = 1_000_000_000
 """Where a log starts whose own stamps cannot be used: any fixed time."""
 DEFAULT_MAX_RANGE_M = 80.0
@@ -79,9 +81,10 @@ def read_carmen(path: Path, *, max_range_m: float | None = None) -> tuple[list[C
     Raises
     ------
     LogError
-        If the file is no CARMEN log with laser scans, or one of its lines is cut off.
+        If the file is no CARMEN log with laser scans, or none of them is whole.
     """
     scans: list[CarmenScan] = []
+    damaged: list[str] = []
     odometry: FloatArray | None = None
     laser_max = max_range_m or DEFAULT_MAX_RANGE_M
     try:
@@ -98,14 +101,16 @@ def read_carmen(path: Path, *, max_range_m: float | None = None) -> tuple[list[C
                         scans.append(_robot_laser(words, max_range_m))
                     elif kind == "FLASER":
                         scans.append(_front_laser(words, laser_max, odometry))
-                except (ValueError, IndexError) as error:
-                    raise LogError(
-                        f"{path}: line {number} is no whole {kind} message; cut the log there"
-                    ) from error
-    except (OSError, EOFError, UnicodeDecodeError) as error:
-        raise LogError(f"{path}: cannot be read as a CARMEN log ({error})") from error
+                except (ValueError, IndexError):
+                    damaged.append(f"line {number} is no whole {kind} message")
+    except (OSError, EOFError, UnicodeDecodeError, zlib.error) as error:
+        damaged.append(f"it cannot be read further than scan {len(scans)} ({error})")
     if not scans:
-        raise LogError(f"{path}: holds no ROBOTLASER1 or FLASER message; give a CARMEN log with laser scans")
+        what = damaged[0] if damaged else f"holds no {' or '.join(SCAN_KINDS)} message"
+        raise LogError(f"{path}: {what}; give a CARMEN log with laser scans", file=path)
+    if damaged:
+        more = f" and {len(damaged) - 1} more like it" if len(damaged) > 1 else ""
+        log_warning(logger, "damaged_message", f"{path}: {damaged[0]}{more}; skipped", file=path)
     times = np.array([scan.time_s for scan in scans])
     stamped = bool(np.all(times > 0)) and len(np.unique(times)) >= MIN_DISTINCT_STAMPS * len(scans)
     if stamped:
@@ -193,7 +198,7 @@ def _robot_laser(words: list[str], max_range_m: float | None) -> CarmenScan:
     count = int(words[8])
     after = 9 + count
     remissions = int(words[after])
-    poses = np.array(words[after + 1 + remissions : after + 7 + remissions], float)
+    poses = _poses(words[after + 1 + remissions : after + 7 + remissions])
     return CarmenScan(
         time_s=float(words[after + 12 + remissions]),
         laser_pose=poses[:3],
@@ -208,7 +213,7 @@ def _front_laser(words: list[str], max_range_m: float, odometry: FloatArray | No
     """Parse FLASER: readings over half a turn, corrected pose, raw pose, stamp."""
     count = int(words[1])
     readings = np.array(words[2 : 2 + count], float)
-    poses = np.array(words[2 + count : 8 + count], float)
+    poses = _poses(words[2 + count : 8 + count])
     # 181 or 361 readings include both ends of the half turn, 180 or 360 leave the last one out.
     step = math.pi / (count - 1 if count % 2 else count)
     return CarmenScan(
@@ -227,6 +232,14 @@ def _bearings(start_rad: float, step_rad: float, count: int) -> FloatArray:
     bearings = start_rad + step_rad * np.arange(count, dtype=float)
     bearings.flags.writeable = False
     return bearings
+
+
+def _poses(words: list[str]) -> FloatArray:
+    """Read two poses (6,)."""
+    poses = np.array(words, float)
+    if poses.shape != (6,) or not (np.abs(poses) < FARTHEST_ORIGIN_M).all():
+        raise ValueError("no poses of a robot")
+    return poses
 
 
 def _returned(readings: FloatArray, max_range_m: float) -> FloatArray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+import zlib
 from pathlib import Path
 from typing import IO
 
@@ -19,7 +20,7 @@ def is_carmen(path: Path) -> bool:
     try:
         with opened_text(path) as text:
             lines = text.read(_LOOKED_AT).splitlines()
-    except (OSError, EOFError, UnicodeDecodeError):
+    except (OSError, EOFError, UnicodeDecodeError, zlib.error):
         return False
     return any(line.startswith(_KINDS) for line in lines)
 

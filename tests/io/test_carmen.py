@@ -1,7 +1,10 @@
+import gzip
+
 import numpy as np
 import pytest
 from carmen_lines import front_laser, robot_laser
 
+from rose2_logs.errors import LogError
 from rose2_logs.io.carmen import read_carmen
 
 
@@ -44,3 +47,25 @@ def test_damaged_stamps_are_replaced_by_the_order_of_the_file(tmp_path):
     assert not stamped
     assert [scan.time_s for scan in scans] == [0, 1, 2]
     assert [scan.laser_pose[0] for scan in scans] == [3, 1, 2]
+
+
+def test_damaged_lines_and_a_packed_log_that_is_cut_off_are_read_as_far_as_they_are_whole(tmp_path, caplog):
+    good = "".join(robot_laser(t, t, [1.0, 2.0, 3.0]) for t in range(1, 2000))
+    log = tmp_path / "a.log"
+    log.write_text(good.replace("ROBOTLASER1 0 -1.5", "ROBOTLASER1 x", 2) + robot_laser(9, 9, [1, 2, 3])[:40])
+    assert len(read_carmen(log)[0]) == 1997
+    assert "line 1 is no whole ROBOTLASER1 message and 2 more like it; skipped" in caplog.text
+    packed = tmp_path / "a.log.gz"
+    packed.write_bytes(gzip.compress(good.encode())[:-3000])
+    assert 10 < len(read_carmen(packed)[0]) < 1990
+    assert "cannot be read further" in caplog.text
+    packed.write_bytes(gzip.compress(b"FLASER 1 2 3")[:-12])
+    with pytest.raises(LogError):
+        read_carmen(packed)
+
+
+def test_poses_that_are_no_numbers_are_refused(tmp_path):
+    log = tmp_path / "a.log"
+    log.write_text("FLASER 1 2.0 nan 0 0 0 0 0 5 host 5\n")
+    with pytest.raises(LogError, match="line 1 is no whole FLASER"):
+        read_carmen(log)

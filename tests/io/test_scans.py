@@ -41,7 +41,9 @@ def test_ranges_are_understood_by_their_bounds():
     read = scan_of(fields(Scan(0.0, ranges, BEARINGS), 2), Scan.kind)
     assert np.isnan(read.ranges_m[:5]).all()
     assert np.isinf(read.ranges_m[5:]).all()
-    boundless = Scan(0.0, np.array([NAN, 0.0, 0.05, 1.0, 31.0, 99.0, INF]), BEARINGS, range_min=0, range_max=0)
+    boundless = Scan(
+        0.0, np.array([NAN, 0.0, 0.05, 1.0, 31.0, 99.0, INF]), BEARINGS, range_min=0, range_max=0
+    )
     read = scan_of(fields(boundless, 2), Scan.kind)
     assert read.ranges_m[2:6] == pytest.approx([0.05, 1.0, 31.0, 99.0])
     assert np.isnan(read.ranges_m[:2]).all()

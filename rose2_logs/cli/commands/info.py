@@ -66,8 +66,8 @@ def print_log_facts(facts: LogFacts) -> None:
         if topic_facts.coverage_first is not None:
             print_line(f"  coverage  {topic_facts.coverage_first:.1%} to 100%")
     if not facts.maps and facts.map_from:
-        topic = escape(printable(facts.map_from[0]))
-        print_line(f"no occupancy grids: analyze --map-from {topic} builds maps from its laser scans")
+        scans = escape(printable(facts.map_from[0]))
+        print_line(f"no occupancy grids: analyze --map-from {scans} builds maps from its laser scans")
     elif not facts.maps:
         print_line("no occupancy grids: analyze cannot use this log")
 
