@@ -29,6 +29,8 @@ TRIED_TRANSFORMS = 20_000
 """If a log's transforms connect its scans to a frame, they do so within this many of its first messages."""
 MOST_LEFT_OUT = 0.05
 """Scans at the ends of a log lack transforms; if more than this share is left out, there is a warning."""
+CLOCKS_APART_S = 60.0
+"""Stamps that are further apart than this at the end of a log come from different clocks."""
 _MOST_LISTED = 6
 
 
@@ -119,6 +121,8 @@ class RosScans:
         self._moving_topics = tuple(name for name in transforms if "static" not in name)
         self.frame_id = self._fixed_frame(frame)
         self.left_out: Counter[str] = Counter()
+        # Latest stamps, to tell clocks that differ.
+        self._scan_ns = self._transform_ns = 0
 
     def __iter__(self) -> Iterator[PlacedScan]:
         """Yield the scans that have a pose, in the order in which they were recorded; warn of the others."""
@@ -145,6 +149,7 @@ class RosScans:
                     continue
                 for transform in _transforms_in(message, data):
                     tree.add(transform)
+                    self._transform_ns = transform.stamp_ns
             elif (scan := self._scan_in(message, data)) is not None:
                 links = links_to.get(scan.frame_id) or tree.above(scan.frame_id).get(self.frame_id, ())
                 if not links:
@@ -152,6 +157,7 @@ class RosScans:
                 elif scan.frame_id not in links_to:
                     links_to[scan.frame_id] = links
                     needed = tuple(child.encode() for found in links_to.values() for _, child in found)
+                self._scan_ns = scan.stamp_ns
                 waiting.append(_Waiting(message.log_time_ns, scan, links))
             yield from self._settled(waiting, tree, now_ns - wait_ns)
         yield from self._settled(waiting, tree, None)
@@ -257,7 +263,13 @@ class RosScans:
         reasons = ", ".join(f"{count} {reason}" for reason, count in self.left_out.most_common())
         text = f"{path}: {self.left_out.total()} of {total} scans on {self.topic} are left out: {reasons}"
         if not placed:
-            raise LogError(text, file=path, topic=self.topic)
+            apart_s = abs(self._scan_ns - self._transform_ns) / 1e9
+            clocks = (
+                ""
+                if apart_s < CLOCKS_APART_S
+                else f"; the stamps of scans and transforms are {apart_s:.0f} s apart"
+            )
+            raise LogError(text + clocks, file=path, topic=self.topic)
         if self.left_out.total() > MOST_LEFT_OUT * total:
             log_warning(logger, "scans_left_out", text, file=path, topic=self.topic)
         else:

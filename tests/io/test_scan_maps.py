@@ -198,6 +198,16 @@ def test_scans_without_transforms_of_their_time_are_counted(tmp_path, caplog):
         final_map(write_scans(tmp_path / "none.mcap", none))
 
 
+def test_clocks_that_differ_are_told(tmp_path):
+    """A lidar that stamps its scans since it was switched on."""
+    logged = [
+        (topic, Scan(each.time_s - 1e9, each.ranges, each.bearings)) if topic == "/scan" else (topic, each)
+        for topic, each in drive(duration_s=2.0)
+    ]
+    with pytest.raises(LogError, match="scans and transforms are 1000000000 s apart"):
+        final_map(write_scans(tmp_path / "run.mcap", logged))
+
+
 def test_a_tilted_lidar_maps_nothing(tmp_path):
     tilted = [
         (topic, Move(0.0, "base_link", "laser", (0, 0, 1), (0.0, math.sin(0.2), 0.0, math.cos(0.2))))
