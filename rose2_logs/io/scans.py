@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rose2_logs.errors import InvalidMapError
 from rose2_logs.io.messages import Fields, ros_type
 from rose2_logs.io.scan_topics import ECHOES_TYPE
 from rose2_logs.mapping.transforms import Transform
 from rose2_logs.model.occupancy import FloatArray
 
+MOST_BEAMS = 1 << 16
+"""No planar lidar has more beams; anything more is treated as damage."""
 LONGEST_SWEEP_NS = 10**9
 """No lidar takes longer for a scan; where the message claims it, all beams count as of its stamp."""
 
@@ -48,7 +52,7 @@ def scan_of(fields: Fields, message_type: str) -> Scan:
     Raises
     ------
     InvalidMapError
-        If the message ends too early.
+        If the message ends too early, or its angles or the number of its beams make no sense.
     """
     stamp_ns, frame_id = fields.header()
     angle_min, _, angle_step, time_step, _, range_min, range_max = fields.numbers("f", 7)
@@ -56,6 +60,10 @@ def scan_of(fields: Fields, message_type: str) -> Scan:
         ranges_m = _nearest_echoes(fields)
     else:
         ranges_m = fields.singles("ranges").astype(float)
+    if not math.isfinite(angle_min) or not math.isfinite(angle_step):
+        raise InvalidMapError(f"its angles, from {angle_min} in steps of {angle_step}, are not finite")
+    if len(ranges_m) > MOST_BEAMS:
+        raise InvalidMapError(f"it has {len(ranges_m)} beams, more than {MOST_BEAMS}")
     beams = np.arange(len(ranges_m))
     sweep_ns = time_step * 1e9 * max(len(beams) - 1, 0)
     step_ns = time_step * 1e9 if abs(sweep_ns) <= LONGEST_SWEEP_NS else 0.0

@@ -6,9 +6,11 @@ import pytest
 from rosbags.highlevel import AnyReader
 from scan_logs import Echoes, Move, Scan, made, typestore
 
+from rose2_logs.config.mapping import MappingParameters
 from rose2_logs.errors import InvalidMapError
 from rose2_logs.io.messages import CdrFields, Ros1Fields
 from rose2_logs.io.scans import scan_of, transforms_of
+from rose2_logs.mapping.log_odds import beams_of
 
 BACKPACK = Path(__file__).parents[3] / "shared" / "bags" / "third_party" / "no_map_cartographer.bag"
 BEARINGS = np.linspace(-1.5, 1.5, 7)
@@ -61,6 +63,34 @@ def test_a_message_that_is_cut_off_is_refused(kind):
     for size in range(4, len(data) - 40, 7):
         with pytest.raises(InvalidMapError):
             scan_of(CdrFields(memoryview(data[:size])), kind.kind)
+
+
+@pytest.mark.parametrize("kind", [Scan, Echoes])
+def test_damaged_bytes_are_refused_or_give_beams_that_can_be_drawn(kind):
+    """Where bytes are changed at random, the beams have finite ends at most as far as is trusted, or none."""
+    random = np.random.default_rng(5)
+    data = np.frombuffer(
+        typestore(2).serialize_cdr(made(kind(0.0, np.ones(7), BEARINGS), 2), kind.kind), np.uint8
+    )
+    read = 0
+    for _ in range(3000):
+        changed = data.copy()
+        changed[random.integers(4, len(data), 3)] = random.integers(0, 256, 3)
+        try:
+            scan = scan_of(CdrFields(memoryview(changed.tobytes())), kind.kind)
+        except InvalidMapError:
+            continue
+        read += 1
+        directions = np.stack([np.cos(scan.bearings_rad), np.sin(scan.bearings_rad)], 1)
+        beams = beams_of(np.zeros(2), directions, scan.ranges_m, MappingParameters())
+        assert (np.hypot(*beams.ends_m.T) <= 20.001).all()
+        assert len(scan.times_ns) == len(scan.ranges_m)
+    assert read > 500
+
+
+def test_angles_that_are_no_numbers_are_refused():
+    with pytest.raises(InvalidMapError, match="its angles"):
+        scan_of(fields(Scan(0.0, np.ones(7), np.full(7, NAN)), 2), Scan.kind)
 
 
 @pytest.mark.parametrize("ros", [1, 2])
