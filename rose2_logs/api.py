@@ -280,6 +280,8 @@ def open_log(
     log: str | Path | Sequence[str | Path],
     *,
     topic: str | None = None,
+    map_from: str | None = None,
+    map_frame: str | None = None,
     parameters: GivenParameters = None,
     **selection: Any,
 ) -> LogReader:
@@ -291,8 +293,12 @@ def open_log(
         An MCAP file, a ROS 1 bag, a ROS 2 bag, saved maps; or several files of one kind that are one log.
     topic : str, optional
         The map topic; by default ``/map``, else the only one.
+    map_from : str, optional
+        Topic of laser scans to build the maps from, instead of reading recorded ones.
+    map_frame : str, optional
+        Frame of built maps; by default ``map``, else ``odom``.
     parameters : Parameters or mapping, optional
-        Those of ``reading`` say how much a log may claim.
+        Those of ``reading`` say how much a log may claim, those of ``mapping`` how maps are built.
     **selection
         Fields of `Selection`: ``every_s``, ``min_change_m2``, ``max_snapshots`` and so on.
 
@@ -315,10 +321,19 @@ def open_log(
     """
     known = [each.name for each in dataclasses.fields(Selection)]
     _refuse_unknown(selection, known)
-    check_option(RunOptions, "topic", topic)
-    limits = Parameters.from_any(parameters).reading
+    for name, value in (("topic", topic), ("map_from", map_from), ("map_frame", map_frame)):
+        check_option(RunOptions, name, value)
+    given = Parameters.from_any(parameters)
     path = [_path(each, "log") for each in log] if isinstance(log, list | tuple) else _path(log, "log")
-    return open_log_reader(path, topic=topic, selection=Selection(**selection), limits=limits)
+    return open_log_reader(
+        path,
+        topic=topic,
+        selection=Selection(**selection),
+        limits=given.reading,
+        map_from=map_from,
+        map_frame=map_frame,
+        mapping=given.mapping,
+    )
 
 
 def read_map(map_file: str | Path, resolution_m: float | None = None) -> OccupancySnapshot:

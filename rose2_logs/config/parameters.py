@@ -23,6 +23,7 @@ from rose2_logs.config.baselines import (
 )
 from rose2_logs.config.comparison import ComparisonParameters
 from rose2_logs.config.fields import ParameterBlock, choice, number
+from rose2_logs.config.mapping import MappingParameters
 from rose2_logs.config.regions import RegionParameters
 from rose2_logs.config.tracking import QualityParameters, TrackingParameters
 from rose2_logs.errors import ParameterError
@@ -383,6 +384,7 @@ class Parameters:
     """
 
     reading: ReadingParameters = field(default_factory=ReadingParameters)
+    mapping: MappingParameters = field(default_factory=MappingParameters)
     occupancy: OccupancyParameters = field(default_factory=OccupancyParameters)
     spectrum: SpectrumParameters = field(default_factory=SpectrumParameters)
     walls: WallParameters = field(default_factory=WallParameters)

@@ -17,6 +17,7 @@ from rose2_logs.io.grids import MapWarning, Patch
 from rose2_logs.io.map_stream import MapChecks, MapStream, ReadCounts
 from rose2_logs.io.messages import is_patch_type
 from rose2_logs.io.poses import RobotPath
+from rose2_logs.io.scan_topics import mappable_topics
 from rose2_logs.io.source import DamagedMessageError, LoggedMap, LogInfo, MessageSource, TopicInfo
 from rose2_logs.model.occupancy import OccupancySnapshot
 from rose2_logs.system.warnings import log_warning
@@ -256,9 +257,14 @@ def choose_topic(info: LogInfo, asked: str | None = None) -> str:
     if not maps:
         others = ", ".join(sorted({topic.message_type for topic in info.topics})[:MOST_LISTED])
         found = f", only {others}" if others else ""
+        scans = mappable_topics(info)
+        remedy = (
+            f"map_from={scans[0]!r} builds maps from its laser scans"
+            if scans
+            else "record the mapping node's topic too, usually /map"
+        )
         raise NoMapTopicError(
-            f"{where} no topic has occupancy grids (nav_msgs/OccupancyGrid){found}; "
-            "record the mapping node's topic too, usually /map"
+            f"{where} no topic has occupancy grids (nav_msgs/OccupancyGrid){found}; {remedy}"
         )
     filled = {name: topic for name, topic in maps.items() if topic.message_count != 0}
     if not filled:

@@ -125,6 +125,11 @@ class MessageSource(ABC):
 
     info: LogInfo
 
+    @property
+    def recorded(self) -> MessageSource:
+        """The log itself, where this one adds maps that are built from it."""
+        return self
+
     @abstractmethod
     def log_times(self, topic: str) -> Times:
         """Log times of all messages of `topic`, nanoseconds, sorted."""

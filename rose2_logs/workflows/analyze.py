@@ -131,7 +131,13 @@ def _analyze_log(
     refuse_existing(output.files, overwrite=options.overwrite or options.resume)
     with (
         open_log(
-            path, topic=options.topic, selection=options.selection, limits=options.parameters.reading
+            path,
+            topic=options.topic,
+            selection=options.selection,
+            limits=options.parameters.reading,
+            map_from=options.map_from,
+            map_frame=options.map_frame,
+            mapping=options.parameters.mapping,
         ) as reader,
         start_workers(options) as processes,
     ):
