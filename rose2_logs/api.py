@@ -106,7 +106,7 @@ def analyze(
     >>> import rose2_logs as rl
     >>> run = rl.analyze("sample_logs/office.mcap", max_snapshots=3)
     >>> run.snapshots.arrow["rooms"].to_pylist()
-    [3, 11, 19]
+    [6, 13, 18]
     """
     log = _path(log, "log")
     folder = None if out is None else _path(out, "out")
@@ -168,9 +168,9 @@ def track(
     >>> import rose2_logs as rl
     >>> for step in rl.track(rl.open_log("sample_logs/office.mcap", max_snapshots=3)):
     ...     print(f"{step.coverage:.2f}", len(step.rooms), sorted(step.track_ids)[:4])
-    0.26 3 [1, 2, 3]
-    0.72 11 [1, 2, 3, 4]
-    1.00 19 [1, 2, 3, 4]
+    0.26 6 [1, 2, 3, 4]
+    0.72 13 [1, 2, 3, 4]
+    1.00 18 [1, 2, 4, 5]
     """
     # What cannot be used is refused by the call, not when the first map is asked for.
     options = _options(parameters, {"method": method, "detail": detail, "workers": workers, "topic": topic})
@@ -386,7 +386,7 @@ def load(folder: str | Path) -> Run:
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     run = rl.analyze("sample_logs/office.mcap", f"{folder}/office", **options)
     ...     rl.load(f"{folder}/office")
-    <Run office: 3 maps, 19 rooms at the end>
+    <Run office: 3 maps, 18 rooms at the end>
     """
     return Run(_path(folder, "folder"))
 
@@ -430,7 +430,7 @@ def compare(
     >>> import rose2_logs as rl
     >>> run = rl.analyze("sample_logs/office.mcap", max_snapshots=3)
     >>> rl.compare(run, run).room_counts
-    {'same': 19}
+    {'same': 18}
     """
     run_a, run_b = (each if isinstance(each, Run) else Run(_path(each, "run")) for each in (a, b))
     used = Parameters.from_any(parameters)

@@ -38,7 +38,7 @@ class LayoutComparison:
     >>> run = rl.analyze("sample_logs/office.mcap", max_snapshots=3)
     >>> found = rl.compare(run, run)
     >>> found.same_building, found.room_counts
-    (True, {'same': 19})
+    (True, {'same': 18})
     """
 
     a: FinalLayout

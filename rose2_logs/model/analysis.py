@@ -182,7 +182,7 @@ class SnapshotAnalysis:
     >>> with rl.open_log("sample_logs/office.mcap") as reader:
     ...     found = rl.segment(reader.last())
     >>> found.labels.shape, int(found.labels.max()), len(found.polygons)
-    ((512, 704), 19, 19)
+    ((512, 704), 18, 18)
     """
 
     index: int

@@ -134,7 +134,7 @@ class RunSummary:
     ...     def finish(self, summary):
     ...         print(summary.totals.rooms_last, "rooms, final from map", summary.layout_final.snapshot)
     >>> run = rl.analyze("sample_logs/office.mcap", sinks=[Conclusion()], max_snapshots=3)
-    19 rooms, final from map 2
+    18 rooms, final from map 2
     """
 
     totals: RunTotals

@@ -52,7 +52,7 @@ class Run(StoredRun, Sequence["RunSnapshot"]):
     >>> import rose2_logs as rl
     >>> run = rl.analyze("sample_logs/office.mcap", max_snapshots=3)
     >>> run
-    <Run office: 3 maps, 19 rooms at the end>
+    <Run office: 3 maps, 18 rooms at the end>
     >>> run[-1].labels.shape == run[-1].geometry.shape
     True
     """
@@ -221,7 +221,7 @@ class RunSnapshot:
     >>> import rose2_logs as rl
     >>> run = rl.analyze("sample_logs/office.mcap", max_snapshots=3)
     >>> run[0]
-    <RunSnapshot 0 of office: coverage 26%, 3 rooms>
+    <RunSnapshot 0 of office: coverage 26%, 6 rooms>
     """
 
     def __init__(self, run: Run, number: int) -> None:

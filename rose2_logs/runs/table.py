@@ -41,7 +41,7 @@ class Table:
     >>> import rose2_logs as rl
     >>> run = rl.analyze("sample_logs/office.mcap", max_snapshots=3)
     >>> run.snapshots
-    <Table snapshots: 3 rows, 33 columns>
+    <Table snapshots: 3 rows, 34 columns>
     >>> run.rooms.arrow.column_names[:4]
     ['snapshot', 'log_time_ns', 'track', 'room']
     """

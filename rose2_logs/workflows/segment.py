@@ -57,7 +57,7 @@ class Segmentation(SnapshotAnalysis):
     >>> with rl.open_log("sample_logs/office.mcap") as reader:
     ...     found = rl.segment(reader.last())
     >>> len(found.plan().rooms), found.figure()
-    (19, Drawing('/map', ...))
+    (18, Drawing('/map', ...))
     """
 
     snapshot: OccupancySnapshot = field(kw_only=True)

@@ -223,10 +223,10 @@ def test_what_is_known_of_runs_is_shown_in_a_line():
     found, size = rl.compare(run, run), r"\d+ x \d+ cells of 0\.05 m"
     assert repr(kept.info) == "RunInfo('office.mcap', topic='/map', method='rose2')"
     assert re.fullmatch(
-        r"RunSummary\(3 maps, 19 rooms at the end, \d+ tracks, \d+ events\)", repr(kept.summary)
+        r"RunSummary\(3 maps, 18 rooms at the end, \d+ tracks, \d+ events\)", repr(kept.summary)
     )
-    assert repr(found) == "LayoutComparison('office', 'office', rooms: 19 same)"
-    assert re.fullmatch(rf"FinalLayout\('office', 19 rooms, {size}\)", repr(found.a))
+    assert repr(found) == "LayoutComparison('office', 'office', rooms: 18 same)"
+    assert re.fullmatch(rf"FinalLayout\('office', 18 rooms, {size}\)", repr(found.a))
     assert re.fullmatch(rf"PlacedMap\({size}, \d+ wall points\)", repr(found.a.map))
     with rl.open_log(SAMPLE_LOGS / "office.mcap") as reader:
         assert repr(reader) == "LogReader('office.mcap', MCAP, topic='/map')"

@@ -320,7 +320,10 @@ def test_a_damaged_chunk_stays_as_it_is(tmp_path):
 
 
 def test_nothing_is_kept_of_chunks_that_were_taken_apart(tmp_path):
-    """Memory does not grow with the log: after 18 chunks with a map it is what it was after two."""
+    """Memory does not grow with the log: in the second ten maps it is at most what it was in the first.
+
+    It goes up and down, as a chunk of what is added is filled and written.
+    """
     log = chunked_log(tmp_path / "run.mcap", maps_in=range(20))
     options = RunOptions()
     with open_log(log.path) as reader, start_workers(options) as workers:
@@ -339,7 +342,7 @@ def test_nothing_is_kept_of_chunks_that_were_taken_apart(tmp_path):
         sink.abandon()
     finally:
         tracemalloc.stop()
-    assert held[-1] - held[1] < step.snapshot.cells.nbytes
+    assert max(held[10:]) - max(held[:10]) < step.snapshot.cells.nbytes
 
 
 def test_a_log_without_an_index_is_copied_message_by_message(tmp_path):
