@@ -251,15 +251,15 @@ def segment(
     >>> rl.segment(grid, resolution_m=0.05).rooms
     RoomMap(2 rooms, 1 doorway, 200 x 120 cells of 0.05 m)
     """
+    used = with_detail(Parameters.from_any(parameters), detail, method)
     if isinstance(map_, OccupancySnapshot):
         snapshot = map_
     elif isinstance(map_, str | Path | bytes):
-        snapshot = read_map(map_, resolution_m)  # type: ignore[arg-type]
+        snapshot = _read_map(map_, resolution_m, used)  # type: ignore[arg-type]
     else:
         snapshot = _snapshot_of_array(map_, resolution_m)
     if not snapshot.cells.size:
         raise InvalidMapError("the map has no cells")
-    used = with_detail(Parameters.from_any(parameters), detail, method)
     return segment_snapshot(snapshot, used, method, name=snapshot.topic, voronoi=voronoi)
 
 
@@ -292,7 +292,7 @@ def open_log(
     topic : str, optional
         The map topic; by default ``/map``, else the only one.
     parameters : Parameters or mapping, optional
-        Those of ``reading`` say how much a log may claim.
+        Those of ``reading`` say how much a log may claim, those of ``occupancy`` what the cells mean.
     **selection
         Fields of `Selection`: ``every_s``, ``min_change_m2``, ``max_snapshots`` and so on.
 
@@ -316,9 +316,11 @@ def open_log(
     known = [each.name for each in dataclasses.fields(Selection)]
     _refuse_unknown(selection, known)
     check_option(RunOptions, "topic", topic)
-    limits = Parameters.from_any(parameters).reading
+    used = Parameters.from_any(parameters)
     path = [_path(each, "log") for each in log] if isinstance(log, list | tuple) else _path(log, "log")
-    return open_log_reader(path, topic=topic, selection=Selection(**selection), limits=limits)
+    return open_log_reader(
+        path, topic=topic, selection=Selection(**selection), limits=used.reading, occupancy=used.occupancy
+    )
 
 
 def read_map(map_file: str | Path, resolution_m: float | None = None) -> OccupancySnapshot:
@@ -347,8 +349,12 @@ def read_map(map_file: str | Path, resolution_m: float | None = None) -> Occupan
     ...     rl.read_map(f"{folder}/plan.png", resolution_m=0.05)
     OccupancySnapshot(index=0, topic='/map', 200 x 120 cells of 0.05 m)
     """
+    return _read_map(map_file, resolution_m, Parameters())
+
+
+def _read_map(map_file: str | Path, resolution_m: float | None, parameters: Parameters) -> OccupancySnapshot:
     _check_resolution(resolution_m)
-    return read_static_map(_path(map_file, "map_file"), resolution_m)
+    return read_static_map(_path(map_file, "map_file"), resolution_m, parameters)
 
 
 def load(folder: str | Path) -> Run:

@@ -29,6 +29,10 @@ from rose2_logs.errors import ParameterError
 from rose2_logs.system.files import reason_of
 
 
+CELL_VALUES = ("auto", "stored", "percent", "zero_one", "fifty_unknown", "costs")
+"""How the numbers in the cells of maps can be read."""
+
+
 @dataclass(frozen=True, repr=False)
 class ReadingParameters(ParameterBlock):
     """How much a log may claim before it is refused as damaged or hostile; real ones stay far below."""
@@ -56,11 +60,28 @@ class ReadingParameters(ParameterBlock):
 
 @dataclass(frozen=True, repr=False)
 class OccupancyParameters(ParameterBlock):
-    """Which cells count as occupied and which as free."""
+    """Which cells count as occupied and which as free.
+
+    Attributes
+    ----------
+    implied : mapping
+        Thresholds that are named apply to the numbers as they are stored.
+    """
 
     block: ClassVar[str] = "occupancy"
     ascending: ClassVar[tuple[tuple[str, ...], ...]] = (("free_max_percent", "occupied_min_percent"),)
+    implied: ClassVar[Mapping[str, Mapping[str, Any]]] = {
+        "free_max_percent": {"values": "percent"},
+        "occupied_min_percent": {"values": "percent"},
+    }
 
+    values: str = choice(
+        "auto",
+        CELL_VALUES,
+        "What the numbers in cells mean: auto decides it from the maps and tells where it is not the usual; "
+        "stored takes percent, saved maps by their own thresholds; percent takes the thresholds below, also "
+        "for saved maps, and so does naming one of these.",
+    )
     occupied_min_percent: float = number(
         65.0, "%", "Cells above are occupied; map_server's default occupied_thresh.", 0, 100
     )
@@ -77,6 +98,11 @@ class OccupancyParameters(ParameterBlock):
         10_000,
         2**40,
     )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.values == "auto" and not self.implied.keys().isdisjoint(self.changed()):
+            object.__setattr__(self, "values", "percent")
 
 
 @dataclass(frozen=True, repr=False)
@@ -480,7 +506,13 @@ def _replaced_block(block_name: str, block: Any, values: Mapping[str, Any]) -> A
             full_name = f"{block_name}.{name}"
             hint = _meant(full_name) or f"there are: {', '.join(names)}"
             raise ParameterError(f"no parameter {full_name}; {hint}")
-    return dataclasses.replace(block, **values)
+    implied = {
+        other: value
+        for name in values
+        for other, value in block.implied.get(name, {}).items()
+        if other not in block.changed()
+    }
+    return dataclasses.replace(block, **(implied | dict(values)))
 
 
 def _meant(name: str) -> str:

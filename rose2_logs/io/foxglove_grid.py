@@ -19,7 +19,6 @@ from rose2_logs.io.grids import (
     MapWarning,
     check_cells,
     make_grid,
-    percent,
 )
 from rose2_logs.model.occupancy import UNKNOWN
 
@@ -95,7 +94,7 @@ def _grid(message: Any, most_cells: int) -> Grid | None:
     stamp_ns = message.timestamp.seconds * 10**9 + message.timestamp.nanos
     values = _channel(message)
     check_cells(values.shape[0], values.shape[1], most_cells)
-    cells = _occupancy(values, map_warnings)
+    cells = _occupancy(values)
     return make_grid(stamp_ns, message.frame_id, message.cell_size.x, pose, cells, map_warnings)
 
 
@@ -128,7 +127,7 @@ def _channel(message: Any) -> NDArray[Any]:
     return np.ndarray((rows, columns), dtype, data, field.offset, (message.row_stride, cell))
 
 
-def _occupancy(values: NDArray[Any], map_warnings: list[MapWarning]) -> Cells:
+def _occupancy(values: NDArray[Any]) -> Cells:
     if values.dtype.kind == "f":
         if values.size and np.nanmax(values, initial=0) > 1:
             raise InvalidMapError(
@@ -137,6 +136,6 @@ def _occupancy(values: NDArray[Any], map_warnings: list[MapWarning]) -> Cells:
         known = values >= 0
         return np.where(known, np.round(np.where(known, values, 0) * 100), UNKNOWN).astype(np.int8)
     if values.dtype.itemsize == 1:
-        return percent(np.ascontiguousarray(values).view(np.int8), map_warnings)
+        return np.ascontiguousarray(values).view(np.int8)
     known = (values >= 0) & (values <= 100)
     return np.where(known, values, UNKNOWN).astype(np.int8)

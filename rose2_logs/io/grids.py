@@ -42,7 +42,7 @@ class MapWarning(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """A whole map: stamp in nanoseconds, geometry, cells (H, W) int8 in {-1, 0..100}, and warnings."""
+    """A whole map: stamp in nanoseconds, geometry, cells (H, W) int8 as they are stored, and warnings."""
 
     stamp_ns: int
     geometry: GridGeometry
@@ -52,7 +52,7 @@ class Grid:
 
 @dataclass(frozen=True, eq=False)
 class Patch:
-    """New values for a rectangle of the previous map: stamp, first row and column, cells (h, w) int8."""
+    """New values for a rectangle of the previous map: stamp, first row and column, cells (h, w) int8 as stored."""
 
     stamp_ns: int
     row: int

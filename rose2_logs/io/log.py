@@ -6,13 +6,17 @@ import dataclasses
 import logging
 from collections import deque
 from collections.abc import Iterator
+from contextlib import suppress
+from functools import cached_property
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
+from rose2_logs.config.parameters import OccupancyParameters
 from rose2_logs.config.selection import Selection, Times
 from rose2_logs.errors import InvalidMapError, LogError, NoMapTopicError
+from rose2_logs.io.cell_values import MAPS_LOOKED_AT, OVERRULED, CellReading, count_values, decide, read_as
 from rose2_logs.io.grids import MapWarning, Patch
 from rose2_logs.io.map_stream import MapChecks, MapStream, ReadCounts
 from rose2_logs.io.messages import is_patch_type
@@ -29,6 +33,7 @@ logger = logging.getLogger(__name__)
 PREFERRED_TOPIC = "map"
 # Patches are published on the map's topic with this suffix: the convention of costmap_2d and nav2.
 PATCH_SUFFIX = "_updates"
+USUAL = OccupancyParameters()
 # Number of message types named in the error about a log without maps, so that it stays one readable line.
 MOST_LISTED = 6
 
@@ -55,12 +60,19 @@ class LogReader:
     /map 10 40
     """
 
-    def __init__(self, source: MessageSource, topic: str | None, selection: Selection) -> None:
+    def __init__(
+        self,
+        source: MessageSource,
+        topic: str | None,
+        selection: Selection,
+        occupancy: OccupancyParameters = USUAL,
+    ) -> None:
         self.info = source.info
         self.topic = choose_topic(source.info, topic)
         self.counts = ReadCounts()
         self.source = source
         self._selection = selection.since(source.info.start_ns)
+        self._occupancy = occupancy
         self._first_failure: str | None = None
         self._topics = [self.topic] + [
             item.name
@@ -82,6 +94,33 @@ class LogReader:
     def close(self) -> None:
         """Release the log's files."""
         self.source.close()
+
+    @cached_property
+    def cell_reading(self) -> CellReading:
+        """What the numbers in the cells mean: decided once for the whole log, whatever is selected of it."""
+        if self._occupancy.values != "auto":
+            return read_as(self._occupancy)
+        counts = count_values(np.zeros((0, 0), np.int8))
+        times = [np.unique(self.source.log_times(topic)) for topic in self._topics]
+        spread = [
+            each[np.linspace(0, len(each) - 1, MAPS_LOOKED_AT).round().astype(int)]
+            for each in times
+            if len(each)
+        ]
+        for message in self.source.read(self._topics, np.unique(np.concatenate([[], *spread]).astype(np.int64))):
+            with suppress(LogError):  # it is told of where the map is needed
+                if (decoded := message.decode()) is not None:
+                    counts += count_values(decoded.cells)
+        found = decide(counts)
+        if found.why:
+            text = f"{self.info.path}: {self.topic}: {found.why}; {OVERRULED}"
+            log_warning(logger, "values", text, file=self.info.path, topic=self.topic)
+        return found
+
+    @property
+    def decided(self) -> dict[str, Any]:
+        """What was decided about how the log is read, as JSON values for the summary."""
+        return {"values": self.source.value_reading or self.cell_reading.as_json()}
 
     def snapshots(self) -> Iterator[OccupancySnapshot]:
         """Yield the selected maps in log time order.
@@ -154,6 +193,7 @@ class LogReader:
         wanted = set(chosen.tolist())
         stream = MapStream(self.topic, counts, min_change_m2)
         map_checks = MapChecks()
+        reading = self.cell_reading
         for message in self.source.read(self._topics, self._needed(chosen)):
             is_wanted = message.log_time_ns in wanted
             map_warnings: tuple[MapWarning, ...] = ()
@@ -164,6 +204,7 @@ class LogReader:
                         MapWarning("patch_without_map", "a patch with no map before it; skipped"),
                     )
                 else:
+                    decoded = None if decoded is None else reading.of(decoded)
                     map_warnings = map_checks.of(decoded, message.log_time_ns)
                 stream.apply(decoded)
             except LogError as error:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rose2_logs.errors import InvalidMapError
+from rose2_logs.io.cell_values import OCCUPANCY_OF_COST
 from rose2_logs.io.grids import (
     FOXGLOVE_GRID_TYPE,
     LONGEST_NAME_BYTES,
@@ -24,9 +25,7 @@ from rose2_logs.io.grids import (
     check_cells,
     exact_resolution,
     make_grid,
-    percent,
 )
-from rose2_logs.model.occupancy import UNKNOWN
 
 GRID_TYPES = ("nav_msgs/OccupancyGrid", "nav2_msgs/Costmap")
 PATCH_TYPES = ("map_msgs/OccupancyGridUpdate", "nav2_msgs/CostmapUpdate")
@@ -153,9 +152,9 @@ class Fields:
             )
         return np.frombuffer(data, np.uint8).reshape(rows, columns)
 
-    def occupancy(self, rows: int, columns: int) -> Cells:
-        """Read the last field as occupancy: -1, 0..100."""
-        return percent(self.cells(rows, columns).view(np.int8), self.map_warnings)
+    def signed_cells(self, rows: int, columns: int) -> Cells:
+        """Read the last field as signed bytes, whatever they mean."""
+        return self.cells(rows, columns).view(np.int8)
 
     def time_ns(self) -> int:
         """Take a time as nanoseconds."""
@@ -197,27 +196,13 @@ class Ros1Fields(Fields):
         return super().header()
 
 
-def _cost_table() -> Cells:
-    """Occupancy per cost: 0 free, 1..252 to 1..98, 253 (inscribed) 99, 254 (lethal) 100, 255 unknown.
-
-    nav2 publishes its costmaps as occupancy grids by the same table.
-    """
-    table = np.empty(256, np.int8)
-    table[0], table[253], table[254], table[255] = 0, 99, 100, UNKNOWN
-    table[1:253] = 1 + (97 * (np.arange(1, 253) - 1)) // 251
-    return table
-
-
-_OCCUPANCY_OF_COST = _cost_table()
-
-
 def _occupancy_grid(fields: Fields) -> Grid | None:
     stamp_ns, frame_id = fields.header()
     fields.time_ns()  # map_load_time
     (resolution,) = fields.numbers("f")
     width, height = fields.integers("I", 2)
     pose = fields.numbers("d", 7)
-    cells = fields.occupancy(height, width)
+    cells = fields.signed_cells(height, width)
     return make_grid(stamp_ns, frame_id, exact_resolution(resolution), pose, cells, fields.map_warnings)
 
 
@@ -225,7 +210,7 @@ def _occupancy_grid_update(fields: Fields) -> Patch:
     stamp_ns, _ = fields.header()
     x, y = fields.integers("i", 2)
     width, height = fields.integers("I", 2)
-    return Patch(stamp_ns, y, x, fields.occupancy(height, width), tuple(fields.map_warnings))
+    return Patch(stamp_ns, y, x, fields.signed_cells(height, width), tuple(fields.map_warnings))
 
 
 def _costmap(fields: Fields) -> Grid | None:
@@ -236,12 +221,12 @@ def _costmap(fields: Fields) -> Grid | None:
     (resolution,) = fields.numbers("f")
     width, height = fields.integers("I", 2)
     pose = fields.numbers("d", 7)
-    cells = _OCCUPANCY_OF_COST[fields.cells(height, width)]
+    cells = OCCUPANCY_OF_COST[fields.cells(height, width)]
     return make_grid(stamp_ns, frame_id, exact_resolution(resolution), pose, cells, fields.map_warnings)
 
 
 def _costmap_update(fields: Fields) -> Patch:
     stamp_ns, _ = fields.header()
     x, y, width, height = fields.integers("I", 4)
-    cells = _OCCUPANCY_OF_COST[fields.cells(height, width)]
+    cells = OCCUPANCY_OF_COST[fields.cells(height, width)]
     return Patch(stamp_ns, y, x, cells, tuple(fields.map_warnings))

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
 
-from rose2_logs.config.parameters import ReadingParameters
+from rose2_logs.config.parameters import OccupancyParameters, ReadingParameters
 from rose2_logs.config.selection import Selection
 from rose2_logs.errors import LogError
 from rose2_logs.io.discovery import (
@@ -27,6 +27,7 @@ from rose2_logs.io.discovery import (
 )
 from rose2_logs.io.log import LogReader
 from rose2_logs.io.source import LogInfo, MessageSource
+from rose2_logs.system.text import counted
 from rose2_logs.system.warnings import log_warning
 
 if TYPE_CHECKING:
@@ -38,6 +39,7 @@ LogPath = str | Path | Sequence[str | Path]
 
 EVERYTHING = Selection()
 DEFAULT_LIMITS = ReadingParameters()
+USUAL = OccupancyParameters()
 DISK_LEFT_BYTES = 1 << 30
 """Disk space left free where the temporary folder is when a bag is decompressed there."""
 _MOST_NAMED = 3
@@ -54,6 +56,7 @@ def open_log(
     topic: str | None = None,
     selection: Selection = EVERYTHING,
     limits: ReadingParameters = DEFAULT_LIMITS,
+    occupancy: OccupancyParameters = USUAL,
 ) -> LogReader:
     """Open a log to read its maps.
 
@@ -69,6 +72,8 @@ def open_log(
         Which maps to read.
     limits : ReadingParameters
         The largest sizes that are accepted.
+    occupancy : OccupancyParameters
+        What the numbers in the cells mean.
 
     Returns
     -------
@@ -82,9 +87,9 @@ def open_log(
     LogError
         If the log cannot be opened.
     """
-    source = open_source(path, limits)
+    source = open_source(path, limits, occupancy)
     try:
-        return LogReader(source, topic, selection)
+        return LogReader(source, topic, selection, occupancy)
     except BaseException:
         source.close()
         raise
@@ -108,12 +113,14 @@ def inspect_log(path: LogPath, limits: ReadingParameters = DEFAULT_LIMITS) -> Lo
     return source.info
 
 
-def open_source(path: LogPath, limits: ReadingParameters = DEFAULT_LIMITS) -> MessageSource:
+def open_source(
+    path: LogPath, limits: ReadingParameters = DEFAULT_LIMITS, occupancy: OccupancyParameters = USUAL
+) -> MessageSource:
     """Open a log to read several of its topics; the caller closes it.
 
     Parameters
     ----------
-    path, limits
+    path, limits, occupancy
         As for `open_log`.
 
     Raises
@@ -122,10 +129,12 @@ def open_source(path: LogPath, limits: ReadingParameters = DEFAULT_LIMITS) -> Me
         If the log cannot be opened.
     """
     try:
-        return _open_source(path, limits)
+        source = _open_source(path, limits)
     except OSError as error:
         where = error.filename or path
         raise LogError(f"{where}: cannot be read: {error.strerror or error}", file=str(where)) from error
+    source.occupancy = occupancy
+    return source
 
 
 def _open_source(path: LogPath, limits: ReadingParameters) -> MessageSource:
@@ -337,11 +346,20 @@ def _files_of_bag(log: Path) -> list[Path]:
         log_warning(logger, "description", f"{error}; the files next to it are read", file=path)
         return files
     files = [file for file in named if file.is_file()]
-    for missing in [file for file in named if not file.is_file()]:
-        text = f"{missing}: is missing although {path} lists it"
+    missing = [file for file in named if not file.is_file()]
+    # Who renames the files of a bag leaves its description as it is.
+    if missing and (renamed := [each for each in _stored_in(log) if each not in files]):
+        text = (
+            f"{path}: lists {missing[0].name}, which is not there; {counted(len(renamed), 'file')} that it does "
+            f"not list, {', '.join(each.name for each in renamed[:_MOST_NAMED])}, are read instead"
+        )
+        log_warning(logger, "file_missing", text, file=missing[0])
+        return files + renamed
+    for file in missing:
+        text = f"{file}: is missing although {path} lists it"
         if not files:
-            raise LogError(text, file=missing)
-        log_warning(logger, "file_missing", f"{text}; the other files are read", file=missing)
+            raise LogError(text, file=file)
+        log_warning(logger, "file_missing", f"{text}; the other files are read", file=file)
     if not files:
         raise LogError(f"{path}: lists no files; run `ros2 bag reindex` on {log}", file=path)
     return files

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
+from rose2_logs.config.parameters import OccupancyParameters
 from rose2_logs.config.selection import Times
 from rose2_logs.errors import LogError
 from rose2_logs.io.grids import Grid, Patch
@@ -121,9 +123,23 @@ class LoggedBytes:
 
 
 class MessageSource(ABC):
-    """An open log: what it contains, and its map messages by topic and log time."""
+    """An open log: what it contains, and its map messages by topic and log time.
+
+    Attributes
+    ----------
+    info : LogInfo
+        What it contains.
+    occupancy : OccupancyParameters
+        What the numbers in the cells mean; only sources that decide it themselves heed it.
+    """
 
     info: LogInfo
+    occupancy = OccupancyParameters()
+
+    @property
+    def value_reading(self) -> Mapping[str, Any] | None:
+        """How the source itself turns what it stores into percent; None if it leaves that to the reader."""
+        return None
 
     @abstractmethod
     def log_times(self, topic: str) -> Times:

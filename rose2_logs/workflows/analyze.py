@@ -131,7 +131,11 @@ def _analyze_log(
     refuse_existing(output.files, overwrite=options.overwrite or options.resume)
     with (
         open_log(
-            path, topic=options.topic, selection=options.selection, limits=options.parameters.reading
+            path,
+            topic=options.topic,
+            selection=options.selection,
+            limits=options.parameters.reading,
+            occupancy=options.parameters.occupancy,
         ) as reader,
         start_workers(options) as processes,
     ):
@@ -158,6 +162,7 @@ def _analyze_log(
                 summary,
                 selection=dataclasses.asdict(options.selection),
                 messages=dataclasses.asdict(reader.counts),
+                decided=reader.decided,
                 files=[file.name for name, file in planned.items() if name != "summary"],
                 warnings=warnings.as_json(),
                 facts=_facts_of(outputs),
