@@ -114,8 +114,8 @@ class MapFilesSource(MessageSource):
 
     @property
     def value_reading(self) -> Mapping[str, Any] | None:
-        """How the grays are read, if not by the thresholds of each file."""
-        return self.gray_reading.as_json() if self.gray_reading else None
+        """How the grays are read: as decided or asked for, else by the thresholds of each file."""
+        return self.gray_reading.as_json() if self.gray_reading else {"values": "as each file says"}
 
     @cached_property
     def gray_reading(self) -> GrayReading | None:
@@ -218,10 +218,11 @@ def _decided(counts: NDArray[np.int64], free_below: float, occupied_above: float
     if known < LEAST_CELLS:
         return None
     name = ""
-    brighter = between & (level < level[HALF_LEVELS[0]]) & ~unknown
+    half = (HALF_LEVELS[0] - 0.5) / (LEVELS - 1)
+    brighter = between & (level < half) & ~unknown
     share = counts[brighter].sum() / known
     if unknown[HALF_LEVELS].any() and share > UNSURE_SHARE * (share + counts[free].sum() / known):
-        name, free_below = "probabilities", float(level[HALF_LEVELS[0]])
+        name, free_below = "probabilities", half
         between &= ~brighter
     walls, faint = counts[level > occupied_above].sum(), between & ~unknown
     if counts[faint].sum() > max(FAINT_RATIO * walls, WALL_SHARE * known):
