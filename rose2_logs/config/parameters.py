@@ -28,7 +28,6 @@ from rose2_logs.config.tracking import QualityParameters, TrackingParameters
 from rose2_logs.errors import ParameterError
 from rose2_logs.system.files import reason_of
 
-
 CELL_VALUES = ("auto", "stored", "percent", "zero_one", "fifty_unknown", "costs")
 """How the numbers in the cells of maps can be read."""
 

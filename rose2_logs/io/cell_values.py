@@ -1,8 +1,8 @@
 """What the numbers in a run's cells mean: decided once, from the numbers that the run's maps hold.
 
-Most maps say -1, 0 and 100. Others hold probabilities that a cell is occupied, -1, 0 and 1 as the definition of
-the ROS 2 message says, 50 where nothing is known, or the costs of a costmap. Each is turned into percent that
-map_server's thresholds tell apart, so that everything behind the reader sees one kind of map.
+Most maps say -1, 0 and 100. Others hold probabilities that a cell is occupied, -1, 0 and 1 as the definition
+of the ROS 2 message says, 50 where nothing is known, or the costs of a costmap. Each is turned into percent
+that map_server's thresholds tell apart, so that everything behind the reader sees one kind of map.
 """
 
 from __future__ import annotations
@@ -35,17 +35,19 @@ MAPS_LOOKED_AT = 5
 """Maps, evenly spread over the run, whose numbers decide: the first, the last and some between."""
 UNSURE_SHARE = 0.1
 """Where more of the cells below one half lie above the usual threshold of free ones, it does not fit: in maps
-of two values there are none, and costmaps, in which there are many, are known by their own numbers."""
+of two values there are none, and costmaps, in which there are many, are known by their own numbers. The same
+of the cells above one half and the usual threshold of occupied ones."""
 WALL_SHARE = 0.01
 """Known cells that are walls at least: 4 to 10 % are, in the maps of buildings that were looked at."""
+WALLS_AT_MOST = 1 / 3
+"""Known cells above one half at most, if these are walls: a map with more is noise, or of no building."""
 FAINT_RATIO = 4
 """Walls are faint where so many times more cells lie between the thresholds than above the upper one: up to
 0.9 times in saved maps whose walls are clear, 20 times in one whose walls are not."""
 SPIKE_RATIO = 5
 """A number stands for something of its own if it comes so many times as often as its two neighbors."""
 UNKNOWN_SHARE = 0.01
-"""Cells of a map that are unknown, at least, if one number stands for it: 4 % are, where two cells are known to
-be unknown around a building."""
+"""Cells that are unknown, at least, if one number stands for it: 4 % are, with two cells around a building."""
 BORDER_WALL_SHARE = 0.05
 """Where less of the border of the free cells is wall, the map tells no rooms."""
 BORDER_LEAST_SIDES = 200
@@ -212,30 +214,31 @@ def _of_percent(known: Counts) -> CellReading:
     walls = int(known[int(OCCUPIED_ABOVE) + 1 :].sum())
     if total < LEAST_CELLS or _are_inflated_costs(known):
         return STORED
-    free_below = FREE_BELOW
-    if below_half - free > UNSURE_SHARE * below_half and total - below_half >= WALL_SHARE * total:
-        free_below = float(HALF)
+    free_below, occupied_above = FREE_BELOW, OCCUPIED_ABOVE
+    above_half = total - below_half
     between = known.copy()
-    between[: int(np.ceil(free_below))] = 0
-    between[int(OCCUPIED_ABOVE) + 1 :] = 0
-    occupied_above = OCCUPIED_ABOVE
+    between[: int(FREE_BELOW) + 1] = between[int(OCCUPIED_ABOVE) + 1 :] = 0
     count = int(between.sum())
-    if count > FAINT_RATIO * walls and count >= WALL_SHARE * total:
+    if below_half - free > UNSURE_SHARE * below_half and WALL_SHARE <= above_half / total <= WALLS_AT_MOST:
+        free_below = float(HALF)
+        if above_half - walls > UNSURE_SHARE * above_half:
+            occupied_above = float(HALF)
+    elif count > FAINT_RATIO * walls and WALL_SHARE <= count / total <= WALLS_AT_MOST:
         mean = float(between @ np.arange(len(between))) / count
-        occupied_above = float(np.floor((free_below + mean) / 2))
-    if (free_below, occupied_above) == (FREE_BELOW, OCCUPIED_ABOVE):
+        occupied_above = float(np.floor((FREE_BELOW + mean) / 2))
+    else:
         return STORED
     what = "probabilities" if free_below != FREE_BELOW else "percent with faint walls"
-    share = as_percent((below_half - free if free_below != FREE_BELOW else count) / total)
+    share = as_percent(count / total)
     why = (
-        f"the cells hold {what}, {share} of the known ones between the usual thresholds of {FREE_BELOW:g} and "
-        f"{OCCUPIED_ABOVE:g}: cells below {free_below:g} are read as free, above {occupied_above:g} as occupied"
+        f"the cells hold {what}, {share} of the known ones between the usual thresholds of {FREE_BELOW:g} "
+        f"and {OCCUPIED_ABOVE:g}: below {free_below:g} is read as free, above {occupied_above:g} as occupied"
     )
     return CellReading(what, _threshold_table(free_below, occupied_above), free_below, occupied_above, why)
 
 
 def _are_inflated_costs(known: Counts) -> bool:
-    """Whether percent come from a costmap, whose cells next to obstacles are 99, of which the others fall off."""
+    """Whether percent come from a costmap: next to obstacles it is 99, and falls off from there by a jump."""
     inscribed, lethal, below = known[99], known[HIGHEST_PERCENT], known[95:99]
     return bool(lethal and inscribed > SPIKE_RATIO * max(below.max(), 1) and SPIKE_RATIO * inscribed > lethal)
 
@@ -268,10 +271,12 @@ def few_walls(snapshot: OccupancySnapshot, parameters: OccupancyParameters) -> s
         sides += int(np.count_nonzero(free[one] != free[other]))
         walls += int(np.count_nonzero(free[one] & occupied[other]))
         walls += int(np.count_nonzero(occupied[one] & free[other]))
-    sides += sum(int(np.count_nonzero(free[edge])) for edge in (np.s_[0], np.s_[-1], np.s_[:, 0], np.s_[:, -1]))
+    sides += sum(
+        int(np.count_nonzero(free[edge])) for edge in (np.s_[0], np.s_[-1], np.s_[:, 0], np.s_[:, -1])
+    )
     if sides < BORDER_LEAST_SIDES or walls >= BORDER_WALL_SHARE * sides:
         return None
     return (
-        f"only {as_percent(walls / sides)} of the border of its free cells is wall: rooms cannot be told apart; "
-        "if walls are there but fainter, lower the parameter occupancy.occupied_min_percent"
+        f"only {as_percent(walls / sides)} of the border of its free cells is wall: rooms cannot be told "
+        "apart; if walls are there but fainter, lower the parameter occupancy.occupied_min_percent"
     )

@@ -107,7 +107,9 @@ class LogReader:
             for each in times
             if len(each)
         ]
-        for message in self.source.read(self._topics, np.unique(np.concatenate([[], *spread]).astype(np.int64))):
+        for message in self.source.read(
+            self._topics, np.unique(np.concatenate([[], *spread]).astype(np.int64))
+        ):
             with suppress(LogError):  # it is told of where the map is needed
                 if (decoded := message.decode()) is not None:
                     counts += count_values(decoded.cells)

@@ -350,8 +350,8 @@ def _files_of_bag(log: Path) -> list[Path]:
     # Who renames the files of a bag leaves its description as it is.
     if missing and (renamed := [each for each in _stored_in(log) if each not in files]):
         text = (
-            f"{path}: lists {missing[0].name}, which is not there; {counted(len(renamed), 'file')} that it does "
-            f"not list, {', '.join(each.name for each in renamed[:_MOST_NAMED])}, are read instead"
+            f"{path}: lists {missing[0].name}, which is not there; {counted(len(renamed), 'file')} that it "
+            f"does not list, {', '.join(each.name for each in renamed[:_MOST_NAMED])}, read instead"
         )
         log_warning(logger, "file_missing", text, file=missing[0])
         return files + renamed

@@ -29,6 +29,7 @@ from rose2_logs.io.cell_values import (
     OVERRULED,
     SPIKE_RATIO,
     UNSURE_SHARE,
+    WALLS_AT_MOST,
     WALL_SHARE,
 )
 from rose2_logs.io.discovery import IMAGE_ENDINGS, load_strings, load_yaml
@@ -183,9 +184,9 @@ class GrayReading:
 def decide_grays(files: Sequence[Path], most_cells: int = MOST_CELLS) -> GrayReading | None:
     """Decide whether the thresholds of saved maps fit their grays, and which ones do if not.
 
-    They do not fit where many pixels are brighter than one half, which stands for unknown, and yet not free: such
-    maps hold probabilities. Nor do they where hardly any pixel is occupied and many are between: their walls
-    are faint.
+    They do not fit where many pixels are brighter than one half, which stands for unknown, and yet not free:
+    such maps hold probabilities. Nor do they where hardly any pixel is occupied and many are between: their
+    walls are faint.
 
     Parameters
     ----------
@@ -211,7 +212,6 @@ def decide_grays(files: Sequence[Path], most_cells: int = MOST_CELLS) -> GrayRea
 
 def _decided(counts: NDArray[np.int64], free_below: float, occupied_above: float) -> GrayReading | None:
     level = np.arange(LEVELS) / (LEVELS - 1)
-    pixels = int(counts.sum())
     free, between = level < free_below, (level >= free_below) & (level <= occupied_above)
     unknown = _unknown_levels(counts, between)
     known = int(counts[~unknown].sum())
@@ -223,24 +223,28 @@ def _decided(counts: NDArray[np.int64], free_below: float, occupied_above: float
     share = counts[brighter].sum() / known
     if unknown[HALF_LEVELS].any() and share > UNSURE_SHARE * (share + counts[free].sum() / known):
         name, free_below = "probabilities", half
-        between &= ~brighter
+        darker = counts[level > level[HALF_LEVELS[-1]]].sum()
+        if darker - counts[level > occupied_above].sum() > UNSURE_SHARE * darker:
+            occupied_above = 1 - half
     walls, faint = counts[level > occupied_above].sum(), between & ~unknown
-    if counts[faint].sum() > max(FAINT_RATIO * walls, WALL_SHARE * known):
-        mean = float(counts[faint] @ level[faint] / counts[faint].sum())
-        name = name or FAINT
-        share = max(share, counts[faint].sum() / known)
+    count = int(counts[faint].sum())
+    if not name and count > FAINT_RATIO * walls and WALL_SHARE * known <= count <= WALLS_AT_MOST * known:
+        mean = float(counts[faint] @ level[faint] / count)
+        name = FAINT
+        share = count / known
         occupied_above = (free_below + mean) / 2
     if not name:
         return None
     why = (
         f"the grays hold {name}, {as_percent(share)} of the known pixels between the thresholds of the "
-        f"description: occupancy below {free_below:.2g} is read as free, above {occupied_above:.2g} as occupied"
+        f"description: occupancy below {free_below:.2g} is read as free, above {occupied_above:.2g} as "
+        "occupied"
     )
     return GrayReading(name, free_below, occupied_above, why, keeps_unknown=name == FAINT)
 
 
 def _unknown_levels(counts: NDArray[np.int64], between: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Levels (256,) that stand for unknown: those of one half, else the most frequent between the thresholds."""
+    """Levels (256,) that stand for unknown: those of one half, else the most frequent one in between."""
     unknown = np.zeros(LEVELS, np.bool_)
     most_frequent = int(np.argmax(np.where(between, counts, 0)))
     for levels in (HALF_LEVELS, [most_frequent]):
@@ -357,9 +361,7 @@ def _thresholds(path: Path, described: Mapping[str, Any]) -> tuple[float, float]
     return free_below, occupied_above
 
 
-def _occupancy(
-    path: Path, described: Mapping[str, Any], shade: NDArray[np.float32]
-) -> NDArray[np.float64]:
+def _occupancy(path: Path, described: Mapping[str, Any], shade: NDArray[np.float32]) -> NDArray[np.float64]:
     """Occupancy in 0..1 of brightness in 0..1."""
     negate = NEGATE.get(str(described.get("negate", "0")).lower())
     if negate is None:

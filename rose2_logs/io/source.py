@@ -149,6 +149,10 @@ class MessageSource(ABC):
     def read(self, topics: Sequence[str], times: Times) -> Iterator[LoggedMap]:
         """Yield the messages of `topics` logged at `times` (sorted, distinct), in log time order."""
 
+    def recorded_ns(self, time_ns: int) -> int:
+        """Return the log time that stands in the log, of a map whose own goes on where a clock was set."""
+        return time_ns
+
     def stream(self, topics: Sequence[str]) -> Iterator[LoggedBytes]:
         """Yield all messages of `topics` one at a time, roughly in log time order.
 

@@ -152,7 +152,7 @@ def segment_snapshot(
     name: str = "map",
     voronoi: bool = False,
 ) -> Segmentation:
-    """Segment a single map; warn if it was analyzed in coarser cells, being large, or has hardly any walls."""
+    """Segment a single map; warn if it has hardly any walls, or is so large that it took coarser cells."""
     if (text := few_walls(snapshot, parameters.occupancy)) is not None:
         log_warning(logger, "few_walls", f"{name}: {text}")
     found, tree = analyze_with_tree(snapshot, parameters, method, voronoi=voronoi)

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from reader_logs import START_NS, Map, Update, serialized, serialized_costmap, typestore
 
 from rose2_logs.errors import InvalidMapError
+from rose2_logs.io.cell_values import STORED
 from rose2_logs.io.grids import Grid, Patch, flat_yaw_of
 from rose2_logs.io.messages import decoder
 
@@ -111,7 +112,9 @@ def test_any_quaternion_about_z_gives_its_yaw(quaternion, yaw):
 
 def test_values_outside_the_range_of_occupancy_count_as_unknown():
     cells = np.array([[-128, -2, -1, 0, 100, 101, 127]], np.int8)
-    assert decode(serialized(Map(cells), 2)).cells.tolist() == [[-1, -1, -1, 0, 100, -1, -1]]
+    read = STORED.of(decode(serialized(Map(cells), 2)))
+    assert read.cells.tolist() == [[-1, -1, -1, 0, 100, -1, -1]]
+    assert [each.kind for each in read.map_warnings] == ["odd_values"]
 
 
 def test_bytes_that_are_not_cdr_are_an_error():
@@ -161,7 +164,7 @@ def test_other_types_and_encodings_are_not_maps(message_type, encoding):
 )
 def test_a_foxglove_grid_of_one_channel_becomes_percent(padding, dtype, kind, values, expected):
     message = foxglove_message(np.array(values, dtype), kind, padding=padding)
-    grid = decode(message.SerializeToString(), "foxglove.Grid", "protobuf", SCHEMA)
+    grid = STORED.of(decode(message.SerializeToString(), "foxglove.Grid", "protobuf", SCHEMA))
     assert grid.cells.tolist() == expected
     assert grid.cells.dtype == np.int8
     assert grid.cells.flags.c_contiguous

@@ -122,7 +122,6 @@ def test_unknown_cells_saved_with_too_high_a_free_thresh_stay_unknown(tmp_path, 
         ({"free_thresh": -1}, "thresh"),
         ({"negate": "maybe"}, "negate"),
         ({"mode": "rgb"}, "mode"),
-        ({"image": "gone.pgm"}, "gone.pgm"),
         ({"image": None}, "image"),
     ],
 )
