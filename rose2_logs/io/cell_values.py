@@ -21,7 +21,7 @@ from rose2_logs.system.text import percent as as_percent
 
 Counts = NDArray[np.int64]
 """Number of cells (256,) by the byte that they are stored as; 255 is -1."""
-Message = TypeVar("Message", Grid, Patch)
+Message = TypeVar("Message", bound=Grid | Patch)
 
 USUAL = OccupancyParameters()
 FREE_BELOW, OCCUPIED_ABOVE = USUAL.free_max_percent, USUAL.occupied_min_percent
@@ -47,7 +47,7 @@ FAINT_RATIO = 4
 SPIKE_RATIO = 5
 """A number stands for something of its own if it comes so many times as often as its two neighbors."""
 UNKNOWN_SHARE = 0.01
-"""Cells that are unknown, at least, if one number stands for it: 4 % are, with two cells around a building."""
+"""Cells that are unknown, at least, if one number stands for it: 4 % are, with two around a building."""
 BORDER_WALL_SHARE = 0.05
 """Where less of the border of the free cells is wall, the map tells no rooms."""
 BORDER_LEAST_SIDES = 200
@@ -78,10 +78,12 @@ class CellReading:
 
     def of(self, message: Message) -> Message:
         """Return a map or a patch, whose cells are as they are stored, in percent."""
-        if self.table is not None:
-            return replace(message, cells=self.table[message.cells.view(np.uint8)])
+        if self.table is OCCUPANCY_OF_COST:
+            return replace(message, cells=OCCUPANCY_OF_COST[message.cells.view(np.uint8)])
         found: list[MapWarning] = []
         cells = percent(message.cells, found)
+        if self.table is not None:
+            cells = self.table[cells.view(np.uint8)]
         if cells is message.cells:
             return message
         return replace(message, cells=cells, map_warnings=(*message.map_warnings, *found))

@@ -245,7 +245,7 @@ class FileLog(MessageSource):
                 time_ns = clock.continued(message.log_time_ns)
                 yield LoggedBytes(time_ns, channel.topic, channel.message_encoding, read)
 
-    def _topic_places(self, topic: str) -> list[tuple[Place, int]]:
+    def _topic_places(self, topic: str) -> list[Timed]:
         if topic not in self._places:
             found = []
             for number, file in enumerate(self._files):

@@ -52,7 +52,7 @@ class Grid:
 
 @dataclass(frozen=True, eq=False)
 class Patch:
-    """New values for a rectangle of the previous map: stamp, first row and column, stored cells (h, w) int8."""
+    """New values for a rectangle of the previous map: stamp, first row and column, cells (h, w) int8."""
 
     stamp_ns: int
     row: int

@@ -29,8 +29,8 @@ from rose2_logs.io.cell_values import (
     OVERRULED,
     SPIKE_RATIO,
     UNSURE_SHARE,
-    WALLS_AT_MOST,
     WALL_SHARE,
+    WALLS_AT_MOST,
 )
 from rose2_logs.io.discovery import IMAGE_ENDINGS, load_strings, load_yaml
 from rose2_logs.io.grids import MOST_CELLS, Cells, Grid, MapWarning, check_cells, make_grid
