@@ -281,6 +281,14 @@ class RunOptions:
         low=1,
         decides=True,
     )
+    base_frame: str | None = option(
+        None,
+        "Frame of the robot's base, whose way the recording shows. By default base_link, base_footprint or "
+        "the like, or the only frame below odom.",
+        panel=OUTPUTS,
+        commands=BOTH,
+        metavar="NAME",
+    )
     method: str = option(
         "rose2",
         f"Segmentation method: {METHODS[0]}, or one that it is compared with, {', '.join(METHODS[1:])}.",

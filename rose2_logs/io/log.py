@@ -74,6 +74,7 @@ class LogReader:
         self._selection = selection.since(source.info.start_ns)
         self._occupancy = occupancy
         self._first_failure: str | None = None
+        self._path_origin: str | None = None
         self._topics = [self.topic] + [
             item.name
             for item in self.info.topics
@@ -122,7 +123,8 @@ class LogReader:
     @property
     def decided(self) -> dict[str, Any]:
         """What was decided about how the log is read, as JSON values for the summary."""
-        return {"values": self.source.value_reading or self.cell_reading.as_json()}
+        decided = {"values": self.source.value_reading or self.cell_reading.as_json()}
+        return decided if self._path_origin is None else decided | {"path": self._path_origin}
 
     def snapshots(self) -> Iterator[OccupancySnapshot]:
         """Yield the selected maps in log time order.
@@ -178,15 +180,21 @@ class LogReader:
                 return dataclasses.replace(latest[0], index=-1)
         raise self._no_map(counts)
 
-    def robot_path(self, frame_id: str) -> RobotPath:
+    def robot_path(self, frame_id: str, base_frame: str | None = None) -> RobotPath:
         """Return the robot's path over the selected time range.
 
         Parameters
         ----------
         frame_id : str
             Frame of the map; the poses are given in it.
+        base_frame : str, optional
+            Frame of the robot's base, where it is none of the usual ones.
         """
-        return RobotPath(self.source, frame_id, self._selection.start_ns)
+        path = RobotPath(
+            self.source, frame_id, self._selection.start_ns, map_topic=self.topic, base_frame=base_frame
+        )
+        self._path_origin = path.origin
+        return path
 
     def _read(
         self, chosen: Times, counts: ReadCounts, min_change_m2: float | None = None, *, warn: bool = False

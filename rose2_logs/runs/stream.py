@@ -107,6 +107,7 @@ class TrackedStream:
         parameters: Parameters,
         *,
         with_path: bool = False,
+        base_frame: str | None = None,
     ) -> TrackedStream:
         """Follow the rooms through an open log.
 
@@ -118,6 +119,8 @@ class TrackedStream:
             As for the class.
         with_path : bool
             Whether to read where the robot was.
+        base_frame : str, optional
+            Frame of the robot's base, where it is none of the usual ones.
 
         Raises
         ------
@@ -135,7 +138,7 @@ class TrackedStream:
             parameters,
             source=str(reader.info.path),
             topic=reader.topic,
-            path=reader.robot_path(last.geometry.frame_id) if with_path else None,
+            path=reader.robot_path(last.geometry.frame_id, base_frame) if with_path else None,
         )
         stream.last_log_time_ns = last.log_time_ns
         return stream

@@ -202,7 +202,13 @@ def _follow(
     """Take the log's maps one by one to the history, the store and the sinks, and finish these."""
     parameters = options.parameters
     history = RunHistory(parameters, back_project=options.back_project)
-    stream = TrackedStream.of_log(reader, workers, parameters, with_path="path" in options.shown_layers)
+    stream = TrackedStream.of_log(
+        reader,
+        workers,
+        parameters,
+        with_path="path" in options.shown_layers,
+        base_frame=options.base_frame,
+    )
     store = RunStore(folder, parameters.occupancy, back_project=options.back_project)
     with store, abandoned_on_error(sinks):
         for sink in sinks:
