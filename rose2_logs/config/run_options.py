@@ -227,6 +227,17 @@ class RunOptions:
         metavar="NAME",
         decides=True,
     )
+    part: int | None = option(
+        None,
+        "Which part of the maps, from 1, where they are not of one run: where two nodes publish on the "
+        "topic, or the map was begun anew. By default the one that tells most.",
+        panel=MAPS,
+        commands=BOTH,
+        metavar="N",
+        low=1,
+        high=1e6,
+        decides=True,
+    )
     start_s: float | None = option(
         None,
         "Skip the first S seconds of the log.",

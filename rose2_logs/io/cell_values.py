@@ -33,10 +33,10 @@ LEAST_CELLS = 1000
 """Known cells, 2.5 m2 of 5 cm, below which the numbers of the maps decide nothing."""
 MAPS_LOOKED_AT = 5
 """Maps, evenly spread over the run, whose numbers decide: the first, the last and some between."""
-UNSURE_SHARE = 0.1
-"""Where more of the cells below one half lie above the usual threshold of free ones, it does not fit: in maps
-of two values there are none, and costmaps, in which there are many, are known by their own numbers. The same
-of the cells above one half and the usual threshold of occupied ones."""
+UNSURE_SHARE = 0.2
+"""Where more of the cells below one half lie above the usual threshold of free ones, it does not fit: a tenth
+does in maps of probabilities whose rooms are right, none in maps of two values; costmaps, in which many do,
+are known by their own numbers. The same of the cells above one half and the threshold of occupied ones."""
 WALL_SHARE = 0.01
 """Known cells that are walls at least: 4 to 10 % are, in the maps of buildings that were looked at."""
 WALLS_AT_MOST = 1 / 3

@@ -17,12 +17,13 @@ from rose2_logs.config.parameters import OccupancyParameters
 from rose2_logs.config.selection import Selection, Times
 from rose2_logs.errors import InvalidMapError, LogError, NoMapTopicError
 from rose2_logs.io.cell_values import MAPS_LOOKED_AT, OVERRULED, CellReading, count_values, decide, read_as
-from rose2_logs.io.grids import MapWarning, Patch
+from rose2_logs.io.grids import Grid, MapWarning, Patch
 from rose2_logs.io.map_stream import MapChecks, MapStream, ReadCounts
 from rose2_logs.io.messages import is_patch_type
+from rose2_logs.io.parts import MapFacts, Part, Parts, find_parts
 from rose2_logs.io.poses import RobotPath
 from rose2_logs.io.source import DamagedMessageError, LoggedMap, LogInfo, MessageSource, TopicInfo
-from rose2_logs.model.occupancy import OccupancySnapshot
+from rose2_logs.model.occupancy import OccupancySnapshot, classify
 from rose2_logs.system.warnings import log_warning
 
 __all__ = ["LogInfo", "LogReader", "ReadCounts", "Selection", "TopicInfo", "choose_topic"]
@@ -66,6 +67,7 @@ class LogReader:
         topic: str | None,
         selection: Selection,
         occupancy: OccupancyParameters = USUAL,
+        part: int | None = None,
     ) -> None:
         self.info = source.info
         self.topic = choose_topic(source.info, topic)
@@ -73,6 +75,7 @@ class LogReader:
         self.source = source
         self._selection = selection.since(source.info.start_ns)
         self._occupancy = occupancy
+        self._asked_part = part
         self._first_failure: str | None = None
         self._path_origin: str | None = None
         self._topics = [self.topic] + [
@@ -123,8 +126,12 @@ class LogReader:
     @property
     def decided(self) -> dict[str, Any]:
         """What was decided about how the log is read, as JSON values for the summary."""
-        decided = {"values": self.source.value_reading or self.cell_reading.as_json()}
-        return decided if self._path_origin is None else decided | {"path": self._path_origin}
+        decided: dict[str, Any] = {"values": self.source.value_reading or self.cell_reading.as_json()}
+        if self._path_origin is not None:
+            decided["path"] = self._path_origin
+        if self._part is not None:
+            decided["part"] = self._part[1]
+        return decided
 
     def snapshots(self) -> Iterator[OccupancySnapshot]:
         """Yield the selected maps in log time order.
@@ -190,9 +197,10 @@ class LogReader:
         base_frame : str, optional
             Frame of the robot's base, where it is none of the usual ones.
         """
-        path = RobotPath(
-            self.source, frame_id, self._selection.start_ns, map_topic=self.topic, base_frame=base_frame
-        )
+        start_ns = self._selection.start_ns
+        if self._part is not None and self._part[1]["number"] > 1:
+            start_ns = max(start_ns or 0, int(self._part[0].times[0]))
+        path = RobotPath(self.source, frame_id, start_ns, map_topic=self.topic, base_frame=base_frame)
         self._path_origin = path.origin
         return path
 
@@ -259,8 +267,42 @@ class LogReader:
         patches, following = patches[inside], following[inside]
         return np.unique(np.concatenate([chosen, begins, patches[begins[following] <= patches]]))
 
+    @cached_property
+    def _part(self) -> tuple[Part, dict[str, int]] | None:
+        """The part of the maps that is read, its number and how many there are; None if there is but one."""
+        times = self.source.log_times(self.topic)
+        # Patches have no map of their own, and maps of one time cannot be told apart.
+        if len(self._topics) > 1 or len(np.unique(times)) < len(times):
+            found = Parts((Part(times, 0.0, len(times)),))
+        else:
+            found = find_parts(times, self._facts)
+        count, number = len(found.parts), self._asked_part
+        if number is not None and not 1 <= number <= count:
+            raise LogError(f"{self.info.path}: {self.topic} has no part {number}; it has {count}")
+        if count == 1:
+            return None
+        if number is None:
+            number = found.likeliest()
+            other = count if number == 1 else 1
+            text = f"{self.info.path}: {self.topic}: {found.text(number)}; part={other} takes another"
+            log_warning(logger, "parts", text, file=self.info.path, topic=self.topic)
+        return found.parts[number - 1], {"number": number, "count": count}
+
+    def _facts(self, time_ns: int) -> MapFacts | None:
+        """Look at the map of one log time."""
+        for message in self.source.read([self.topic], np.array([time_ns], np.int64)):
+            with suppress(LogError):  # it is told of where the map is needed
+                decoded = message.decode()
+                if isinstance(decoded, Grid):
+                    free, _ = classify(self.cell_reading.of(decoded).cells, self._occupancy)
+                    area_m2 = float(np.count_nonzero(free)) * decoded.geometry.cell_area_m2
+                    return MapFacts(decoded.geometry, area_m2)
+        return None
+
     def _times_in_range(self) -> Times:
         times = np.sort(np.concatenate([self.source.log_times(topic) for topic in self._topics]))
+        if len(times) and self._part is not None:
+            times = self._part[0].times
         if not len(times):
             raise LogError(f"{self.info.path}: no messages on {self.topic}; choose another topic")
         in_range = self._selection.in_range(times)

@@ -57,6 +57,7 @@ def open_log(
     selection: Selection = EVERYTHING,
     limits: ReadingParameters = DEFAULT_LIMITS,
     occupancy: OccupancyParameters = USUAL,
+    part: int | None = None,
 ) -> LogReader:
     """Open a log to read its maps.
 
@@ -74,6 +75,8 @@ def open_log(
         The largest sizes that are accepted.
     occupancy : OccupancyParameters
         What the numbers in the cells mean.
+    part : int, optional
+        Which part of a topic, from 1, whose maps are not of one run; by default the one that tells most.
 
     Returns
     -------
@@ -89,7 +92,7 @@ def open_log(
     """
     source = open_source(path, limits, occupancy)
     try:
-        return LogReader(source, topic, selection, occupancy)
+        return LogReader(source, topic, selection, occupancy, part)
     except BaseException:
         source.close()
         raise

@@ -136,6 +136,7 @@ def _analyze_log(
             selection=options.selection,
             limits=options.parameters.reading,
             occupancy=options.parameters.occupancy,
+            part=options.part,
         ) as reader,
         start_workers(options) as processes,
     ):

@@ -64,7 +64,7 @@ def kinds_of(cells):
 
 
 STORED_AS = {
-    "few unsure": lambda cells: probabilities(cells, 0.15),
+    "few unsure": lambda cells: probabilities(cells, 0.3),
     "half unsure": lambda cells: probabilities(cells, 0.5),
     "most unsure": lambda cells: probabilities(cells, 0.9),
     "all unsure": lambda cells: probabilities(cells, 1.0),
@@ -133,7 +133,7 @@ def test_maps_that_the_usual_thresholds_fit_stay_as_they_are():
     for cells in (
         building(),
         inflated(building()),
-        probabilities(building(), 0.05),
+        probabilities(building(), 0.12),
         random.integers(-1, 101, (80, 120)).astype(np.int8),
         np.full((80, 120), -1, np.int8),
         np.zeros((80, 120), np.int8),
@@ -288,4 +288,4 @@ def test_what_went_wrong_in_real_logs_is_read_and_told(name):
     free, walls = int((kinds == 0).sum()), int((kinds == 100).sum())
     # The log whose clock was set back ends with half of the building.
     assert free in ((44896, 44806) if name != "gazebo_reset.mcap" else (31130, 44896))
-    assert 0.9 * 3464 <= walls <= 3464 or walls == 2410
+    assert 0.85 * 3464 <= walls <= 3464 or walls == 2410
