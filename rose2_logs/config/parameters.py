@@ -32,6 +32,10 @@ CELL_VALUES = ("auto", "stored", "percent", "zero_one", "fifty_unknown", "costs"
 """How the numbers in the cells of maps can be read."""
 
 
+NO_TYPE = "none"
+TYPES_WITHOUT_SCHEMA = (NO_TYPE, "nav_msgs/OccupancyGrid", "nav2_msgs/Costmap", "foxglove_msgs/Grid")
+
+
 @dataclass(frozen=True, repr=False)
 class ReadingParameters(ParameterBlock):
     """How much a log may claim before it is refused as damaged or hostile; real ones stay far below."""
@@ -54,6 +58,11 @@ class ReadingParameters(ParameterBlock):
     )
     map_max_messages: int = number(
         2_000_000, "messages", "Most map messages in a log: one per second for 23 days.", 1, 10**12
+    )
+    type_without_schema: str = choice(
+        NO_TYPE,
+        TYPES_WITHOUT_SCHEMA,
+        "Type of the messages on channels that have no schema: such a log does not say it itself.",
     )
 
 

@@ -130,7 +130,7 @@ def _cost_table() -> Cells:
 OCCUPANCY_OF_COST = _cost_table()
 """Occupancy per cost: 0 free, 1..252 to 1..98, 253 (inscribed) 99, 254 (lethal) 100, 255 unknown. nav2
 publishes its costmaps as occupancy grids by the same table."""
-OVERRULED = "occupancy.values=stored reads them as they are"
+OVERRULED = "the parameter occupancy.values=stored reads them as they are"
 """Ends what is told of a decision."""
 READINGS = {
     "zero_one": CellReading(

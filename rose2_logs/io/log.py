@@ -20,10 +20,11 @@ from rose2_logs.io.cell_values import MAPS_LOOKED_AT, OVERRULED, CellReading, co
 from rose2_logs.io.grids import Grid, MapWarning, Patch
 from rose2_logs.io.map_stream import MapChecks, MapStream, ReadCounts
 from rose2_logs.io.messages import is_patch_type
-from rose2_logs.io.parts import MapFacts, Part, Parts, find_parts
+from rose2_logs.io.parts import MapFacts, Part, Parts, facts_of, find_parts, find_saved_parts
 from rose2_logs.io.poses import RobotPath
+from rose2_logs.io.saved_maps import MapFilesSource
 from rose2_logs.io.source import DamagedMessageError, LoggedMap, LogInfo, MessageSource, TopicInfo
-from rose2_logs.model.occupancy import OccupancySnapshot, classify
+from rose2_logs.model.occupancy import OccupancySnapshot
 from rose2_logs.system.warnings import log_warning
 
 __all__ = ["LogInfo", "LogReader", "ReadCounts", "Selection", "TopicInfo", "choose_topic"]
@@ -71,6 +72,15 @@ class LogReader:
     ) -> None:
         self.info = source.info
         self.topic = choose_topic(source.info, topic)
+        others = [
+            each.name
+            for each in source.info.topics
+            if each.is_map and each.message_count != 0 and each.name != self.topic
+        ]
+        if topic is None and others:
+            held = f"{', '.join(others)} {'holds' if len(others) == 1 else 'hold'} maps, too"
+            text = f"{source.info.path}: {self.topic} is read; {held}; topic={others[0]!r} chooses another"
+            log_warning(logger, "topic", text, file=source.info.path, topic=self.topic)
         self.counts = ReadCounts()
         self.source = source
         self._selection = selection.since(source.info.start_ns)
@@ -271,11 +281,16 @@ class LogReader:
     def _part(self) -> tuple[Part, dict[str, int]] | None:
         """The part of the maps that is read, its number and how many there are; None if there is but one."""
         times = self.source.log_times(self.topic)
+        if len(times) > 1 and isinstance(self.source, MapFilesSource):
+            return self._chosen(find_saved_parts(times, self._grid, self._occupancy))
         # Patches have no map of their own, and maps of one time cannot be told apart.
         if len(self._topics) > 1 or len(np.unique(times)) < len(times):
             found = Parts((Part(times, 0.0, len(times)),))
         else:
             found = find_parts(times, self._facts)
+        return self._chosen(found)
+
+    def _chosen(self, found: Parts) -> tuple[Part, dict[str, int]] | None:
         count, number = len(found.parts), self._asked_part
         if number is not None and not 1 <= number <= count:
             raise LogError(f"{self.info.path}: {self.topic} has no part {number}; it has {count}")
@@ -290,13 +305,15 @@ class LogReader:
 
     def _facts(self, time_ns: int) -> MapFacts | None:
         """Look at the map of one log time."""
+        return None if (grid := self._grid(time_ns)) is None else facts_of(grid, self._occupancy)
+
+    def _grid(self, time_ns: int) -> Grid | None:
+        """Read the map of one log time; None if there is none."""
         for message in self.source.read([self.topic], np.array([time_ns], np.int64)):
             with suppress(LogError):  # it is told of where the map is needed
                 decoded = message.decode()
                 if isinstance(decoded, Grid):
-                    free, _ = classify(self.cell_reading.of(decoded).cells, self._occupancy)
-                    area_m2 = float(np.count_nonzero(free)) * decoded.geometry.cell_area_m2
-                    return MapFacts(decoded.geometry, area_m2)
+                    return self.cell_reading.of(decoded)
         return None
 
     def _times_in_range(self) -> Times:
@@ -345,6 +362,13 @@ def choose_topic(info: LogInfo, asked: str | None = None) -> str:
         has = f"its map topics are {listed}" if maps else "it has no map topics"
         raise NoMapTopicError(
             f"{info.path}: {asked or repr(asked)} is not a topic with occupancy grids; {has}"
+        )
+    untyped = sorted({each.name for each in info.topics if not each.message_type})
+    if untyped and not maps:
+        raise NoMapTopicError(
+            f"{where} no topic has occupancy grids, and {', '.join(untyped[:MOST_LISTED])} has no schema that "
+            "says what its messages are; name their type "
+            "(message_type='nav_msgs/OccupancyGrid') if they are maps"
         )
     if not maps:
         others = ", ".join(sorted({topic.message_type for topic in info.topics})[:MOST_LISTED])

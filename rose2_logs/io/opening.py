@@ -42,6 +42,8 @@ DEFAULT_LIMITS = ReadingParameters()
 USUAL = OccupancyParameters()
 DISK_LEFT_BYTES = 1 << 30
 """Disk space left free where the temporary folder is when a bag is decompressed there."""
+MASK_WORDS = ("mask", "keepout", "speed_limit")
+"""In the names of masks of costmap filters: where a robot must not go, or go slowly."""
 _MOST_NAMED = 3
 """Number of files that a warning names."""
 _FORMATS = (
@@ -303,12 +305,22 @@ def _open_directory(log: Path, limits: ReadingParameters) -> MessageSource:
     images = {each.stem for each in inside if each.suffix.lower() in IMAGE_ENDINGS}
     described = [each for each in inside if each.suffix.lower() in MAP_ENDINGS]
     if maps := [each for each in described if each.stem in images or is_map_file(each)]:
-        return _open_files(log, _in_natural_order(maps), limits)
+        return _open_files(log, _in_natural_order(_without_masks(log, maps)), limits)
     raise LogError(
         f"{log}: contains neither a bag ({BAG_DESCRIPTION}) nor saved maps; give {_FORMATS}; "
         "analyze a folder of many logs as a batch",
         file=log,
     )
+
+
+def _without_masks(log: Path, maps: list[Path]) -> list[Path]:
+    """Leave out the masks of costmap filters, which are saved as maps are, from the maps of a folder."""
+    masks = [each for each in maps if any(word in each.stem.lower() for word in MASK_WORDS)]
+    if not masks or len(masks) == len(maps):
+        return maps
+    text = f"{log}: {', '.join(each.name for each in masks[:_MOST_NAMED])} left out, as a mask and no map"
+    log_warning(logger, "masks", f"{text}; name the file to read it", file=log)
+    return [each for each in maps if each not in masks]
 
 
 def _stored_in(log: Path) -> list[Path]:

@@ -11,8 +11,10 @@ from itertools import pairwise
 
 import numpy as np
 
+from rose2_logs.config.parameters import OccupancyParameters
 from rose2_logs.config.selection import Times
-from rose2_logs.model.occupancy import GridGeometry
+from rose2_logs.io.grids import Grid
+from rose2_logs.model.occupancy import GridGeometry, classify
 from rose2_logs.system.text import counted
 
 LOOKED_AT = 64
@@ -29,6 +31,13 @@ BACK_SHARE = 0.8
 """A map that has this share again one map later was a bad map, and none that was begun anew."""
 LEAST_AREA_M2 = 5.0
 """Smaller maps are no loss."""
+
+WALL_REACH_M = 0.2
+"""Walls of two maps of one run are no farther apart: two widths of a wall."""
+SAME_WALLS_SHARE = 0.5
+"""Share of a map's walls that are walls in the next map of its run: of another floor, a third are by chance."""
+LEAST_WALL_CELLS = 100
+"""Walls that two maps show, 5 m of 5 cm, below which they are not compared."""
 
 
 @dataclass(frozen=True)
@@ -114,6 +123,61 @@ def find_parts(times: Times, look: Facts) -> Parts:
     begins = [0, *_begins(spread, facts), len(times)]
     parts = [_part(times, range(low, high), facts, spread) for low, high in pairwise(begins)]
     return Parts(tuple(parts), "the map is begun anew" if len(parts) > 1 else "")
+
+
+def facts_of(grid: Grid, occupancy: OccupancyParameters) -> MapFacts:
+    """Return what is compared of a map in percent."""
+    free, _ = classify(grid.cells, occupancy)
+    return MapFacts(grid.geometry, float(np.count_nonzero(free)) * grid.geometry.cell_area_m2)
+
+
+def find_saved_parts(
+    times: Times, read: Callable[[int], Grid | None], occupancy: OccupancyParameters
+) -> Parts:
+    """Find which saved maps are of one run: those whose walls stand where those of the map before do.
+
+    Parameters
+    ----------
+    times : (N,) int64
+        Times of the maps.
+    read : callable
+        Returns the map of a time, in percent.
+    occupancy : OccupancyParameters
+        Which cells are free and occupied.
+    """
+    begins, areas = [0], []
+    before: Grid | None = None
+    for place, time_ns in enumerate(times.tolist()):
+        now = read(time_ns)
+        areas.append(0.0 if now is None else facts_of(now, occupancy).free_m2)
+        if now is not None:
+            if before is not None and not _is_continued(before, now, occupancy):
+                begins.append(place)
+            before = now
+    parts = [
+        Part(times[low:high], areas[high - 1], len(set(areas[low:high])))
+        for low, high in pairwise([*begins, len(times)])
+    ]
+    return Parts(tuple(parts), "the walls of one map are not those of the next" if len(parts) > 1 else "")
+
+
+def _is_continued(before: Grid, now: Grid, occupancy: OccupancyParameters) -> bool:
+    """Whether most of the walls of a map that another one shows, too, are walls there; also if few are shown."""
+    import cv2
+
+    _, walls = classify(before.cells, occupancy)
+    free, occupied = classify(now.cells, occupancy)
+    row, column = np.moveaxis(
+        now.geometry.world_to_cell(before.geometry.cell_centers(*np.nonzero(walls))), -1, 0
+    )
+    inside = (row >= 0) & (row < free.shape[0]) & (column >= 0) & (column < free.shape[1])
+    row, column = row[inside], column[inside]
+    reach = 2 * round(WALL_REACH_M / now.geometry.resolution_m) + 1
+    near = cv2.dilate(occupied.astype(np.uint8), np.ones((reach, reach), np.uint8)).astype(bool)
+    shown = near[row, column] | free[row, column]
+    if np.count_nonzero(shown) < LEAST_WALL_CELLS:
+        return True
+    return bool(np.count_nonzero(near[row, column]) >= SAME_WALLS_SHARE * np.count_nonzero(shown))
 
 
 def _grid(geometry: GridGeometry) -> GridGeometry:

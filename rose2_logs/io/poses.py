@@ -177,8 +177,8 @@ def _tell_other_frame(source: MessageSource, topics: tuple[str, ...], wanted: _W
         if frame and frame != wanted.frame:
             text = (
                 f"{source.info.path}: the robot's way is that of {topics[0]}, in the frame {frame!r} instead "
-                f"of {wanted.frame!r}: it may drift away from the map; base_frame names the robot's frame "
-                "where transforms lead to it"
+                f"of {wanted.frame!r}: it may drift away from the map; base_frame=NAME names the "
+                "robot's frame if transforms lead to it"
             )
             log_warning(logger, "other_frame", text, file=source.info.path, topic=topics[0])
 
@@ -210,7 +210,7 @@ def _connected(source: MessageSource, topics: tuple[str, ...], wanted: _Wanted) 
         if len(robots) > 1:
             text = (
                 f"{path}: the robot's way is that of {robots[0]}; {', '.join(robots[1:])} are other robots, "
-                "which are not shown; base_frame chooses one"
+                "which are not shown; base_frame=NAME chooses one"
             )
             log_warning(logger, "one_robot", text, file=path, topic=topics[0])
         return replace(wanted, base=robots[0])
@@ -218,7 +218,7 @@ def _connected(source: MessageSource, topics: tuple[str, ...], wanted: _Wanted) 
     if wanted.base or len(below) != 1 or not _robots_in(replace(wanted, base=below[0]), edges):
         return None
     text = f"{path}: the robot's base is taken to be {below[0]!r}, the only frame below {ODOMETRY_FRAME}"
-    log_warning(logger, "base_frame", f"{text}; base_frame names another", file=path, topic=topics[0])
+    log_warning(logger, "base_frame", f"{text}; base_frame=NAME names another", file=path, topic=topics[0])
     return replace(wanted, base=below[0])
 
 

@@ -134,7 +134,7 @@ def _analyze_log(
             path,
             topic=options.topic,
             selection=options.selection,
-            limits=options.parameters.reading,
+            limits=options.reading,
             occupancy=options.parameters.occupancy,
             part=options.part,
         ) as reader,
