@@ -282,7 +282,7 @@ class LogReader:
         """The part of the maps that is read, its number and how many there are; None if there is but one."""
         times = self.source.log_times(self.topic)
         if len(times) > 1 and isinstance(self.source, MapFilesSource):
-            return self._chosen(find_saved_parts(times, self._grid, self._occupancy))
+            return self._chosen(find_saved_parts(self.source.names, times, self._grid, self._occupancy))
         # Patches have no map of their own, and maps of one time cannot be told apart.
         if len(self._topics) > 1 or len(np.unique(times)) < len(times):
             found = Parts((Part(times, 0.0, len(times)),))
@@ -366,9 +366,9 @@ def choose_topic(info: LogInfo, asked: str | None = None) -> str:
     untyped = sorted({each.name for each in info.topics if not each.message_type})
     if untyped and not maps:
         raise NoMapTopicError(
-            f"{where} no topic has occupancy grids, and {', '.join(untyped[:MOST_LISTED])} has no schema that "
-            "says what its messages are; name their type "
-            "(message_type='nav_msgs/OccupancyGrid') if they are maps"
+            f"{where} no topic has occupancy grids, and {', '.join(untyped[:MOST_LISTED])} has no schema "
+            "that says what its messages are; if they are maps, name their type "
+            "(message_type='nav_msgs/OccupancyGrid')"
         )
     if not maps:
         others = ", ".join(sorted({topic.message_type for topic in info.topics})[:MOST_LISTED])

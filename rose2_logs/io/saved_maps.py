@@ -95,6 +95,11 @@ class MapFilesSource(MessageSource):
             True,
         )
 
+    @property
+    def names(self) -> list[str]:
+        """Names of the maps."""
+        return [file.stem for file in self._files]
+
     def close(self) -> None:
         """Do nothing: no file stays open between maps."""
 
