@@ -161,19 +161,22 @@ def find_saved_parts(
     occupancy : OccupancyParameters
         Which cells are free and occupied.
     """
-    begins, areas = [0], []
-    before: Grid | None = None
+    begins: list[int] = [0]
+    areas: list[float] = []
+    latest: tuple[Grid, float] | None = None
     for place, time_ns in enumerate(times.tolist()):
         now = read(time_ns)
-        areas.append(0.0 if now is None else facts_of(now, occupancy).free_m2)
-        if now is not None:
-            if before is not None and (
-                _floor(names[place]) != _floor(names[place - 1])
-                or areas[place] < KEPT_SHARE * areas[place - 1]
-                or not _is_continued(before, now, occupancy)
-            ):
-                begins.append(place)
-            before = now
+        area_m2 = 0.0 if now is None else facts_of(now, occupancy).free_m2
+        areas.append(area_m2)
+        is_next = latest is None or _floor(names[place]) == _floor(names[place - 1])
+        if now is not None and latest is not None and area_m2 >= LEAST_AREA_M2:
+            before, before_m2 = latest
+            is_next &= area_m2 >= KEPT_SHARE * before_m2 and _is_continued(before, now, occupancy)
+        if not is_next:
+            begins.append(place)
+        # A bad map between others, without free cells, parts nothing.
+        if now is not None and (area_m2 >= LEAST_AREA_M2 or not is_next):
+            latest = now, area_m2
     parts = [
         Part(times[low:high], areas[high - 1], len(set(areas[low:high])))
         for low, high in pairwise([*begins, len(times)])
