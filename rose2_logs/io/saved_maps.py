@@ -337,7 +337,7 @@ def _cells(
     is_too_high = keeps_unknown and free_below > 1 - SAVED_UNKNOWN / 255
     if is_too_high and (saved := _saved_as_unknown(shade)) is not None:
         text = (
-            f"{path}: its free_thresh of {free_below:g} would make unknown pixels ({SAVED_UNKNOWN}) free; "
+            f"its free_thresh of {free_below:g} would make unknown pixels ({SAVED_UNKNOWN}) free; "
             "they are read as unknown"
         )
         map_warnings.append(MapWarning("free_thresh", text))

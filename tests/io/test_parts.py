@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
-from reader_logs import SHARED, START_NS, Map, McapLog
+from PIL import Image
+from reader_logs import SHARED, START_NS, Map, McapLog, serialized
 
-from rose2_logs.errors import LogError
+from rose2_logs.config.parameters import ReadingParameters
+from rose2_logs.errors import LogError, NoMapTopicError
 from rose2_logs.io import open_log
 from rose2_logs.system.warnings import StrictError, collect_warnings
 
@@ -100,3 +102,53 @@ def test_parts_of_logs_as_users_have_them(name, number):
     assert free == [4862, 13862, 22448, 31130, 40130, 44896]
     assert reader.decided["part"] == {"number": number, "count": 2}
     assert found.kinds["parts"].count == 1
+
+
+def save(folder, name, cells):
+    pixels = np.flipud(np.select([cells == -1, cells == 0], [205, 254], 0)).astype(np.uint8)
+    Image.fromarray(pixels).save(folder / f"{name}.pgm")
+    text = f"image: {name}.pgm\nresolution: 0.05\norigin: [0, 0, 0]\nnegate: 0\n"
+    (folder / f"{name}.yaml").write_text(text + "occupied_thresh: 0.65\nfree_thresh: 0.196\n")
+
+
+def test_saved_maps_that_grow_from_each_other_are_one_run(tmp_path):
+    for k, columns in enumerate(GROWING):
+        save(tmp_path, f"map{k}", seen(columns))
+    save(tmp_path, "map2", np.full((100, 200), -1, np.int8))
+    free, part, kinds = read(tmp_path)
+    assert (len(free), part, kinds) == (5, None, {})
+
+
+@pytest.mark.parametrize("names", [("floor1", "floor2"), ("2nd floor", "3rd floor"), ("lab", "office")])
+def test_saved_maps_of_other_floors_and_masks_are_not_read_as_one_run(names, tmp_path):
+    upper = seen(170) if "floor" in names[0] else np.pad(seen(170).T, ((0, 0), (0, 100)))[:100]
+    save(tmp_path, names[0], seen(170))
+    save(tmp_path, names[1], upper)
+    save(tmp_path, "keepout_mask", np.where(seen(170) == 0, 100, 0).astype(np.int8))
+    free, part, kinds = read(tmp_path)
+    assert len(free) == 1
+    assert part["count"] == 2
+    assert set(kinds) == {"masks", "parts"}
+    assert "keepout_mask.yaml left out" in kinds["masks"].first[0]["message"]
+
+
+def test_the_choice_among_topics_is_told_unless_one_was_named(tmp_path):
+    log = McapLog(tmp_path / "run.mcap")
+    for k, topic in enumerate(("/one/map", "/map", "/two/map")):
+        log.add(topic, START_NS + k, Map(seen(100)))
+    path = log.close()
+    (told,) = read(path)[2]["topic"].first
+    assert told["message"].endswith(
+        "/map is read; /one/map, /two/map hold maps, too; topic='/one/map' chooses another"
+    )
+    assert not read(path, topic="/map")[2]
+
+
+def test_a_channel_without_a_schema_is_named_and_read_by_the_type_that_is_given(tmp_path):
+    log = McapLog(tmp_path / "run.mcap")
+    log.raw("/map", START_NS, ("", "", b""), "cdr", serialized(Map(seen(100)), 2))
+    path = log.close()
+    with pytest.raises(NoMapTopicError, match=r"/map has no schema .*message_type='nav_msgs/OccupancyGrid'"):
+        open_log(path)
+    limits = ReadingParameters(type_without_schema="nav_msgs/OccupancyGrid")
+    assert read(path, limits=limits)[0] == [95]
