@@ -280,6 +280,10 @@ def open_log(
     log: str | Path | Sequence[str | Path],
     *,
     topic: str | None = None,
+    message_type: str | None = None,
+    part: int | None = None,
+    map_from: str | None = None,
+    map_frame: str | None = None,
     parameters: GivenParameters = None,
     **selection: Any,
 ) -> LogReader:
@@ -291,8 +295,17 @@ def open_log(
         An MCAP file, a ROS 1 bag, a ROS 2 bag, saved maps; or several files of one kind that are one log.
     topic : str, optional
         The map topic; by default ``/map``, else the only one.
+    message_type : str, optional
+        Type of the maps on channels without a schema.
+    part : int, optional
+        Which part of the maps, from 1, where they are not of one run; by default the one that tells most.
+    map_from : str, optional
+        Topic of laser scans to build the maps from, instead of reading recorded ones.
+    map_frame : str, optional
+        Frame of built maps; by default ``map``, else ``odom``.
     parameters : Parameters or mapping, optional
-        Those of ``reading`` say how much a log may claim, those of ``occupancy`` what the cells mean.
+        Those of ``reading`` say how much a log may claim, those of ``occupancy`` what the cells mean, those
+        of ``mapping`` how maps are built.
     **selection
         Fields of `Selection`: ``every_s``, ``min_change_m2``, ``max_snapshots`` and so on.
 
@@ -315,11 +328,21 @@ def open_log(
     """
     known = [each.name for each in dataclasses.fields(Selection)]
     _refuse_unknown(selection, known)
-    check_option(RunOptions, "topic", topic)
+    names = {"topic": topic, "message_type": message_type, "part": part}
+    for name, value in (names | {"map_from": map_from, "map_frame": map_frame}).items():
+        check_option(RunOptions, name, value)
     used = Parameters.from_any(parameters)
     path = [_path(each, "log") for each in log] if isinstance(log, list | tuple) else _path(log, "log")
     return open_log_reader(
-        path, topic=topic, selection=Selection(**selection), limits=used.reading, occupancy=used.occupancy
+        path,
+        topic=topic,
+        selection=Selection(**selection),
+        limits=used.reading.with_type(message_type),
+        occupancy=used.occupancy,
+        part=part,
+        map_from=map_from,
+        map_frame=map_frame,
+        mapping=used.mapping,
     )
 
 

@@ -85,10 +85,10 @@ def test_an_array_needs_its_resolution(cells: np.ndarray):
 
 def test_methods_and_parameters_are_chosen_by_name(cells: np.ndarray):
     """Parameters whole, or a mapping of dotted names."""
-    few = {"floor_plan.room_min_area_m2": 12.0}
+    few = {"regions.room_min_area_m2": 12.0}
     found = [
         rl.segment(cells, resolution_m=0.05, parameters=given)
-        for given in (few, rl.Parameters().replaced({"floor_plan": {"room_min_area_m2": 12.0}}))
+        for given in (few, rl.Parameters().replaced({"regions": {"room_min_area_m2": 12.0}}))
     ]
     assert np.array_equal(found[0].labels, found[1].labels)
     assert rl.segment(cells, resolution_m=0.05, method="voronoi").walls is None

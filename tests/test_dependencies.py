@@ -18,7 +18,9 @@ EXTRAS = {
     name: [Requirement(line) for line in lines] for name, lines in PROJECT["optional-dependencies"].items()
 }
 DIRECT = [Requirement(line) for line in PROJECT["dependencies"]]
-OPTIONAL = [each for extra in EXTRAS.values() for each in extra]
+NOT_INSTALLED = "train"
+"""PyTorch is larger than all else together; only who fits anew needs it."""
+OPTIONAL = [each for name, extra in EXTRAS.items() if name != NOT_INSTALLED for each in extra]
 BUILD = [Requirement(line) for line in CONFIGURATION["build-system"]["requires"]]
 
 if not PINS.is_dir():

@@ -21,15 +21,14 @@ from collections.abc import Iterator
 from itertools import groupby
 from pathlib import Path
 
-from carmen import CarmenScan, read_carmen
 from log_writing import NANOSECONDS, robot_log
-from simulation.mapper import LogOddsMapper, MapperSettings
 
+from rose2_logs.config.mapping import MappingParameters
 from rose2_logs.errors import Rose2LogsError
+from rose2_logs.io.carmen import EPOCH_OF_UNSTAMPED_S, CarmenScan, read_carmen
+from rose2_logs.mapping.log_odds import MapBuilder
 
 MAPS_BY_DEFAULT = 40
-EPOCH_OF_UNSTAMPED_S = 1_000_000_000
-"""Where a log starts whose own stamps cannot be used: any fixed time."""
 
 
 def rounds(scans: list[CarmenScan], every_s: float) -> Iterator[tuple[float, list[CarmenScan]]]:
@@ -46,7 +45,7 @@ def convert(
     *,
     every_s: float | None = None,
     max_range_m: float | None = None,
-    mapping: MapperSettings | None = None,
+    mapping: MappingParameters | None = None,
     probabilities: bool = False,
 ) -> int:
     """Write `target`, whose suffix chooses the kind of log, from the CARMEN log `source`.
@@ -59,7 +58,7 @@ def convert(
         Time from map to map in the log's time; by default what gives about `MAPS_BY_DEFAULT` maps.
     max_range_m : float, optional
         Readings from here on mean that nothing returned; by default what the log says.
-    mapping : MapperSettings, optional
+    mapping : MappingParameters, optional
         Resolution and range cap of the map.
     probabilities : bool
         Write 0..100 instead of 0 and 100.
@@ -82,16 +81,16 @@ def convert(
     # Times are written relative to a whole second, so that nanoseconds survive.
     zero_s = int(scans[0].time_s)
     start_ns = (zero_s if stamped else EPOCH_OF_UNSTAMPED_S) * NANOSECONDS
-    mapper, count = LogOddsMapper(mapping), 0
+    builder, count = MapBuilder(mapping), 0
     with robot_log(
         target, start_ns, {"carmen log": source.name, "seconds from map to map": f"{every_s:g}"}
     ) as log:
         for map_time, taken in rounds(scans, every_s):
             for scan in taken:
-                mapper.add_scan(scan.laser_pose, scan.bearings_rad, scan.ranges_m)
+                builder.add_scan(scan.laser_pose, scan.bearings_rad, scan.ranges_m)
                 log.write_pose(scan.time_s - zero_s, scan.robot_pose, scan.odometry)
-            cells = mapper.probabilities() if probabilities else mapper.trinary()
-            log.write_map(map_time - zero_s, cells, mapper.geometry())
+            cells = builder.probabilities() if probabilities else builder.trinary()
+            log.write_map(map_time - zero_s, cells, builder.geometry())
             count += 1
     note = "" if stamped else "; its stamps are damaged: one second a scan was taken instead"
     print(f"{target}: {count} maps from {len(scans)} scans, {duration:.0f} s{note}")
@@ -103,7 +102,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    add, defaults = parser.add_argument, MapperSettings()
+    add, defaults = parser.add_argument, MappingParameters()
     add("source", type=Path, help="CARMEN log, plain or .gz, with ROBOTLASER1 or FLASER messages")
     add("target", type=Path, help="what to write: *.mcap, *.bag, or a directory (rosbag2)")
     add("--every", type=float, metavar="S", help="log time from map to map (default: for about 40 maps)")
@@ -122,7 +121,7 @@ def main(arguments: list[str] | None = None) -> int:
         value = getattr(options, name)
         if value is not None and not value > 0:
             parser.error(f"--{name.replace('_', '-')} is {value:g}; it must be positive")
-    mapping = MapperSettings(resolution_m=options.resolution, usable_range_m=options.usable_range)
+    mapping = MappingParameters(resolution_m=options.resolution, usable_range_m=options.usable_range)
     try:
         convert(
             options.source,

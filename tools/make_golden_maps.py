@@ -4,7 +4,8 @@
     python tools/make_golden_maps.py           # segment the maps that are there again, say what changed
     python tools/make_golden_maps.py --maps    # draw and simulate the maps anew as well
 
-Each file holds the ``cells`` (H, W) int8 of a map, its ``resolution_m`` and the ``labels`` (H, W) of rooms.
+Each file holds the ``cells`` (H, W) int8 of a map, its ``resolution_m``, and labels (H, W) of its rooms by
+each grouping of the floor: ``fitted`` and ``walls``.
 Run it after a change that is meant to change rooms, look at what changed, and commit the files with it.
 """
 
@@ -24,6 +25,7 @@ from rose2_logs.segmentation.pipeline import analyze
 
 PROJECT = Path(__file__).resolve().parents[1]
 GOLDEN = PROJECT / "tests" / "segmentation" / "golden"
+GROUPINGS = ("fitted", "walls")
 MARGIN_CELLS = 10
 """Unknown cells that stay around a map when it is cut out."""
 SIMULATED = (
@@ -73,10 +75,12 @@ def kept() -> Iterator[tuple[str, NDArray[np.int8], float]]:
             yield path.stem, file["cells"], float(file["resolution_m"])
 
 
-def rooms_of(cells: NDArray[np.int8], resolution_m: float) -> NDArray[np.int32]:
+def rooms_of(cells: NDArray[np.int8], resolution_m: float, grouping: str) -> NDArray[np.int16]:
     """Segment a map (H, W)."""
+    parameters = Parameters.from_any({"floor_plan.grouping": grouping})
     geometry = GridGeometry(resolution_m, (0.0, 0.0), 0.0, "map", (cells.shape[0], cells.shape[1]))
-    return analyze(OccupancySnapshot(0, 1, 1, "/map", cells, geometry), Parameters()).rooms.labels
+    snapshot = OccupancySnapshot(0, 1, 1, "/map", cells, geometry)
+    return analyze(snapshot, parameters).rooms.labels.astype(np.int16)
 
 
 def main() -> None:
@@ -90,14 +94,12 @@ def main() -> None:
     maps = [*drawn(), *simulated()] if arguments.maps else list(kept())
     for name, cells, resolution_m in maps:
         path = GOLDEN / f"{name}.npz"
-        labels = rooms_of(cells, resolution_m).astype(np.int16)
-        said = "new"
-        if path.exists():
-            with np.load(path) as file:
-                same = np.array_equal(file["labels"], labels)
-            said = "the same" if same else "CHANGED"
-        np.savez_compressed(path, cells=cells, resolution_m=resolution_m, labels=labels)
-        print(f"{name}: {cells.shape[0]} x {cells.shape[1]} cells, {labels.max()} rooms, {said}")
+        labels = {grouping: rooms_of(cells, resolution_m, grouping) for grouping in GROUPINGS}
+        before = dict(np.load(path)) if path.exists() else {}
+        np.savez_compressed(path, cells=cells, resolution_m=resolution_m, **labels)  # type: ignore[arg-type]
+        for grouping, rooms in labels.items():
+            same = grouping in before and np.array_equal(before[grouping], rooms)
+            print(f"{name}, {grouping}: {rooms.max()} rooms, {'the same' if same else 'CHANGED'}")
 
 
 if __name__ == "__main__":

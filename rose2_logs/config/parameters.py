@@ -11,9 +11,9 @@ import difflib
 import math
 import tomllib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 from rose2_logs.config.baselines import (
     DistanceParameters,
@@ -23,6 +23,7 @@ from rose2_logs.config.baselines import (
 )
 from rose2_logs.config.comparison import ComparisonParameters
 from rose2_logs.config.fields import ParameterBlock, choice, number
+from rose2_logs.config.mapping import MappingParameters
 from rose2_logs.config.regions import RegionParameters
 from rose2_logs.config.tracking import QualityParameters, TrackingParameters
 from rose2_logs.errors import ParameterError
@@ -64,6 +65,10 @@ class ReadingParameters(ParameterBlock):
         TYPES_WITHOUT_SCHEMA,
         "Type of the messages on channels that have no schema: such a log does not say it itself.",
     )
+
+    def with_type(self, name: str | None) -> Self:
+        """Return these with the type of channels without a schema that was named, if one was."""
+        return self if name is None else replace(self, type_without_schema=name)
 
 
 @dataclass(frozen=True, repr=False)
@@ -417,6 +422,7 @@ class Parameters:
     """
 
     reading: ReadingParameters = field(default_factory=ReadingParameters)
+    mapping: MappingParameters = field(default_factory=MappingParameters)
     occupancy: OccupancyParameters = field(default_factory=OccupancyParameters)
     spectrum: SpectrumParameters = field(default_factory=SpectrumParameters)
     walls: WallParameters = field(default_factory=WallParameters)

@@ -44,6 +44,13 @@ class RegionParameters(ParameterBlock):
         "Log odds per difference of the mean answer from one half, of the order of the trees' own.",
         0.0,
     )
+    join_margin: float = number(
+        0.75,
+        "log odds",
+        "A wrong join costs more than a wrong border: 0.5 to 1 were best on maps left out.",
+        -20,
+        20,
+    )
     detail: float = number(
         0.0,
         "log odds",

@@ -249,6 +249,25 @@ class RunOptions:
         high=1e6,
         decides=True,
     )
+    map_from: str | None = option(
+        None,
+        "Topic of laser scans (LaserScan or MultiEchoLaserScan): build the maps from these and the log's "
+        "transforms, for a log without maps. Cells and ranges are parameters, as in "
+        "mapping.resolution_m=0.1.",
+        panel=MAPS,
+        commands=BOTH,
+        metavar="NAME",
+        decides=True,
+    )
+    map_frame: str | None = option(
+        None,
+        "Frame of maps that are built from scans, in which the building stands still. By default map, else "
+        "odom, with a warning.",
+        panel=MAPS,
+        commands=BOTH,
+        metavar="FRAME",
+        decides=True,
+    )
     start_s: float | None = option(
         None,
         "Skip the first S seconds of the log.",
@@ -416,16 +435,22 @@ class RunOptions:
             raise ParameterError(
                 "bag=True makes a ROS 2 bag of the annotated MCAP, which annotated_log=False leaves out"
             )
+        if self.topic is not None and self.map_from is not None:
+            raise ParameterError(
+                f"topic={self.topic!r} reads recorded maps, map_from={self.map_from!r} builds them; give one "
+                "of the two"
+            )
+        if self.map_frame is not None and self.map_from is None:
+            raise ParameterError(
+                f"map_frame={self.map_frame!r} is for maps built from scans; give map_from too"
+            )
         if self.start_s is not None and self.end_s is not None and self.start_s > self.end_s:
             raise ParameterError(f"start_s={self.start_s:g}: it lies after end_s={self.end_s:g}")
 
     @property
     def reading(self) -> ReadingParameters:
         """Parameters of reading, with the type that was named."""
-        reading = self.parameters.reading
-        if self.message_type is None:
-            return reading
-        return dataclasses.replace(reading, type_without_schema=self.message_type)
+        return self.parameters.reading.with_type(self.message_type)
 
     @property
     def selection(self) -> Selection:

@@ -14,6 +14,8 @@ MAP_ENDINGS = (".yaml", ".yml")
 IMAGE_ENDINGS = (".pgm", ".png", ".bmp")
 STORAGE_ENDINGS = (".mcap", ".db3", ".bag", ".bag.active")
 """``.bag.active`` is a bag that its recorder did not close."""
+CARMEN_ENDINGS = (".log.gz", ".clf.gz", ".log", ".clf")
+"""Usual endings of CARMEN logs, which are recognized by their content; many other files end in ``.log``."""
 COMPRESSED_ENDING = ".zstd"
 """Ending of the files of a ROS 2 bag that was compressed file by file."""
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
@@ -25,7 +27,7 @@ BAG_DESCRIPTION = "metadata.yaml"
 
 def stem_of(name: str) -> str:
     """Name of a log without its format's ending."""
-    for ending in (*STORAGE_ENDINGS, *MAP_ENDINGS):
+    for ending in (*STORAGE_ENDINGS, *MAP_ENDINGS, *CARMEN_ENDINGS):
         name = name.removesuffix(ending)
     return name
 

@@ -23,6 +23,7 @@ from rose2_logs.io.messages import is_patch_type
 from rose2_logs.io.parts import MapFacts, Part, Parts, facts_of, find_parts, find_saved_parts
 from rose2_logs.io.poses import RobotPath
 from rose2_logs.io.saved_maps import MapFilesSource
+from rose2_logs.io.scan_topics import mappable_topics
 from rose2_logs.io.source import DamagedMessageError, LoggedMap, LogInfo, MessageSource, TopicInfo
 from rose2_logs.model.occupancy import OccupancySnapshot
 from rose2_logs.system.warnings import log_warning
@@ -210,7 +211,8 @@ class LogReader:
         start_ns = self._selection.start_ns
         if self._part is not None and self._part[1]["number"] > 1:
             start_ns = max(start_ns or 0, int(self._part[0].times[0]))
-        path = RobotPath(self.source, frame_id, start_ns, map_topic=self.topic, base_frame=base_frame)
+        map_topic = self.source.made_from(self.topic)
+        path = RobotPath(self.source, frame_id, start_ns, map_topic=map_topic, base_frame=base_frame)
         self._path_origin = path.origin
         return path
 
@@ -363,19 +365,21 @@ def choose_topic(info: LogInfo, asked: str | None = None) -> str:
         raise NoMapTopicError(
             f"{info.path}: {asked or repr(asked)} is not a topic with occupancy grids; {has}"
         )
+    scans = mappable_topics(info)
+    building = f"map_from={scans[0]!r} builds maps from its laser scans" if scans else ""
     untyped = sorted({each.name for each in info.topics if not each.message_type})
     if untyped and not maps:
         raise NoMapTopicError(
             f"{where} no topic has occupancy grids, and {', '.join(untyped[:MOST_LISTED])} has no schema "
             "that says what its messages are; if they are maps, name their type "
-            "(message_type='nav_msgs/OccupancyGrid')"
+            "(message_type='nav_msgs/OccupancyGrid')" + (f"; {building}" if building else "")
         )
     if not maps:
         others = ", ".join(sorted({topic.message_type for topic in info.topics})[:MOST_LISTED])
         found = f", only {others}" if others else ""
+        remedy = building or "record the mapping node's topic too, usually /map"
         raise NoMapTopicError(
-            f"{where} no topic has occupancy grids (nav_msgs/OccupancyGrid){found}; "
-            "record the mapping node's topic too, usually /map"
+            f"{where} no topic has occupancy grids (nav_msgs/OccupancyGrid){found}; {remedy}"
         )
     filled = {name: topic for name, topic in maps.items() if topic.message_count != 0}
     if not filled:

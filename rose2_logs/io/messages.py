@@ -142,9 +142,8 @@ class Fields:
     def octets(self, what: str) -> memoryview:
         """Read a string or an array of bytes, without a copy."""
         (count,) = self.integers("I")
-        left = len(self._data) - self._place
-        if count > left:
-            raise InvalidMapError(f"its {what} claims {count} bytes, but only {left} bytes are left")
+        if count > self.left:
+            raise InvalidMapError(f"its {what} claims {count} bytes, but only {self.left} bytes are left")
         self._place += count
         return self._data[self._place - count : self._place]
 
@@ -155,13 +154,28 @@ class Fields:
             raise InvalidMapError(f"its {what} is {len(octets)} bytes long, more than {LONGEST_NAME_BYTES}")
         return bytes(octets).rstrip(b"\0").decode("utf-8", errors="replace")
 
+    @property
+    def left(self) -> int:
+        """Number of bytes that are left."""
+        return len(self._data) - self._place
+
+    def singles(self, what: str) -> NDArray[np.float32]:
+        """Read an array of numbers of single precision, without a copy."""
+        (count,) = self.integers("I")
+        size = 4 * count
+        if size > self.left:
+            raise InvalidMapError(f"its {what} claim {count} numbers, but only {self.left} bytes are left")
+        values = np.frombuffer(self._data, f"{self.byte_order}f4", count, self._place)
+        self._place += size
+        return values
+
     def cells(self, rows: int, columns: int) -> NDArray[np.uint8]:
         """Read the last field: the cells (rows, columns), one byte each."""
         data = self.octets("data")
         if rows * columns != len(data):
             raise InvalidMapError(f"it claims {columns} x {rows} cells, but its data has {len(data)}")
         check_cells(rows, columns, self.most_cells)
-        if (left := len(self._data) - self._place) >= PADDING_BYTES:
+        if (left := self.left) >= PADDING_BYTES:
             self.map_warnings.append(
                 MapWarning(
                     "more_bytes", f"{left} bytes follow its last field; is its message definition different?"

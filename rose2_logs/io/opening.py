@@ -10,9 +10,11 @@ from collections.abc import Sequence
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
 
+from rose2_logs.config.mapping import MappingParameters
 from rose2_logs.config.parameters import OccupancyParameters, ReadingParameters
 from rose2_logs.config.selection import Selection
 from rose2_logs.errors import LogError
+from rose2_logs.io.carmen_format import CARMEN_FORMAT, is_carmen
 from rose2_logs.io.discovery import (
     ANNOTATED_ENDING,
     BAG_DESCRIPTION,
@@ -32,6 +34,7 @@ from rose2_logs.system.warnings import log_warning
 
 if TYPE_CHECKING:
     from rose2_logs.io.file_log import FileLog, OpenFile
+    from rose2_logs.io.scan_maps import ScanMaps
 
 logger = logging.getLogger(__name__)
 
@@ -40,6 +43,7 @@ LogPath = str | Path | Sequence[str | Path]
 EVERYTHING = Selection()
 DEFAULT_LIMITS = ReadingParameters()
 USUAL = OccupancyParameters()
+DEFAULT_MAPPING = MappingParameters()
 DISK_LEFT_BYTES = 1 << 30
 """Disk space left free where the temporary folder is when a bag is decompressed there."""
 MASK_WORDS = ("mask", "keepout", "speed_limit")
@@ -47,7 +51,8 @@ MASK_WORDS = ("mask", "keepout", "speed_limit")
 _MOST_NAMED = 3
 """Number of files that a warning names."""
 _FORMATS = (
-    "an .mcap file, a ROS 1 .bag, a ROS 2 bag directory or .db3, a map_server .yaml or a folder of those"
+    "an .mcap file, a ROS 1 .bag, a ROS 2 bag directory or .db3, a map_server .yaml or a folder of those, or "
+    "a CARMEN log"
 )
 _MAGIC = {b"\x89MCAP0\r\n": ".mcap", b"#ROSBAG ": ".bag", b"SQLite f": ".db3"}
 
@@ -60,6 +65,9 @@ def open_log(
     limits: ReadingParameters = DEFAULT_LIMITS,
     occupancy: OccupancyParameters = USUAL,
     part: int | None = None,
+    map_from: str | None = None,
+    map_frame: str | None = None,
+    mapping: MappingParameters = DEFAULT_MAPPING,
 ) -> LogReader:
     """Open a log to read its maps.
 
@@ -79,6 +87,12 @@ def open_log(
         What the numbers in the cells mean.
     part : int, optional
         Which part of a topic, from 1, whose maps are not of one run; by default the one that tells most.
+    map_from : str, optional
+        Topic of laser scans to build the maps from, instead of reading recorded ones.
+    map_frame : str, optional
+        Frame of built maps; by default ``map``, else ``odom``.
+    mapping : MappingParameters
+        How maps are built.
 
     Returns
     -------
@@ -94,10 +108,34 @@ def open_log(
     """
     source = open_source(path, limits, occupancy)
     try:
+        if map_from is not None or source.info.format == CARMEN_FORMAT:
+            built = _with_maps(source, map_from, map_frame, selection, limits, mapping)
+            return LogReader(built, topic or built.topic, selection, occupancy, part)
         return LogReader(source, topic, selection, occupancy, part)
     except BaseException:
         source.close()
         raise
+
+
+def _with_maps(
+    source: MessageSource,
+    map_from: str | None,
+    frame: str | None,
+    selection: Selection,
+    limits: ReadingParameters,
+    mapping: MappingParameters,
+) -> ScanMaps:
+    """Add the maps that are built from scans to an open log."""
+    from rose2_logs.io.carmen import CarmenLog, CarmenScans
+    from rose2_logs.io.placed_scans import PlacedScans, RosScans
+    from rose2_logs.io.scan_maps import ScanMaps
+
+    scans: PlacedScans
+    if isinstance(source, CarmenLog):
+        scans = CarmenScans(source, mapping)
+    else:
+        scans = RosScans(source, map_from or "", frame, mapping)
+    return ScanMaps(source, scans, mapping, selection, limits.map_max_cells)
 
 
 def inspect_log(path: LogPath, limits: ReadingParameters = DEFAULT_LIMITS) -> LogInfo:
@@ -183,6 +221,12 @@ def _open_files(
             from rose2_logs.io.saved_maps import MapFilesSource
 
             return MapFilesSource(log, [_yaml_beside(file) for file in files], limits)
+        case kind if kind == CARMEN_FORMAT:
+            from rose2_logs.io.carmen import CarmenLog
+
+            if len(files) > 1:
+                raise LogError(f"{log}: several CARMEN logs cannot be read as one; give one", file=log)
+            return CarmenLog(files[0])
         case kind:
             return _open_storage(log, files, kind, limits, is_bag=is_bag)
 
@@ -263,6 +307,8 @@ def _kind(file: Path) -> str:
         return ".yaml"
     if suffix in IMAGE_ENDINGS:
         return "image"
+    if is_carmen(file):
+        return CARMEN_FORMAT
     if _is_packed(file) or name.endswith(STORAGE_ENDINGS):
         what = "is empty" if not begin else f"does not start like a {suffix} file"
         raise LogError(f"{file}: {what}; was it copied completely?", file=file)

@@ -141,6 +141,15 @@ class MessageSource(ABC):
         """How the source itself turns what it stores into percent; None if it leaves that to the reader."""
         return None
 
+    @property
+    def recorded(self) -> MessageSource:
+        """The log itself, where this one adds maps that are built from it."""
+        return self
+
+    def made_from(self, topic: str) -> str:
+        """Topic that the messages of `topic` are made from: the same one, if they were recorded."""
+        return topic
+
     @abstractmethod
     def log_times(self, topic: str) -> Times:
         """Log times of all messages of `topic`, nanoseconds, sorted."""

@@ -137,6 +137,9 @@ def _analyze_log(
             limits=options.reading,
             occupancy=options.parameters.occupancy,
             part=options.part,
+            map_from=options.map_from,
+            map_frame=options.map_frame,
+            mapping=options.parameters.mapping,
         ) as reader,
         start_workers(options) as processes,
     ):

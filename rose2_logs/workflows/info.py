@@ -11,6 +11,7 @@ from rose2_logs.config.parameters import OccupancyParameters, Parameters
 from rose2_logs.config.selection import Selection
 from rose2_logs.errors import LogError
 from rose2_logs.io import LogReader, open_source
+from rose2_logs.io.scan_topics import mappable_topics
 from rose2_logs.io.source import LogInfo, MessageSource
 from rose2_logs.model.occupancy import OccupancySnapshot, classify
 
@@ -59,10 +60,15 @@ class TopicFacts:
 
 @dataclass(frozen=True)
 class LogFacts:
-    """A log and its map topics."""
+    """A log, its map topics, and the topics of laser scans from which maps can be built."""
 
     info: LogInfo
     maps: tuple[TopicFacts, ...]
+
+    @property
+    def map_from(self) -> tuple[str, ...]:
+        """Topics with laser scans whose place is known."""
+        return mappable_topics(self.info)
 
     def as_json(self) -> dict[str, Any]:
         """Return everything as JSON values."""
@@ -71,7 +77,7 @@ class LogFacts:
             "duration_s": self.info.duration_s,
         }
         maps = [dataclasses.asdict(facts) | {"coverage_first": facts.coverage_first} for facts in self.maps]
-        return info | {"maps": maps}
+        return info | {"maps": maps, "map_from": list(self.map_from)}
 
 
 def describe_log(log: str, parameters: Parameters | None = None) -> LogFacts:

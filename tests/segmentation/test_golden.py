@@ -25,12 +25,14 @@ def numbered_as(kept: NDArray[np.integer], found: NDArray[np.integer]) -> NDArra
     return common.argmax(1)[found]
 
 
+@pytest.mark.parametrize("grouping", ["fitted", "walls"])
 @pytest.mark.parametrize("path", GOLDEN, ids=lambda path: path.stem)
-def test_a_map_has_the_rooms_that_were_kept(path: Path):
+def test_a_map_has_the_rooms_that_were_kept(path: Path, grouping: str):
     """Whatever their numbers are."""
     with np.load(path) as file:
-        cells, resolution_m, kept = file["cells"], float(file["resolution_m"]), file["labels"]
-    found = analyze(snapshot(cells, resolution_m), Parameters()).rooms.labels
+        cells, resolution_m, kept = file["cells"], float(file["resolution_m"]), file[grouping]
+    parameters = Parameters.from_any({"floor_plan.grouping": grouping})
+    found = analyze(snapshot(cells, resolution_m), parameters).rooms.labels
     differing = (numbered_as(kept, found) != kept).sum() / (kept > 0).sum()
     assert found.max() == kept.max()
     assert differing <= MOST_DIFFERENCE

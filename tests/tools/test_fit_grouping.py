@@ -259,15 +259,19 @@ def test_network_answers_the_same_from_its_file(tmp_path, prepared):
     from fit_grouping.network import RoomNetwork, export_onnx
 
     from rose2_logs.segmentation.regions.answers import AnsweringNetwork
-    from rose2_logs.segmentation.regions.plan_raster import OUTPUTS
+    from rose2_logs.segmentation.regions.plan_raster import OUTPUTS, PlanRaster, network_input, shares_of
 
     torch.manual_seed(0)
     network = RoomNetwork((4, 6, 8, 8, 8)).eval()
-    export_onnx(network, tmp_path / "n.onnx")
-    answers = AnsweringNetwork(tmp_path / "n.onnx")(prepared.raster)
-    assert answers.shape == (OUTPUTS, *prepared.raster.wall.shape)
-    assert (answers >= 0).all()
-    assert (answers <= 1).all()
+    export_onnx([network], tmp_path / "n.onnx")
+    raster = prepared.atoms.raster
+    height, width = (side // 32 * 32 for side in raster.wall.shape)
+    whole = PlanRaster(raster.wall[:height, :width], raster.free[:height, :width])
+    answers = AnsweringNetwork(tmp_path / "n.onnx")(whole)
+    inputs = torch.from_numpy(network_input(shares_of(whole.wall), shares_of(whole.free))[None])
+    expected = torch.sigmoid(network(inputs))[0].detach().numpy()
+    assert answers.shape == (OUTPUTS, height, width)
+    np.testing.assert_allclose(answers, expected, atol=2e-3)
 
 
 @pytest.fixture

@@ -65,53 +65,6 @@ def test_rays_through_clear_glass_reach_what_is_behind():
     assert ranges[0] == pytest.approx(2)
 
 
-def test_mapped_ray_is_free_up_to_an_occupied_end_and_unknown_beyond():
-    from simulation.mapper import LogOddsMapper
-
-    mapper = LogOddsMapper()
-    mapper.add_scan(np.array([0.01, 0.01, 0.0]), np.array([0.0]), np.array([1.0]))
-    cells, geometry = mapper.trinary(), mapper.geometry()
-    row, column = geometry.world_to_cell(np.array([0.01, 0.01]))
-    assert cells[row, column : column + 20].tolist() == [0] * 20
-    assert cells[row, column + 20] == 100
-    assert (cells != -1).sum() == 21
-
-
-def test_rays_past_the_usable_range_mark_no_obstacle_and_lost_rays_mark_nothing():
-    from simulation.mapper import LogOddsMapper, MapperSettings
-
-    mapper = LogOddsMapper(MapperSettings(usable_range_m=2.0))
-    mapper.add_scan(np.zeros(3), np.array([0.0, 1.0]), np.array([5.0, np.nan]))
-    cells = mapper.trinary()
-    assert not (cells == 100).any()
-    assert (cells == 0).sum() == 41
-
-
-def test_growing_canvas_keeps_what_it_holds_at_its_place_in_the_world():
-    from simulation.mapper import LogOddsMapper
-
-    mapper = LogOddsMapper()
-    mapper.add_scan(np.zeros(3), np.array([0.0]), np.array([1.0]))
-    before, old = mapper.trinary(), mapper.geometry()
-    mapper.add_scan(np.zeros(3), np.array([np.pi * 0.75]), np.array([12.0]))
-    after, new = mapper.trinary(), mapper.geometry()
-    assert new.origin_xy_m < old.origin_xy_m
-    rows, columns = np.nonzero(before == 100)
-    moved = new.world_to_cell(old.cell_centers(rows, columns))
-    assert (after[moved[:, 0], moved[:, 1]] == 100).all()
-
-
-def test_lines_of_cells_join_both_ends_without_gaps():
-    from simulation.mapper import line_cells
-
-    ends = np.random.default_rng(0).integers(-40, 40, (50, 2))
-    for end in ends:
-        cells = line_cells(np.array([3, -2]), end[None])
-        assert cells[0].tolist() == [3, -2]
-        assert cells[-1].tolist() == end.tolist()
-        assert np.abs(np.diff(cells, axis=0)).max(initial=0) <= 1
-
-
 def test_exploration_sees_almost_the_whole_floor_and_its_maps_grow(flat, flat_run):
     free = [(step.cells == 0).sum() for step in flat_run]
     assert free[0] < 0.8 * free[-1]

@@ -34,7 +34,7 @@ from rose2_logs.config.regions import RegionParameters
 from rose2_logs.segmentation.regions.features import REGION_FEATURES, SHAPE_FEATURES
 from rose2_logs.segmentation.regions.fitted import JOINS, MANIFEST, NETWORK, OUTSIDE, sha256_of
 from rose2_logs.segmentation.regions.joining import join_regions
-from rose2_logs.segmentation.regions.strengths import BoostedTrees, JoinStrength
+from rose2_logs.segmentation.regions.strengths import BoostedTrees, FittedStrength
 
 HERE = Path(__file__).parent
 MAPS_PER_FILE = 400
@@ -108,7 +108,7 @@ def fit_on(parts: Sequence[Sequence[Samples]], parameters: TreeParameters, seed:
 
 def regions_of(examples: Sequence[Example], trees: BoostedTrees) -> list[NDArray[np.int64]]:
     """Region of each atom of each map, joined as the package does."""
-    strength = JoinStrength(trees, REGIONS.answer_weight, REGIONS.answer_scale)
+    strength = FittedStrength.of_joins(trees, REGIONS)
     return [join_regions(e.graph, strength, REGIONS.detail).regions(REGIONS.detail) for e in examples]
 
 

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+import onnx
+import onnx.numpy_helper
 import torch
 from torch import Tensor, nn
 
+from rose2_logs.segmentation.regions.answers import BLOCK
 from rose2_logs.segmentation.regions.plan_raster import OUTPUTS
 
 CHANNELS = (16, 28, 40, 56, 72)
 """Channels at 0.2, 0.4, 0.8, 1.6 and 3.2 m a cell."""
 INPUTS = 4
-STRIDE = 32
-"""Inputs are padded to a multiple of this many cells."""
+HALVED_MIN_SIZE = 64
+"""Smaller arrays of numbers, as of biases, are kept in 32 bits."""
 
 
 def _layer(inputs: int, outputs: int, kernel: int = 3, stride: int = 1) -> nn.Sequential:
@@ -38,12 +43,17 @@ class RoomNetwork(nn.Module):  # type: ignore[misc]
             )
             for i in range(len(channels) - 2, -1, -1)
         )
-        self.answers = nn.Conv2d(channels[0], 4 * OUTPUTS, 1)
+        self.answers = nn.Conv2d(channels[0], BLOCK**2 * OUTPUTS, 1)
         nn.init.constant_(self.answers.bias, -1.5)
-        self.fine = nn.PixelShuffle(2)
+        self.fine = nn.PixelShuffle(BLOCK)
 
     def forward(self, inputs: Tensor) -> Tensor:
         """Log odds (B, OUTPUTS, H, W) from inputs (B, INPUTS, H, W)."""
+        out: Tensor = self.fine(self.blocks(inputs))
+        return out
+
+    def blocks(self, inputs: Tensor) -> Tensor:
+        """Log odds (B, BLOCK^2 OUTPUTS, H / BLOCK, W / BLOCK), the cells of a block one after the other."""
         x = self.stem(inputs)
         levels = []
         for i, block in enumerate(self.down):
@@ -52,25 +62,30 @@ class RoomNetwork(nn.Module):  # type: ignore[misc]
         for block, skip in zip(self.up, reversed(levels[:-1]), strict=True):
             x = nn.functional.interpolate(x, scale_factor=2.0, mode="nearest")
             x = block(torch.cat([x, skip], 1))
-        out: Tensor = self.fine(self.answers(x))
+        out: Tensor = self.answers(x)
         return out
 
 
-class _Probabilities(nn.Module):  # type: ignore[misc]
-    def __init__(self, network: RoomNetwork) -> None:
+class _MeanAnswer(nn.Module):  # type: ignore[misc]
+    """Mean of the probabilities of networks, as blocks of 2 x 2 cells: as the package reads them."""
+
+    def __init__(self, networks: Sequence[RoomNetwork]) -> None:
         super().__init__()
-        self.network = network
+        self.networks = nn.ModuleList(networks)
 
     def forward(self, inputs: Tensor) -> Tensor:
-        return torch.sigmoid(self.network(inputs))
+        total: Tensor = sum(torch.sigmoid(network.blocks(inputs)) for network in self.networks)
+        return total / len(self.networks)
 
 
-def export_onnx(network: RoomNetwork, path: Path) -> None:
-    """Write the network as ONNX with its norms folded in; it answers with probabilities, at any size."""
-    model = _Probabilities(network).eval()
+def export_onnx(networks: Sequence[RoomNetwork], path: Path) -> None:
+    """Write networks as one ONNX file that gives the mean of their probabilities, at any size.
+
+    Norms are folded in, and weights are kept in 16 bits, which OpenCV reads as 32.
+    """
     axes = {"map": {2: "rows", 3: "columns"}, "answers": {2: "rows", 3: "columns"}}
     torch.onnx.export(
-        model,
+        _MeanAnswer(networks).eval(),
         (torch.zeros(1, INPUTS, 256, 256),),
         str(path),
         input_names=["map"],
@@ -79,3 +94,9 @@ def export_onnx(network: RoomNetwork, path: Path) -> None:
         opset_version=13,
         dynamo=False,
     )
+    model = onnx.load(str(path))
+    for tensor in model.graph.initializer:
+        values = onnx.numpy_helper.to_array(tensor)
+        if values.dtype == np.float32 and values.size >= HALVED_MIN_SIZE:
+            tensor.CopyFrom(onnx.numpy_helper.from_array(values.astype(np.float16), tensor.name))
+    onnx.save(model, str(path))

@@ -5,7 +5,8 @@
 
 OUT.pt is the checkpoint (weights, their running mean, the optimizer's state, steps and seconds done), written
 every few minutes; a run whose OUT.pt exists goes on from it until it has trained for that long all told.
-OUT.onnx holds the running mean of the weights.
+OUT.onnx answers with the running mean of the weights, and, where it began with a checkpoint, with that one
+too: it holds the mean of both answers.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import copy
 import os
 import sys
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
@@ -152,6 +153,7 @@ def main() -> None:
     optimizer = torch.optim.AdamW(network.parameters(), arguments.learning_rate, weight_decay=WEIGHT_DECAY)
     steps, before = 0, 0.0
     checkpoint = arguments.out.with_suffix(".pt")
+    begun_with = [_network_of(arguments.start)] if arguments.start else []
     mean = copy.deepcopy(network).eval()
     if checkpoint.exists():
         state = torch.load(checkpoint, map_location=device)
@@ -162,9 +164,8 @@ def main() -> None:
         if before >= arguments.seconds:
             return
     elif arguments.start:
-        state = torch.load(arguments.start, map_location=device)
-        network.load_state_dict(state["mean"])
-        mean.load_state_dict(state["mean"])
+        network.load_state_dict(begun_with[0].state_dict())
+        mean.load_state_dict(begun_with[0].state_dict())
     keep: Path | None = arguments.keep
     simulated, held_out = kept(
         keep and keep / "simulated.pkl", lambda: simulated_rasters(arguments.simulated, arguments.seed)
@@ -215,7 +216,27 @@ def main() -> None:
             told = ", ".join(f"{name} {value:.3f}" for name, value in seen.items())
             print(f"{now - start:6.0f} s {steps:6d} steps: loss {np.mean(losses):.3f}, {told}", flush=True)
             losses.clear()
+            # The network first: where there is a checkpoint, there is the network of it or of a later one.
+            write_network(checkpoint.with_suffix(".onnx"), [*begun_with, mean])
             _save(checkpoint, network, mean, optimizer, steps, now - start)
+
+
+def _network_of(checkpoint: Path) -> RoomNetwork:
+    """Mean network of a checkpoint."""
+    network = RoomNetwork()
+    network.load_state_dict(torch.load(checkpoint, map_location="cpu")["mean"])
+    network.eval()
+    return network
+
+
+def write_network(path: Path, networks: Sequence[RoomNetwork]) -> None:
+    """Write the mean answer of networks.
+
+    A network that was trained further on real maps errs elsewhere than the one that it began with, which saw
+    simulated maps only: together they are better than each.
+    """
+    with replacing(path) as part:
+        export_onnx([copy.deepcopy(network).cpu() for network in networks], part)
 
 
 def _save(
@@ -233,9 +254,6 @@ def _save(
         "steps": steps,
         "seconds": seconds,
     }
-    # The network first: where there is a checkpoint, there is the network that belongs to it or a later one.
-    with replacing(path.with_suffix(".onnx")) as part:
-        export_onnx(copy.deepcopy(mean).cpu(), part)
     with replacing(path) as part:
         torch.save(state, part)
 

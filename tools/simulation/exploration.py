@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation, label
 from skimage.graph import MCP_Geometric
 
+from rose2_logs.config.mapping import MappingParameters
+from rose2_logs.mapping.log_odds import MapBuilder
 from rose2_logs.model.occupancy import GridGeometry
 from simulation.building import Building, FloatArray
 from simulation.lidar import Lidar
-from simulation.mapper import LogOddsMapper, MapperSettings
 
 
 @dataclass(frozen=True)
@@ -123,7 +124,7 @@ class Planner:
         self._known = np.zeros(self._walkable.shape, bool)
         self._given_up = np.zeros(self._walkable.shape, bool)
 
-    def update(self, mapper: LogOddsMapper) -> None:
+    def update(self, mapper: MapBuilder) -> None:
         """Look up what the map knows by now."""
         todo = self._walkable & ~self._known
         self._known[todo] = mapper.known_at(self._centers[todo])
@@ -190,7 +191,7 @@ def explore(
     map_every_s: float = 15.0,
     lidar: Lidar | None = None,
     robot: RobotSettings | None = None,
-    mapping: MapperSettings | None = None,
+    mapping: MappingParameters | None = None,
     max_time_s: float = 7200.0,
 ) -> Iterator[ExplorationStep]:
     """Explore a building until no frontier is left.
@@ -215,7 +216,7 @@ def explore(
     """
     lidar, settings = lidar or Lidar(), robot or RobotSettings()
     rng = np.random.default_rng([seed, 1])
-    mapper, planner = LogOddsMapper(mapping), Planner(building, settings)
+    mapper, planner = MapBuilder(mapping), Planner(building, settings)
     body = _Robot(building.start_xy_m, settings, rng)
     poses: list[PoseSample] = []
     next_map_s = map_every_s
@@ -245,7 +246,7 @@ def explore(
     yield step(last=True)
 
 
-def _moves(planner: Planner, mapper: LogOddsMapper, body: _Robot) -> Iterator[tuple[float, float]]:
+def _moves(planner: Planner, mapper: MapBuilder, body: _Robot) -> Iterator[tuple[float, float]]:
     """Distances and turns, from scan to scan, that explore everything."""
     s = body.settings
     yield from _turn(2 * np.pi - 1e-6, s)

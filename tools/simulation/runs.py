@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from rose2_logs.config.mapping import MappingParameters
 from simulation.building import Building
 from simulation.exploration import ExplorationStep, RobotSettings, explore
 from simulation.lidar import Lidar
-from simulation.mapper import MapperSettings
 
 
-def random_equipment(seed: int) -> tuple[Lidar, RobotSettings, MapperSettings]:
+def random_equipment(seed: int) -> tuple[Lidar, RobotSettings, MappingParameters]:
     """A lidar, a robot, and a mapper as they come: old and new, exact and less exact."""
     rng = np.random.default_rng([seed, 2])
     beams, view_deg = [(181, 180.0), (361, 180.0), (541, 270.0), (361, 240.0)][int(rng.integers(4))]
@@ -29,7 +29,7 @@ def random_equipment(seed: int) -> tuple[Lidar, RobotSettings, MapperSettings]:
         pose_noise_rad=float(rng.uniform(0.001, 0.006)),
         greed=float(rng.uniform(0.0, 2.0)),
     )
-    return lidar, robot, MapperSettings(usable_range_m=float(rng.uniform(7.0, 12.0)))
+    return lidar, robot, MappingParameters(usable_range_m=float(rng.uniform(7.0, 12.0)))
 
 
 def thinned_run(building: Building, seed: int, *, maps: int) -> list[ExplorationStep]:

@@ -31,7 +31,8 @@ if TYPE_CHECKING:
 
 EXAMPLE = (
     "Example: [bold]rose2-logs analyze run.mcap -o results --workers 4[/bold]\n\n"
-    "A first look at a long log: [bold]rose2-logs analyze run.mcap -o look --max-snapshots 20[/bold]"
+    "A first look at a long log: [bold]rose2-logs analyze run.mcap -o look --max-snapshots 20[/bold]\n\n"
+    "A log of laser scans without maps: [bold]rose2-logs analyze run.bag -o results --map-from /scan[/bold]"
 )
 
 

@@ -21,7 +21,9 @@ EXAMPLE = "Example: [bold]rose2-logs info run.mcap[/bold]"
 def info(
     log: Annotated[
         str,
-        typer.Argument(metavar="LOG", help="MCAP, ROS 1 bag, ROS 2 bag, saved map, or folder of saved maps."),
+        typer.Argument(
+            metavar="LOG", help="MCAP, ROS 1 bag, ROS 2 bag, CARMEN log, saved map, or folder of saved maps."
+        ),
     ],
     parameters: Parameters,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON, for programs.")] = False,
@@ -63,7 +65,10 @@ def print_log_facts(facts: LogFacts) -> None:
         print_line(f"  last map  {_map_line(topic_facts.last)}")
         if topic_facts.coverage_first is not None:
             print_line(f"  coverage  {topic_facts.coverage_first:.1%} to 100%")
-    if not facts.maps:
+    if not facts.maps and facts.map_from:
+        scans = escape(printable(facts.map_from[0]))
+        print_line(f"no occupancy grids: analyze --map-from {scans} builds maps from its laser scans")
+    elif not facts.maps:
         print_line("no occupancy grids: analyze cannot use this log")
 
 

@@ -102,7 +102,7 @@ class AnnotatedMcap(Sink):
         self._info = info
         if self._source is None:
             self._opened_source = self._source = open_source(info.log_path)
-        self._log: CopiedLog = copied_log(self._source)
+        self._log: CopiedLog = copied_log(self._source.recorded)
         with self._writing():
             self._path.parent.mkdir(parents=True, exist_ok=True)
             self._file = self._part.open("wb")
@@ -141,13 +141,17 @@ class AnnotatedMcap(Sink):
         qos = map_metadata.get("offered_qos_profiles", "[]")
         self._qos = qos if qos.strip() not in ("", "[]") else LATCHED_QOS
         self._added = {topic: self._add_channel(topic, kind) for topic, kind in ADDED.items()}
-        self._own_map = None if log.channels() or log.profile != "ros2" else self._map_channel()
+        self._own_map = self._map_channel()
         self._writer.add_metadata(
             METADATA, {name: str(value) for name, value in (info.versions | info.provenance).items()}
         )
 
     def _map_channel(self) -> int | None:
-        return self._add_channel(self._info.topic, GRID_TYPE) if not self._has_messages() else None
+        """Add a channel for maps that the log does not contain: saved ones, and those built from scans."""
+        assert self._source is not None
+        is_built = self._source.recorded is not self._source
+        is_empty = not self._log.channels() and self._log.profile == "ros2" and not self._has_messages()
+        return self._add_channel(self._info.topic, GRID_TYPE) if is_built or is_empty else None
 
     def _has_messages(self) -> bool:
         self._waiting = next(self._items, None)

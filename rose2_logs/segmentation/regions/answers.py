@@ -13,6 +13,8 @@ from rose2_logs.segmentation.regions.plan_raster import OUTPUTS, PlanRaster, net
 
 STRIDE = 32
 """Inputs are padded to a multiple of this many cells, the coarsest step of the network."""
+BLOCK = 2
+"""The network answers for blocks of this many cells squared, one channel for each cell of a block."""
 ANSWER_STEPS = 1000
 """Answers are rounded to this many steps, so that they are the same whatever instructions a CPU has."""
 TILE_CELLS = 1536
@@ -51,7 +53,9 @@ class AnsweringNetwork:
         pad = ((top, rows - height - top), (left, columns - width - left))
         inputs = network_input(shares_of(np.pad(raster.wall, pad)), shares_of(np.pad(raster.free, pad)))
         self._network.setInput(np.ascontiguousarray(inputs[None]))
-        out = self._network.forward()[0][:, top : top + height, left : left + width]
+        blocks = self._network.forward()[0].reshape(OUTPUTS, BLOCK, BLOCK, rows // BLOCK, columns // BLOCK)
+        out = blocks.transpose(0, 3, 1, 4, 2).reshape(OUTPUTS, rows, columns)
+        out = out[:, top : top + height, left : left + width]
         rounded: NDArray[np.float32] = np.rint(out * ANSWER_STEPS).astype(np.float32) / np.float32(
             ANSWER_STEPS
         )

@@ -25,7 +25,7 @@ from rose2_logs.segmentation.regions.joining import Joins, Strength, join_region
 from rose2_logs.segmentation.regions.outside import edge_shares, rooms_of
 from rose2_logs.segmentation.regions.plan_frame import Labels, PlanFrame
 from rose2_logs.segmentation.regions.plan_raster import PlanRaster
-from rose2_logs.segmentation.regions.strengths import JoinStrength
+from rose2_logs.segmentation.regions.strengths import FittedStrength
 from rose2_logs.segmentation.rose.clean_map import attached_cells
 from rose2_logs.segmentation.rose.stage import StructureResult
 from rose2_logs.segmentation.walls.stage import WallResult, find_walls
@@ -138,7 +138,8 @@ class RegionTree:
         region = joins.regions(detail)
         regions, _ = self.graph.joined(region)
         edge_share = np.bincount(region, self.edge_share).astype(float)
-        room, outside = rooms_of(regions, edge_share, fitted.outside_trees(), self.parameters)
+        is_room = FittedStrength.of_rooms(fitted.outside_trees(), self.parameters)
+        room, outside = rooms_of(regions, edge_share, is_room, self.parameters)
         cells_of_atom = label_sizes(self.cells, len(region))[1:]
         outside_m2 = float(cells_of_atom[outside[region]].sum()) * self.resolution_m**2
         labels = room_labels(
@@ -206,7 +207,7 @@ def region_tree(
 ) -> RegionTree:
     """Judge the borders of atoms, to join these to rooms."""
     graph = atoms.graph(fitted.answering_network()(atoms.raster) if atoms.count else None)
-    strength = JoinStrength(fitted.join_trees(), parameters.answer_weight, parameters.answer_scale)
+    strength = FittedStrength.of_joins(fitted.join_trees(), parameters)
     return RegionTree(atoms.cells, free, resolution_m, graph, atoms.edge_shares(), strength, parameters)
 
 

@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from rose2_logs.config.regions import RegionParameters
 from rose2_logs.model.occupancy import FloatArray
-from rose2_logs.segmentation.regions.features import FEATURES, NO_ANSWER
+from rose2_logs.segmentation.regions.features import FEATURES, NO_ANSWER, REGION_FEATURES
 
-DIFFERENT = FEATURES.index("different")
+DIFFERENT, OUTSIDE = FEATURES.index("different"), REGION_FEATURES.index("outside")
 UNASKED_ANSWER = -0.5
 """What the answer counts for regions that touch nowhere: they are in different rooms."""
 
@@ -95,21 +96,38 @@ def read_trees(path: Path, names: tuple[str, ...] = FEATURES) -> BoostedTrees:
 
 
 @dataclass(frozen=True, eq=False)
-class JoinStrength:
-    """Log odds that two regions are one room: the trees' and the network's, weighed.
+class FittedStrength:
+    """Log odds from trees and from the network's mean answer, weighed.
 
     Attributes
     ----------
     trees : BoostedTrees, optional
+    answer : int
+        Feature that holds the mean of the network's answers, which speak against.
     answer_weight : float
         Weight of the network's log odds beside the trees' 1.
     answer_scale : float
         Log odds of the network per difference of its mean answer from one half.
+    margin : float
+        Subtracted from the log odds: how much surer than even odds they must be.
     """
 
     trees: BoostedTrees | None
+    answer: int
     answer_weight: float
     answer_scale: float
+    margin: float = 0.0
+
+    @classmethod
+    def of_joins(cls, trees: BoostedTrees | None, parameters: RegionParameters) -> FittedStrength:
+        """Log odds that two regions are one room, from `join_features`."""
+        weight, scale = parameters.answer_weight, parameters.answer_scale
+        return cls(trees, DIFFERENT, weight, scale, parameters.join_margin)
+
+    @classmethod
+    def of_rooms(cls, trees: BoostedTrees | None, parameters: RegionParameters) -> FittedStrength:
+        """Log odds that a region is a room and not outside, from `region_features`."""
+        return cls(trees, OUTSIDE, parameters.answer_weight, parameters.answer_scale)
 
     def __call__(self, features: FloatArray) -> FloatArray:
         """Strength (N,) for features (N, F)."""
@@ -118,8 +136,8 @@ class JoinStrength:
             total += self.trees(features)
             weight += 1.0
         if self.answer_weight:
-            mean = features[:, DIFFERENT]
+            mean = features[:, self.answer]
             answer = np.where(mean == NO_ANSWER, UNASKED_ANSWER, 0.5 - mean)
             total += self.answer_weight * self.answer_scale * answer
             weight += self.answer_weight
-        return np.rint(total / weight * STRENGTH_STEPS) / STRENGTH_STEPS
+        return np.rint((total / weight - self.margin) * STRENGTH_STEPS) / STRENGTH_STEPS

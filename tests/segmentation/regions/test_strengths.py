@@ -5,7 +5,7 @@ import pytest
 
 from rose2_logs.segmentation.regions import fitted
 from rose2_logs.segmentation.regions.features import FEATURES, NO_ANSWER, REGION_FEATURES
-from rose2_logs.segmentation.regions.strengths import DIFFERENT, BoostedTrees, JoinStrength, read_trees
+from rose2_logs.segmentation.regions.strengths import DIFFERENT, BoostedTrees, FittedStrength, read_trees
 
 NAMES = ("width", "height")
 
@@ -52,16 +52,16 @@ def features(*different):
 
 
 def test_strength_weighs_trees_and_answers():
-    answers_alone = JoinStrength(None, answer_weight=1.0, answer_scale=12.0)
+    answers_alone = FittedStrength(None, DIFFERENT, answer_weight=1.0, answer_scale=12.0)
     np.testing.assert_allclose(answers_alone(features(0.0, 1.0, NO_ANSWER)), [6.0, -6.0, -6.0])
-    both = JoinStrength(BoostedTrees.constant(3.0), answer_weight=0.5, answer_scale=12.0)
+    both = FittedStrength(BoostedTrees.constant(3.0), DIFFERENT, answer_weight=0.5, answer_scale=12.0)
     np.testing.assert_allclose(both(features(0.0, 1.0)), [4.0, 0.0])
-    trees_alone = JoinStrength(BoostedTrees.constant(3.0), answer_weight=0.0, answer_scale=12.0)
+    trees_alone = FittedStrength(BoostedTrees.constant(3.0), DIFFERENT, answer_weight=0.0, answer_scale=12.0)
     np.testing.assert_allclose(trees_alone(features(0.0, NO_ANSWER)), [3.0, 3.0])
 
 
 def test_strengths_that_differ_by_rounding_errors_are_equal():
-    strength = JoinStrength(None, answer_weight=1.0, answer_scale=12.0)
+    strength = FittedStrength(None, DIFFERENT, answer_weight=1.0, answer_scale=12.0)
     one, other = strength(features(0.3, np.nextafter(0.3, 1) + 1e-9))
     assert one == other
 

@@ -1,0 +1,1 @@
+"""Occupancy maps from laser scans whose poses are known."""
