@@ -5,8 +5,9 @@ import pytest
 from PIL import Image
 from reader_logs import SHARED, START_NS, Map, McapLog, serialized
 
+import rose2_logs as rl
 from rose2_logs.config.parameters import ReadingParameters
-from rose2_logs.errors import LogError, NoMapTopicError
+from rose2_logs.errors import LogError, NoMapTopicError, ParameterError
 from rose2_logs.io import open_log
 from rose2_logs.system.warnings import StrictError, collect_warnings
 
@@ -152,3 +153,15 @@ def test_a_channel_without_a_schema_is_named_and_read_by_the_type_that_is_given(
         open_log(path)
     limits = ReadingParameters(type_without_schema="nav_msgs/OccupancyGrid")
     assert read(path, limits=limits)[0] == [95]
+    with rl.open_log(path, message_type="nav_msgs/OccupancyGrid") as reader:
+        assert len(list(reader.snapshots())) == 1
+    with pytest.raises(ParameterError, match="message_type='nav_msgs/Odometry'"):
+        rl.open_log(path, message_type="nav_msgs/Odometry")
+
+
+def test_the_part_is_chosen_in_python_as_on_the_command_line(tmp_path):
+    path = log_of(tmp_path / "run.mcap", [seen(columns) for columns in (*GROWING, *GROWING[:4])])
+    with rl.open_log(path, part=2) as reader:
+        assert len(list(reader.snapshots())) == 4
+    with pytest.raises(ParameterError, match="part=0: it must be a whole number"):
+        rl.open_log(path, part=0)
