@@ -251,15 +251,15 @@ def segment(
     >>> rl.segment(grid, resolution_m=0.05).rooms
     RoomMap(2 rooms, 1 doorway, 200 x 120 cells of 0.05 m)
     """
+    used = with_detail(Parameters.from_any(parameters), detail, method)
     if isinstance(map_, OccupancySnapshot):
         snapshot = map_
     elif isinstance(map_, str | Path | bytes):
-        snapshot = read_map(map_, resolution_m)  # type: ignore[arg-type]
+        snapshot = _read_map(map_, resolution_m, used)  # type: ignore[arg-type]
     else:
         snapshot = _snapshot_of_array(map_, resolution_m)
     if not snapshot.cells.size:
         raise InvalidMapError("the map has no cells")
-    used = with_detail(Parameters.from_any(parameters), detail, method)
     return segment_snapshot(snapshot, used, method, name=snapshot.topic, voronoi=voronoi)
 
 
@@ -280,6 +280,8 @@ def open_log(
     log: str | Path | Sequence[str | Path],
     *,
     topic: str | None = None,
+    message_type: str | None = None,
+    part: int | None = None,
     map_from: str | None = None,
     map_frame: str | None = None,
     parameters: GivenParameters = None,
@@ -293,12 +295,17 @@ def open_log(
         An MCAP file, a ROS 1 bag, a ROS 2 bag, saved maps; or several files of one kind that are one log.
     topic : str, optional
         The map topic; by default ``/map``, else the only one.
+    message_type : str, optional
+        Type of the maps on channels without a schema.
+    part : int, optional
+        Which part of the maps, from 1, where they are not of one run; by default the one that tells most.
     map_from : str, optional
         Topic of laser scans to build the maps from, instead of reading recorded ones.
     map_frame : str, optional
         Frame of built maps; by default ``map``, else ``odom``.
     parameters : Parameters or mapping, optional
-        Those of ``reading`` say how much a log may claim, those of ``mapping`` how maps are built.
+        Those of ``reading`` say how much a log may claim, those of ``occupancy`` what the cells mean, those
+        of ``mapping`` how maps are built.
     **selection
         Fields of `Selection`: ``every_s``, ``min_change_m2``, ``max_snapshots`` and so on.
 
@@ -321,18 +328,21 @@ def open_log(
     """
     known = [each.name for each in dataclasses.fields(Selection)]
     _refuse_unknown(selection, known)
-    for name, value in (("topic", topic), ("map_from", map_from), ("map_frame", map_frame)):
+    names = {"topic": topic, "message_type": message_type, "part": part}
+    for name, value in (names | {"map_from": map_from, "map_frame": map_frame}).items():
         check_option(RunOptions, name, value)
-    given = Parameters.from_any(parameters)
+    used = Parameters.from_any(parameters)
     path = [_path(each, "log") for each in log] if isinstance(log, list | tuple) else _path(log, "log")
     return open_log_reader(
         path,
         topic=topic,
         selection=Selection(**selection),
-        limits=given.reading,
+        limits=used.reading.with_type(message_type),
+        occupancy=used.occupancy,
+        part=part,
         map_from=map_from,
         map_frame=map_frame,
-        mapping=given.mapping,
+        mapping=used.mapping,
     )
 
 
@@ -362,8 +372,12 @@ def read_map(map_file: str | Path, resolution_m: float | None = None) -> Occupan
     ...     rl.read_map(f"{folder}/plan.png", resolution_m=0.05)
     OccupancySnapshot(index=0, topic='/map', 200 x 120 cells of 0.05 m)
     """
+    return _read_map(map_file, resolution_m, Parameters())
+
+
+def _read_map(map_file: str | Path, resolution_m: float | None, parameters: Parameters) -> OccupancySnapshot:
     _check_resolution(resolution_m)
-    return read_static_map(_path(map_file, "map_file"), resolution_m)
+    return read_static_map(_path(map_file, "map_file"), resolution_m, parameters)
 
 
 def load(folder: str | Path) -> Run:

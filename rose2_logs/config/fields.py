@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import numbers
+from collections.abc import Mapping
 from dataclasses import field
 from typing import Any, ClassVar
 
@@ -79,6 +80,8 @@ class ParameterBlock:
         Name of the block, as in a configuration file.
     ascending : tuple of tuple of str
         Groups of parameters whose values must not fall from one to the next.
+    implied : mapping of str to mapping
+        What naming a parameter decides of others that are not named with it.
 
     Raises
     ------
@@ -88,6 +91,7 @@ class ParameterBlock:
 
     block: ClassVar[str]
     ascending: ClassVar[tuple[tuple[str, ...], ...]] = ()
+    implied: ClassVar[Mapping[str, Mapping[str, Any]]] = {}
 
     def __post_init__(self) -> None:
         for declared in dataclasses.fields(self):  # type: ignore[arg-type]

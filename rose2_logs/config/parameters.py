@@ -11,9 +11,9 @@ import difflib
 import math
 import tomllib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 from rose2_logs.config.baselines import (
     DistanceParameters,
@@ -28,6 +28,13 @@ from rose2_logs.config.regions import RegionParameters
 from rose2_logs.config.tracking import QualityParameters, TrackingParameters
 from rose2_logs.errors import ParameterError
 from rose2_logs.system.files import reason_of
+
+CELL_VALUES = ("auto", "stored", "percent", "zero_one", "fifty_unknown", "costs")
+"""How the numbers in the cells of maps can be read."""
+
+
+NO_TYPE = "none"
+TYPES_WITHOUT_SCHEMA = (NO_TYPE, "nav_msgs/OccupancyGrid", "nav2_msgs/Costmap", "foxglove_msgs/Grid")
 
 
 @dataclass(frozen=True, repr=False)
@@ -53,15 +60,41 @@ class ReadingParameters(ParameterBlock):
     map_max_messages: int = number(
         2_000_000, "messages", "Most map messages in a log: one per second for 23 days.", 1, 10**12
     )
+    type_without_schema: str = choice(
+        NO_TYPE,
+        TYPES_WITHOUT_SCHEMA,
+        "Type of the messages on channels that have no schema: such a log does not say it itself.",
+    )
+
+    def with_type(self, name: str | None) -> Self:
+        """Return these with the type of channels without a schema that was named, if one was."""
+        return self if name is None else replace(self, type_without_schema=name)
 
 
 @dataclass(frozen=True, repr=False)
 class OccupancyParameters(ParameterBlock):
-    """Which cells count as occupied and which as free."""
+    """Which cells count as occupied and which as free.
+
+    Attributes
+    ----------
+    implied : mapping
+        Thresholds that are named apply to the numbers as they are stored.
+    """
 
     block: ClassVar[str] = "occupancy"
     ascending: ClassVar[tuple[tuple[str, ...], ...]] = (("free_max_percent", "occupied_min_percent"),)
+    implied: ClassVar[Mapping[str, Mapping[str, Any]]] = {
+        "free_max_percent": {"values": "percent"},
+        "occupied_min_percent": {"values": "percent"},
+    }
 
+    values: str = choice(
+        "auto",
+        CELL_VALUES,
+        "What the numbers in cells mean: auto decides it from the maps and tells where it is not the usual; "
+        "stored takes percent, saved maps by their own thresholds; percent takes the thresholds below, also "
+        "for saved maps, and so does naming one of these.",
+    )
     occupied_min_percent: float = number(
         65.0, "%", "Cells above are occupied; map_server's default occupied_thresh.", 0, 100
     )
@@ -78,6 +111,11 @@ class OccupancyParameters(ParameterBlock):
         10_000,
         2**40,
     )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.values == "auto" and not self.implied.keys().isdisjoint(self.changed()):
+            object.__setattr__(self, "values", "percent")
 
 
 @dataclass(frozen=True, repr=False)
@@ -482,7 +520,13 @@ def _replaced_block(block_name: str, block: Any, values: Mapping[str, Any]) -> A
             full_name = f"{block_name}.{name}"
             hint = _meant(full_name) or f"there are: {', '.join(names)}"
             raise ParameterError(f"no parameter {full_name}; {hint}")
-    return dataclasses.replace(block, **values)
+    implied = {
+        other: value
+        for name in values
+        for other, value in block.implied.get(name, {}).items()
+        if other not in block.changed()
+    }
+    return dataclasses.replace(block, **(implied | dict(values)))
 
 
 def _meant(name: str) -> str:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from rose2_logs.config.baselines import METHODS
 from rose2_logs.config.fields import changed_text
-from rose2_logs.config.parameters import Parameters
+from rose2_logs.config.parameters import TYPES_WITHOUT_SCHEMA, Parameters, ReadingParameters
 from rose2_logs.config.regions import DETAIL_MOST
 from rose2_logs.errors import ParameterError
 
@@ -227,6 +227,28 @@ class RunOptions:
         metavar="NAME",
         decides=True,
     )
+    message_type: str | None = option(
+        None,
+        "Type of the maps on channels without a schema, which do not say it themselves: "
+        f"{', '.join(TYPES_WITHOUT_SCHEMA[1:])}.",
+        panel=MAPS,
+        commands=BOTH,
+        flag="--type",
+        metavar="NAME",
+        choices=TYPES_WITHOUT_SCHEMA[1:],
+        decides=True,
+    )
+    part: int | None = option(
+        None,
+        "Which part of the maps, from 1, where they are not of one run: where two nodes publish on the "
+        "topic, or the map was begun anew. By default the one that tells most.",
+        panel=MAPS,
+        commands=BOTH,
+        metavar="N",
+        low=1,
+        high=1e6,
+        decides=True,
+    )
     map_from: str | None = option(
         None,
         "Topic of laser scans (LaserScan or MultiEchoLaserScan): build the maps from these and the log's "
@@ -299,6 +321,14 @@ class RunOptions:
         metavar="N",
         low=1,
         decides=True,
+    )
+    base_frame: str | None = option(
+        None,
+        "Frame of the robot's base, whose way the recording shows. By default base_link, base_footprint or "
+        "the like, or the only frame below odom.",
+        panel=OUTPUTS,
+        commands=BOTH,
+        metavar="NAME",
     )
     method: str = option(
         "rose2",
@@ -416,6 +446,11 @@ class RunOptions:
             )
         if self.start_s is not None and self.end_s is not None and self.start_s > self.end_s:
             raise ParameterError(f"start_s={self.start_s:g}: it lies after end_s={self.end_s:g}")
+
+    @property
+    def reading(self) -> ReadingParameters:
+        """Parameters of reading, with the type that was named."""
+        return self.parameters.reading.with_type(self.message_type)
 
     @property
     def selection(self) -> Selection:

@@ -103,8 +103,23 @@ LARGEST_BYTES = 1 << 22
 """Descriptions take a few kilobytes; those of bags with thousands of files take a megabyte."""
 
 
-def load_yaml(path: Path) -> dict[str, Any]:
+def load_strings(path: Path) -> dict[str, Any]:
+    """Read a mapping from a YAML file as `load_yaml` does, with every value as the text that stands there.
+
+    YAML 1.1 and 1.2 differ in what is a number; who reads one says what counts.
+    """
+    return load_yaml(path, typed=False)
+
+
+def load_yaml(path: Path, *, typed: bool = True) -> dict[str, Any]:
     """Read a mapping from a YAML file.
+
+    Parameters
+    ----------
+    path : path
+        The file.
+    typed : bool
+        Whether values are numbers, dates and so on where they look like it, and not all text.
 
     Raises
     ------
@@ -119,8 +134,9 @@ def load_yaml(path: Path) -> dict[str, Any]:
         if path.stat().st_size > LARGEST_BYTES:
             raise LogError(f"{path}: is too large to describe a map or a bag", file=path)
         # The loader in C where available: the one in Python takes quadratic time for deep nesting.
-        loader = yaml.CSafeLoader if yaml.__with_libyaml__ else yaml.SafeLoader
-        described = yaml.load(path.read_text(encoding="utf-8"), loader)  # noqa: S506 (both are safe)
+        names = ("CSafeLoader", "CBaseLoader") if yaml.__with_libyaml__ else ("SafeLoader", "BaseLoader")
+        loader = getattr(yaml, names[0] if typed else names[1])
+        described = yaml.load(path.read_text(encoding="utf-8"), loader)  # noqa: S506 (all are safe)
     except (OSError, UnicodeDecodeError) as error:
         raise LogError(f"{path}: cannot be read: {reason_of(error)}", file=path) from error
     # RecursionError: endless nesting. ValueError: numbers and dates that Python does not accept.

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import logging
+from bisect import bisect_left
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
+from statistics import median_low
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,6 +20,7 @@ from rose2_logs.io.grids import Decoder, Grid, Patch
 from rose2_logs.io.log_file import LogFile, Place
 from rose2_logs.io.messages import decoder
 from rose2_logs.io.source import LoggedBytes, LoggedMap, LogInfo, MessageSource, TopicInfo
+from rose2_logs.system.text import apart
 from rose2_logs.system.warnings import log_warning
 
 logger = logging.getLogger(__name__)
@@ -24,7 +29,80 @@ CLOCK_SET_BACK_NS = 10**9
 """Recorders with several threads write messages out of order by milliseconds; if the log time goes back by
 more than this, the recorder's clock was set back."""
 
+LONGEST_RUN_NS = 366 * 86400 * 10**9
+"""No robot is on the way for a year; a clock that is set after the start makes a log last for decades."""
 OpenFile = Callable[[Path, ReadingParameters], LogFile]
+
+
+class Timed(NamedTuple):
+    """A message in the order of reading: log time, continued where the clock jumps, file and place."""
+
+    time_ns: int
+    file: int
+    place: Place
+
+
+class Clock:
+    """The log time of a file's messages in their order, continued where its clock was set.
+
+    Parameters
+    ----------
+    delays_ns : sequence of int
+        How much later than written the messages are taken before the first jump, after it, and so on.
+    """
+
+    def __init__(self, delays_ns: Sequence[int]) -> None:
+        self._delays_ns = delays_ns
+        self._latest_ns: int | None = None
+        self._part = 0
+
+    def continued(self, time_ns: int) -> int:
+        """Take the time of the next message; return the one that goes on from the ones before."""
+        if not self._delays_ns:
+            return time_ns
+        self._jumps_at(time_ns)
+        return time_ns + self._delays_ns[min(self._part, len(self._delays_ns) - 1)]
+
+    def jumps(self, times_ns: Sequence[int]) -> list[int]:
+        """Return which of the messages, in the order of the file, are the first after a jump."""
+        return [k for k, time_ns in enumerate(times_ns) if self._jumps_at(time_ns)]
+
+    def _jumps_at(self, time_ns: int) -> bool:
+        latest_ns = self._latest_ns
+        has_jumped = latest_ns is not None and not (
+            latest_ns - CLOCK_SET_BACK_NS <= time_ns <= latest_ns + LONGEST_RUN_NS
+        )
+        self._part += has_jumped
+        self._latest_ns = time_ns if latest_ns is None or has_jumped else max(latest_ns, time_ns)
+        return has_jumped
+
+
+def delays_of(times_ns: Sequence[int], jumps: Sequence[int]) -> list[int]:
+    """Find how much later messages must be, part by part, for the time to go on where the clock jumps.
+
+    After a jump the time goes on by the usual step. What was recorded before a clock was set forward, as of a
+    computer that starts in 1970, is moved; what was recorded after one was set back is moved, too.
+
+    Parameters
+    ----------
+    times_ns : sequence of int
+        Log times in the order of the file.
+    jumps : sequence of int
+        The first message after each jump.
+    """
+    steps = [
+        later - earlier
+        for k, (earlier, later) in enumerate(pairwise(times_ns), start=1)
+        if k not in jumps and later > earlier
+    ]
+    step_ns = int(median_low(steps)) if steps else CLOCK_SET_BACK_NS
+    delays, forward_ns, begin = [0], 0, 0
+    for jump in jumps:
+        change_ns = max(times_ns[begin:jump]) + step_ns - times_ns[jump]
+        forward_ns += max(-change_ns, 0)
+        delays.append(delays[-1] + change_ns)
+        begin = jump
+    return [delay + forward_ns for delay in delays]
 
 
 class FileLog(MessageSource):
@@ -68,21 +146,22 @@ class FileLog(MessageSource):
         self._on_close = on_close
         self._limits = limits
         self._decoders: dict[tuple[int, int], Decoder] = {}
-        # By topic: sorted places with the number of their file; filled when a topic is first read.
-        self._places: dict[str, list[tuple[Place, int]]] = {}
+        # By topic, sorted; filled when a topic is first read.
+        self._places: dict[str, list[Timed]] = {}
+        # By file: how much later its log times are taken from each place on where they jump.
+        self._delays: dict[int, list[int]] = {}
         try:
             self._open(files, open_file)
         except BaseException:
             self.close()
             raise
-        starts = [file.start_ns for file in self._files if file.start_ns is not None]
-        ends = [file.end_ns for file in self._files if file.end_ns is not None]
+        start_ns, end_ns = self._extent(path)
         self.info = LogInfo(
             path,
             format_name,
             sum(file.stat().st_size for file in files) if size_bytes is None else size_bytes,
-            min(starts, default=None),
-            max(ends, default=None),
+            start_ns,
+            end_ns,
             self._topics(),
             all(file.indexed for file in self._files),
             len(self._files) == len(files) and all(file.whole for file in self._files),
@@ -114,9 +193,34 @@ class FileLog(MessageSource):
         self._on_close()
         self._on_close = lambda: None
 
+    def _extent(self, path: Path) -> tuple[int | None, int | None]:
+        """Log times of the first and the last message; of the maps if these are too far apart for one run."""
+        start_ns = min((each.start_ns for each in self._files if each.start_ns is not None), default=None)
+        end_ns = max((each.end_ns for each in self._files if each.end_ns is not None), default=None)
+        if start_ns is None or end_ns is None or end_ns - start_ns <= LONGEST_RUN_NS:
+            return start_ns, end_ns
+        topics = {each.topic for file in self._files for each in file.channels.values() if each.is_wanted}
+        times = [each.time_ns for topic in sorted(topics) for each in self._topic_places(topic)]
+        if not times:
+            return start_ns, end_ns
+        text = (
+            f"{path}: its log times are {apart(end_ns - start_ns)} apart: the clock was set while it was "
+            "recorded; it is taken to last from its first map to its last"
+        )
+        log_warning(logger, "clock_apart", text, file=path)
+        return min(times), max(times)
+
     def log_times(self, topic: str) -> Times:
         """Log times of all map messages and patches of `topic`, nanoseconds, sorted."""
-        return np.array([place.log_time_ns for place, _ in self._topic_places(topic)], np.int64)
+        return np.array([each.time_ns for each in self._topic_places(topic)], np.int64)
+
+    def recorded_ns(self, time_ns: int) -> int:
+        """Return the log time that stands in the file."""
+        for places in self._places.values() if self._delays else ():
+            at = bisect_left(places, time_ns, key=lambda each: each.time_ns)
+            if at < len(places) and places[at].time_ns == time_ns:
+                return places[at].place.log_time_ns
+        return time_ns
 
     def read(self, topics: Sequence[str], times: Times) -> Iterator[LoggedMap]:
         """Yield the messages of `topics` logged at `times` (sorted, distinct), in log time order."""
@@ -124,23 +228,24 @@ class FileLog(MessageSource):
         for topic in topics:
             places = self._topic_places(topic)
             for k in np.flatnonzero(np.isin(self.log_times(topic), times)):
-                place, number = places[k]
-                chosen.append((place.log_time_ns, number, place, topic, int(k) + 1))
+                chosen.append((*places[k], topic, int(k) + 1))
         for time, number, place, topic, index in sorted(chosen, key=lambda found: found[:3]):
             decode = partial(self._decode, number, place)
             yield LoggedMap(time, topic, index, self._files[number].path, decode)
 
     def stream(self, topics: Sequence[str]) -> Iterator[LoggedBytes]:
         """Yield all messages of `topics` one at a time, roughly in log time order."""
-        for file in sorted(self._files, key=lambda each: each.start_ns or 0):
+        for number, file in sorted(enumerate(self._files), key=lambda each: each[1].start_ns or 0):
             wanted = [each.id for each in file.channels.values() if each.topic in topics]
+            clock = Clock(self._delays.get(number, []))
             for message in file.messages(wanted) if wanted else ():
                 channel = message.channel
                 is_cdr = channel.message_encoding == "cdr"
                 read = partial(file.decompressed if is_cdr else memoryview, message.data)
-                yield LoggedBytes(message.log_time_ns, channel.topic, channel.message_encoding, read)
+                time_ns = clock.continued(message.log_time_ns)
+                yield LoggedBytes(time_ns, channel.topic, channel.message_encoding, read)
 
-    def _topic_places(self, topic: str) -> list[tuple[Place, int]]:
+    def _topic_places(self, topic: str) -> list[Timed]:
         if topic not in self._places:
             found = []
             for number, file in enumerate(self._files):
@@ -153,27 +258,32 @@ class FileLog(MessageSource):
                         )
                         log_warning(logger, "type_changes", text, file=file.path, topic=topic)
                 places = file.places([channel.id for channel in channels if channel.is_wanted])
-                self._look_at_clock(file, topic, places)
-                found += [(place, number) for place in places]
-            self._places[topic] = sorted(found, key=lambda each: (each[0].log_time_ns, each[1], each[0]))
+                found += [Timed(time, number, place) for time, place in self._timed(number, topic, places)]
+            self._places[topic] = sorted(found)
         return self._places[topic]
 
-    def _look_at_clock(self, file: LogFile, topic: str, places: list[Place]) -> None:
-        """Warn where the log time of a topic goes backwards in the file."""
-        order = np.array([place[1:3] for place in places], np.int64).reshape(-1, 2)
+    def _timed(self, number: int, topic: str, places: list[Place]) -> list[tuple[int, Place]]:
+        """Log times of a topic's messages in a file, continued where its clock jumps."""
+        file = self._files[number]
         times = np.array([place.log_time_ns for place in places], np.int64)
-        along_file = times[np.lexsort((order[:, 1], order[:, 0]))]
         if len(times) > 1 and times[0] == times[-1]:
             text = f"{file.path}: all {len(times)} messages on {topic} have the log time {times[0]} ns"
             log_warning(logger, "clock_stands", text, file=file.path, topic=topic)
-        back = np.flatnonzero(np.diff(along_file) < -CLOCK_SET_BACK_NS)
-        for k in back:
-            seconds = (int(along_file[k]) - int(along_file[k + 1])) / 1e9
+        along_file = sorted(places, key=lambda place: place[1:3])
+        written = [place.log_time_ns for place in along_file]
+        jumps = Clock([]).jumps(written)
+        if jumps and number not in self._delays:
+            self._delays[number] = delays_of(written, jumps)
+        clock = Clock(self._delays.get(number, []))
+        for k in jumps:
+            before, after = written[k - 1], written[k]
+            kind, way = ("clock_set_back", "back") if after < before else ("clock_set_forward", "forward")
             text = (
-                f"{file.path}: the log time on {topic} goes back by {seconds:.1f} s at message {k + 2} of "
-                "the file; messages are read in log time order"
+                f"{file.path}: the log time on {topic} goes {way} by {apart(abs(after - before))} at message "
+                f"{k + 1} of the file; messages are read in the order of the file, with log times that go on"
             )
-            log_warning(logger, "clock_set_back", text, file=file.path, topic=topic, index=int(k) + 2)
+            log_warning(logger, kind, text, file=file.path, topic=topic, index=k + 1)
+        return [(clock.continued(time), place) for time, place in zip(written, along_file, strict=True)]
 
     def _decode(self, number: int, place: Place) -> Grid | Patch | None:
         file = self._files[number]

@@ -1,8 +1,10 @@
-"""Occupancy from ``foxglove.Grid`` protobuf messages, decoded by the schema stored in the log."""
+"""Occupancy from ``foxglove.Grid`` messages: of protobuf, decoded by the schema in the log, and of others."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -19,12 +21,14 @@ from rose2_logs.io.grids import (
     MapWarning,
     check_cells,
     make_grid,
-    percent,
 )
 from rose2_logs.model.occupancy import UNKNOWN
 
 # foxglove.PackedElementField.NumericType
 _NUMERIC_TYPES = {1: "u1", 2: "i1", 3: "<u2", 4: "<i2", 5: "<u4", 6: "<i4", 7: "<f4", 8: "<f8"}
+NUMERIC_NAMES = (
+    "UNKNOWN", "UINT8", "INT8", "UINT16", "INT16", "UINT32", "INT32", "FLOAT32", "FLOAT64",
+)  # fmt: skip
 _OCCUPANCY_FIELD = "occupancy"
 
 
@@ -62,7 +66,7 @@ def grid_decoder(schema: bytes, most_cells: int = MOST_CELLS) -> Decoder:
 
     def decode(data: memoryview) -> Grid | None:
         try:
-            return _grid(message_class.FromString(bytes(data)), most_cells)
+            return grid_of(_packed(message_class.FromString(bytes(data))), most_cells)
         except DecodeError as error:
             raise InvalidMapError(f"it cannot be decoded as {FOXGLOVE_GRID_TYPE}: {error}") from error
         except (AttributeError, TypeError, ValueError, OverflowError) as error:
@@ -81,25 +85,82 @@ def _add_with_imports(pool: Any, files: dict[str, Any], name: str) -> None:
         pool.Add(file)
 
 
-def _grid(message: Any, most_cells: int) -> Grid | None:
-    map_warnings: list[MapWarning] = []
-    if len(message.frame_id) > LONGEST_NAME_BYTES:
-        raise InvalidMapError(f"its frame_id is longer than {LONGEST_NAME_BYTES} bytes")
-    # NaN never equals anything; GridGeometry reports it below.
-    if message.cell_size.x != message.cell_size.y and not math.isnan(message.cell_size.x):
-        raise InvalidMapError(
-            f"its cells are {message.cell_size.x} x {message.cell_size.y} m; only square cells are supported"
-        )
+@dataclass(frozen=True)
+class PackedField:
+    """A channel of a packed grid: its name, its offset in a cell, and the number of its numeric type."""
+
+    name: str
+    offset: int
+    type: int
+
+
+@dataclass(frozen=True, eq=False)
+class PackedGrid:
+    """A ``foxglove.Grid`` of any encoding.
+
+    Attributes
+    ----------
+    stamp_ns : int
+    frame_id : str
+    pose : tuple of float
+        Position x, y, z and quaternion x, y, z, w.
+    column_count : int
+    cell_size : (float, float)
+        Sides of a cell along x and y, meters.
+    row_stride, cell_stride : int
+        Bytes from a row, and from a cell, to the next.
+    fields : tuple of PackedField
+    data : bytes
+        The cells.
+    """
+
+    stamp_ns: int
+    frame_id: str
+    pose: tuple[float, ...]
+    column_count: int
+    cell_size: tuple[float, float]
+    row_stride: int
+    cell_stride: int
+    fields: tuple[PackedField, ...]
+    data: bytes | memoryview
+
+
+def _packed(message: Any) -> PackedGrid:
     position, turn = message.pose.position, message.pose.orientation
-    pose = (position.x, position.y, position.z, turn.x, turn.y, turn.z, turn.w)
-    stamp_ns = message.timestamp.seconds * 10**9 + message.timestamp.nanos
-    values = _channel(message)
+    return PackedGrid(
+        message.timestamp.seconds * 10**9 + message.timestamp.nanos,
+        message.frame_id,
+        (position.x, position.y, position.z, turn.x, turn.y, turn.z, turn.w),
+        message.column_count,
+        (message.cell_size.x, message.cell_size.y),
+        message.row_stride,
+        message.cell_stride,
+        tuple(PackedField(field.name, field.offset, field.type) for field in message.fields),
+        message.data,
+    )
+
+
+def grid_of(packed: PackedGrid, most_cells: int, map_warnings: Sequence[MapWarning] = ()) -> Grid | None:
+    """Return the map in a packed grid; None if it has no cells.
+
+    Raises
+    ------
+    InvalidMapError
+        If it is no occupancy grid, or inconsistent.
+    """
+    if len(packed.frame_id) > LONGEST_NAME_BYTES:
+        raise InvalidMapError(f"its frame_id is longer than {LONGEST_NAME_BYTES} bytes")
+    side_m, other_m = packed.cell_size
+    # NaN never equals anything; GridGeometry reports it below.
+    if side_m != other_m and not math.isnan(side_m):
+        raise InvalidMapError(f"its cells are {side_m} x {other_m} m; only square cells are supported")
+    values = _channel(packed)
     check_cells(values.shape[0], values.shape[1], most_cells)
-    cells = _occupancy(values, map_warnings)
-    return make_grid(stamp_ns, message.frame_id, message.cell_size.x, pose, cells, map_warnings)
+    cells = _occupancy(values)
+    return make_grid(packed.stamp_ns, packed.frame_id, side_m, packed.pose, cells, list(map_warnings))
 
 
-def _channel(message: Any) -> NDArray[Any]:
+def _channel(message: PackedGrid) -> NDArray[Any]:
     """View of the occupancy channel (H, W) in the packed cells."""
     fields = {field.name: field for field in message.fields}
     if len(fields) > 1:
@@ -128,7 +189,7 @@ def _channel(message: Any) -> NDArray[Any]:
     return np.ndarray((rows, columns), dtype, data, field.offset, (message.row_stride, cell))
 
 
-def _occupancy(values: NDArray[Any], map_warnings: list[MapWarning]) -> Cells:
+def _occupancy(values: NDArray[Any]) -> Cells:
     if values.dtype.kind == "f":
         if values.size and np.nanmax(values, initial=0) > 1:
             raise InvalidMapError(
@@ -137,6 +198,6 @@ def _occupancy(values: NDArray[Any], map_warnings: list[MapWarning]) -> Cells:
         known = values >= 0
         return np.where(known, np.round(np.where(known, values, 0) * 100), UNKNOWN).astype(np.int8)
     if values.dtype.itemsize == 1:
-        return percent(np.ascontiguousarray(values).view(np.int8), map_warnings)
+        return np.ascontiguousarray(values).view(np.int8)
     known = (values >= 0) & (values <= 100)
     return np.where(known, values, UNKNOWN).astype(np.int8)

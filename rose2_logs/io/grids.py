@@ -42,7 +42,7 @@ class MapWarning(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """A whole map: stamp in nanoseconds, geometry, cells (H, W) int8 in {-1, 0..100}, and warnings."""
+    """A whole map: stamp in nanoseconds, geometry, cells (H, W) int8 as they are stored, and warnings."""
 
     stamp_ns: int
     geometry: GridGeometry

@@ -6,17 +6,23 @@ import dataclasses
 import logging
 from collections import deque
 from collections.abc import Iterator
+from contextlib import suppress
+from functools import cached_property
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
+from rose2_logs.config.parameters import OccupancyParameters
 from rose2_logs.config.selection import Selection, Times
 from rose2_logs.errors import InvalidMapError, LogError, NoMapTopicError
-from rose2_logs.io.grids import MapWarning, Patch
+from rose2_logs.io.cell_values import MAPS_LOOKED_AT, OVERRULED, CellReading, count_values, decide, read_as
+from rose2_logs.io.grids import Grid, MapWarning, Patch
 from rose2_logs.io.map_stream import MapChecks, MapStream, ReadCounts
 from rose2_logs.io.messages import is_patch_type
+from rose2_logs.io.parts import MapFacts, Part, Parts, facts_of, find_parts, find_saved_parts
 from rose2_logs.io.poses import RobotPath
+from rose2_logs.io.saved_maps import MapFilesSource
 from rose2_logs.io.scan_topics import mappable_topics
 from rose2_logs.io.source import DamagedMessageError, LoggedMap, LogInfo, MessageSource, TopicInfo
 from rose2_logs.model.occupancy import OccupancySnapshot
@@ -30,6 +36,7 @@ logger = logging.getLogger(__name__)
 PREFERRED_TOPIC = "map"
 # Patches are published on the map's topic with this suffix: the convention of costmap_2d and nav2.
 PATCH_SUFFIX = "_updates"
+USUAL = OccupancyParameters()
 # Number of message types named in the error about a log without maps, so that it stays one readable line.
 MOST_LISTED = 6
 
@@ -56,13 +63,32 @@ class LogReader:
     /map 10 40
     """
 
-    def __init__(self, source: MessageSource, topic: str | None, selection: Selection) -> None:
+    def __init__(
+        self,
+        source: MessageSource,
+        topic: str | None,
+        selection: Selection,
+        occupancy: OccupancyParameters = USUAL,
+        part: int | None = None,
+    ) -> None:
         self.info = source.info
         self.topic = choose_topic(source.info, topic)
+        others = [
+            each.name
+            for each in source.info.topics
+            if each.is_map and each.message_count != 0 and each.name != self.topic
+        ]
+        if topic is None and others:
+            held = f"{', '.join(others)} {'holds' if len(others) == 1 else 'hold'} maps, too"
+            text = f"{source.info.path}: {self.topic} is read; {held}; topic={others[0]!r} chooses another"
+            log_warning(logger, "topic", text, file=source.info.path, topic=self.topic)
         self.counts = ReadCounts()
         self.source = source
         self._selection = selection.since(source.info.start_ns)
+        self._occupancy = occupancy
+        self._asked_part = part
         self._first_failure: str | None = None
+        self._path_origin: str | None = None
         self._topics = [self.topic] + [
             item.name
             for item in self.info.topics
@@ -83,6 +109,40 @@ class LogReader:
     def close(self) -> None:
         """Release the log's files."""
         self.source.close()
+
+    @cached_property
+    def cell_reading(self) -> CellReading:
+        """What the numbers in the cells mean: decided once for the whole log, whatever is selected of it."""
+        if self._occupancy.values != "auto":
+            return read_as(self._occupancy)
+        counts = count_values(np.zeros((0, 0), np.int8))
+        times = [np.unique(self.source.log_times(topic)) for topic in self._topics]
+        spread = [
+            each[np.linspace(0, len(each) - 1, MAPS_LOOKED_AT).round().astype(int)]
+            for each in times
+            if len(each)
+        ]
+        for message in self.source.read(
+            self._topics, np.unique(np.concatenate([[], *spread]).astype(np.int64))
+        ):
+            with suppress(LogError):  # it is told of where the map is needed
+                if (decoded := message.decode()) is not None:
+                    counts += count_values(decoded.cells)
+        found = decide(counts)
+        if found.why:
+            text = f"{self.info.path}: {self.topic}: {found.why}; {OVERRULED}"
+            log_warning(logger, "values", text, file=self.info.path, topic=self.topic)
+        return found
+
+    @property
+    def decided(self) -> dict[str, Any]:
+        """What was decided about how the log is read, as JSON values for the summary."""
+        decided: dict[str, Any] = {"values": self.source.value_reading or self.cell_reading.as_json()}
+        if self._path_origin is not None:
+            decided["path"] = self._path_origin
+        if self._part is not None:
+            decided["part"] = self._part[1]
+        return decided
 
     def snapshots(self) -> Iterator[OccupancySnapshot]:
         """Yield the selected maps in log time order.
@@ -138,15 +198,23 @@ class LogReader:
                 return dataclasses.replace(latest[0], index=-1)
         raise self._no_map(counts)
 
-    def robot_path(self, frame_id: str) -> RobotPath:
+    def robot_path(self, frame_id: str, base_frame: str | None = None) -> RobotPath:
         """Return the robot's path over the selected time range.
 
         Parameters
         ----------
         frame_id : str
             Frame of the map; the poses are given in it.
+        base_frame : str, optional
+            Frame of the robot's base, where it is none of the usual ones.
         """
-        return RobotPath(self.source, frame_id, self._selection.start_ns)
+        start_ns = self._selection.start_ns
+        if self._part is not None and self._part[1]["number"] > 1:
+            start_ns = max(start_ns or 0, int(self._part[0].times[0]))
+        map_topic = self.source.made_from(self.topic)
+        path = RobotPath(self.source, frame_id, start_ns, map_topic=map_topic, base_frame=base_frame)
+        self._path_origin = path.origin
+        return path
 
     def _read(
         self, chosen: Times, counts: ReadCounts, min_change_m2: float | None = None, *, warn: bool = False
@@ -155,6 +223,7 @@ class LogReader:
         wanted = set(chosen.tolist())
         stream = MapStream(self.topic, counts, min_change_m2)
         map_checks = MapChecks()
+        reading = self.cell_reading
         for message in self.source.read(self._topics, self._needed(chosen)):
             is_wanted = message.log_time_ns in wanted
             map_warnings: tuple[MapWarning, ...] = ()
@@ -165,6 +234,7 @@ class LogReader:
                         MapWarning("patch_without_map", "a patch with no map before it; skipped"),
                     )
                 else:
+                    decoded = None if decoded is None else reading.of(decoded)
                     map_warnings = map_checks.of(decoded, message.log_time_ns)
                 stream.apply(decoded)
             except LogError as error:
@@ -209,8 +279,49 @@ class LogReader:
         patches, following = patches[inside], following[inside]
         return np.unique(np.concatenate([chosen, begins, patches[begins[following] <= patches]]))
 
+    @cached_property
+    def _part(self) -> tuple[Part, dict[str, int]] | None:
+        """The part of the maps that is read, its number and how many there are; None if there is but one."""
+        times = self.source.log_times(self.topic)
+        if len(times) > 1 and isinstance(self.source, MapFilesSource):
+            return self._chosen(find_saved_parts(self.source.names, times, self._grid, self._occupancy))
+        # Patches have no map of their own, and maps of one time cannot be told apart.
+        if len(self._topics) > 1 or len(np.unique(times)) < len(times):
+            found = Parts((Part(times, 0.0, len(times)),))
+        else:
+            found = find_parts(times, self._facts)
+        return self._chosen(found)
+
+    def _chosen(self, found: Parts) -> tuple[Part, dict[str, int]] | None:
+        count, number = len(found.parts), self._asked_part
+        if number is not None and not 1 <= number <= count:
+            raise LogError(f"{self.info.path}: {self.topic} has no part {number}; it has {count}")
+        if count == 1:
+            return None
+        if number is None:
+            number = found.likeliest()
+            other = count if number == 1 else 1
+            text = f"{self.info.path}: {self.topic}: {found.text(number)}; part={other} takes another"
+            log_warning(logger, "parts", text, file=self.info.path, topic=self.topic)
+        return found.parts[number - 1], {"number": number, "count": count}
+
+    def _facts(self, time_ns: int) -> MapFacts | None:
+        """Look at the map of one log time."""
+        return None if (grid := self._grid(time_ns)) is None else facts_of(grid, self._occupancy)
+
+    def _grid(self, time_ns: int) -> Grid | None:
+        """Read the map of one log time; None if there is none."""
+        for message in self.source.read([self.topic], np.array([time_ns], np.int64)):
+            with suppress(LogError):  # it is told of where the map is needed
+                decoded = message.decode()
+                if isinstance(decoded, Grid):
+                    return self.cell_reading.of(decoded)
+        return None
+
     def _times_in_range(self) -> Times:
         times = np.sort(np.concatenate([self.source.log_times(topic) for topic in self._topics]))
+        if len(times) and self._part is not None:
+            times = self._part[0].times
         if not len(times):
             raise LogError(f"{self.info.path}: no messages on {self.topic}; choose another topic")
         in_range = self._selection.in_range(times)
@@ -254,15 +365,19 @@ def choose_topic(info: LogInfo, asked: str | None = None) -> str:
         raise NoMapTopicError(
             f"{info.path}: {asked or repr(asked)} is not a topic with occupancy grids; {has}"
         )
+    scans = mappable_topics(info)
+    building = f"map_from={scans[0]!r} builds maps from its laser scans" if scans else ""
+    untyped = sorted({each.name for each in info.topics if not each.message_type})
+    if untyped and not maps:
+        raise NoMapTopicError(
+            f"{where} no topic has occupancy grids, and {', '.join(untyped[:MOST_LISTED])} has no schema "
+            "that says what its messages are; if they are maps, name their type "
+            "(message_type='nav_msgs/OccupancyGrid')" + (f"; {building}" if building else "")
+        )
     if not maps:
         others = ", ".join(sorted({topic.message_type for topic in info.topics})[:MOST_LISTED])
         found = f", only {others}" if others else ""
-        scans = mappable_topics(info)
-        remedy = (
-            f"map_from={scans[0]!r} builds maps from its laser scans"
-            if scans
-            else "record the mapping node's topic too, usually /map"
-        )
+        remedy = building or "record the mapping node's topic too, usually /map"
         raise NoMapTopicError(
             f"{where} no topic has occupancy grids (nav_msgs/OccupancyGrid){found}; {remedy}"
         )

@@ -9,6 +9,7 @@ import numpy as np
 from rose2_logs.errors import InvalidMapError
 from rose2_logs.io.grids import Cells, Grid, MapWarning, Patch
 from rose2_logs.model.occupancy import UNKNOWN, BoolArray, OccupancySnapshot
+from rose2_logs.system.text import apart
 
 
 @dataclass
@@ -164,6 +165,10 @@ BACK_NS = 10**9
 """Concurrently published maps may have stamps out of order by up to this; more means a clock was set back."""
 
 
+FORWARD_NS = 366 * 86400 * 10**9
+"""No two maps of a run are a year apart; a clock was set between those that are."""
+
+
 class MapChecks:
     """Checks the maps of a topic as they arrive."""
 
@@ -176,13 +181,19 @@ class MapChecks:
         if message is None:
             return (MapWarning("no_cells", "a map without cells; skipped"),)
         map_warnings = list(message.map_warnings)
-        before, self._stamp_ns = self._stamp_ns, message.stamp_ns
+        before = self._stamp_ns
+        if message.stamp_ns != 0:
+            self._stamp_ns = message.stamp_ns
         # Sources without times, such as saved maps, have a log time of 0 too.
         if message.stamp_ns == 0 and log_time_ns != 0:
             map_warnings.append(MapWarning("stamp_zero", "its stamp is zero; only its log time is valid"))
         elif before is not None and message.stamp_ns < before - BACK_NS:
             map_warnings.append(
-                MapWarning("stamp_back", f"its stamp goes back by {(before - message.stamp_ns) / 1e9:.1f} s")
+                MapWarning("stamp_back", f"its stamp goes back by {apart(before - message.stamp_ns)}")
+            )
+        elif before is not None and message.stamp_ns > before + FORWARD_NS:
+            map_warnings.append(
+                MapWarning("stamp_forward", f"its stamp goes forward by {apart(message.stamp_ns - before)}")
             )
         if isinstance(message, Grid):
             frame, self._frame = self._frame, message.geometry.frame_id

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rose2_logs.errors import InvalidMapError
+from rose2_logs.io.cell_values import OCCUPANCY_OF_COST
 from rose2_logs.io.grids import (
     FOXGLOVE_GRID_TYPE,
     LONGEST_NAME_BYTES,
@@ -24,19 +25,26 @@ from rose2_logs.io.grids import (
     check_cells,
     exact_resolution,
     make_grid,
-    percent,
 )
-from rose2_logs.model.occupancy import UNKNOWN
 
 GRID_TYPES = ("nav_msgs/OccupancyGrid", "nav2_msgs/Costmap")
+FOXGLOVE_ROS_TYPE = "foxglove_msgs/Grid"
 PATCH_TYPES = ("map_msgs/OccupancyGridUpdate", "nav2_msgs/CostmapUpdate")
+MOST_CHANNELS = 256
+"""Channels of a packed grid that are read; more are damage."""
 PADDING_BYTES = 8
 """Fewer bytes than this may follow the last field: some writers pad to the largest alignment."""
 
 
 def ros_type(name: str) -> str:
-    """Normalize the name of a ROS message type to ``package/Type``, without ``/msg/``."""
-    return name.replace("/msg/", "/")
+    """Normalize the name of a ROS message type to ``package/Type``, without ``/msg/``.
+
+    DDS spells it ``package::msg::dds_::Type_``, and tools that read it write it with slashes.
+    """
+    plain = name.replace("::", "/")
+    if "/dds_/" in plain:
+        plain = plain.replace("/dds_/", "/").removesuffix("_")
+    return plain.replace("/msg/", "/")
 
 
 def is_patch_type(message_type: str) -> bool:
@@ -48,7 +56,10 @@ def is_map_type(message_type: str, encoding: str) -> bool:
     """Whether messages of this type and encoding are whole maps that `decoder` can read."""
     if encoding == "protobuf":
         return message_type == FOXGLOVE_GRID_TYPE
-    return encoding in ("cdr", "ros1") and ros_type(message_type) in GRID_TYPES
+    name = ros_type(message_type)
+    if encoding == "json":
+        return name in (FOXGLOVE_GRID_TYPE, FOXGLOVE_ROS_TYPE, GRID_TYPES[0])
+    return encoding in ("cdr", "ros1") and name in (*GRID_TYPES, FOXGLOVE_ROS_TYPE)
 
 
 def decoder(
@@ -61,7 +72,7 @@ def decoder(
     message_type : str
         ROS message type, with or without ``/msg/``, or protobuf message name.
     encoding : str
-        ``cdr``, ``ros1`` or ``protobuf``.
+        ``cdr``, ``ros1``, ``protobuf`` or ``json``.
     schema : bytes
         The schema stored in the log; needed for protobuf only.
     most_cells : int
@@ -77,7 +88,12 @@ def decoder(
         from rose2_logs.io.foxglove_grid import grid_decoder
 
         return grid_decoder(schema, most_cells)
+    if is_map_type(message_type, encoding) and encoding == "json":
+        from rose2_logs.io.json_maps import json_decoder
+
+        return json_decoder(ros_type(message_type) != GRID_TYPES[0], most_cells)
     decode = {
+        FOXGLOVE_ROS_TYPE: _foxglove_grid,
         "nav_msgs/OccupancyGrid": _occupancy_grid,
         "map_msgs/OccupancyGridUpdate": _occupancy_grid_update,
         "nav2_msgs/Costmap": _costmap,
@@ -102,7 +118,7 @@ class Fields:
     def __init__(self, data: memoryview, most_cells: int = MOST_CELLS) -> None:
         self._data = data
         self._place = self.start
-        self._most_cells = most_cells
+        self.most_cells = most_cells
         self.map_warnings: list[MapWarning] = []
 
     def numbers(self, code: str, count: int = 1) -> tuple[float, ...]:
@@ -158,7 +174,7 @@ class Fields:
         data = self.octets("data")
         if rows * columns != len(data):
             raise InvalidMapError(f"it claims {columns} x {rows} cells, but its data has {len(data)}")
-        check_cells(rows, columns, self._most_cells)
+        check_cells(rows, columns, self.most_cells)
         if (left := self.left) >= PADDING_BYTES:
             self.map_warnings.append(
                 MapWarning(
@@ -167,9 +183,9 @@ class Fields:
             )
         return np.frombuffer(data, np.uint8).reshape(rows, columns)
 
-    def occupancy(self, rows: int, columns: int) -> Cells:
-        """Read the last field as occupancy: -1, 0..100."""
-        return percent(self.cells(rows, columns).view(np.int8), self.map_warnings)
+    def signed_cells(self, rows: int, columns: int) -> Cells:
+        """Read the last field as signed bytes, whatever they mean."""
+        return self.cells(rows, columns).view(np.int8)
 
     def time_ns(self) -> int:
         """Take a time as nanoseconds."""
@@ -211,27 +227,13 @@ class Ros1Fields(Fields):
         return super().header()
 
 
-def _cost_table() -> Cells:
-    """Occupancy per cost: 0 free, 1..252 to 1..98, 253 (inscribed) 99, 254 (lethal) 100, 255 unknown.
-
-    nav2 publishes its costmaps as occupancy grids by the same table.
-    """
-    table = np.empty(256, np.int8)
-    table[0], table[253], table[254], table[255] = 0, 99, 100, UNKNOWN
-    table[1:253] = 1 + (97 * (np.arange(1, 253) - 1)) // 251
-    return table
-
-
-_OCCUPANCY_OF_COST = _cost_table()
-
-
 def _occupancy_grid(fields: Fields) -> Grid | None:
     stamp_ns, frame_id = fields.header()
     fields.time_ns()  # map_load_time
     (resolution,) = fields.numbers("f")
     width, height = fields.integers("I", 2)
     pose = fields.numbers("d", 7)
-    cells = fields.occupancy(height, width)
+    cells = fields.signed_cells(height, width)
     return make_grid(stamp_ns, frame_id, exact_resolution(resolution), pose, cells, fields.map_warnings)
 
 
@@ -239,7 +241,34 @@ def _occupancy_grid_update(fields: Fields) -> Patch:
     stamp_ns, _ = fields.header()
     x, y = fields.integers("i", 2)
     width, height = fields.integers("I", 2)
-    return Patch(stamp_ns, y, x, fields.occupancy(height, width), tuple(fields.map_warnings))
+    return Patch(stamp_ns, y, x, fields.signed_cells(height, width), tuple(fields.map_warnings))
+
+
+def _foxglove_grid(fields: Fields) -> Grid | None:
+    from rose2_logs.io.foxglove_grid import PackedField, PackedGrid, grid_of
+
+    stamp_ns, frame_id = fields.time_ns(), fields.string("frame_id")
+    pose = fields.numbers("d", 7)
+    (columns,) = fields.integers("I")
+    width_m, height_m = fields.numbers("d", 2)
+    row_stride, cell_stride, count = fields.integers("I", 3)
+    channels = []
+    for _ in range(min(count, MOST_CHANNELS)):
+        name = fields.string("field name")
+        (offset,), (kind,) = fields.integers("I"), fields.integers("B")
+        channels.append(PackedField(name, offset, kind))
+    packed = PackedGrid(
+        stamp_ns,
+        frame_id,
+        pose,
+        columns,
+        (width_m, height_m),
+        row_stride,
+        cell_stride,
+        tuple(channels),
+        fields.octets("data"),
+    )
+    return grid_of(packed, fields.most_cells, fields.map_warnings)
 
 
 def _costmap(fields: Fields) -> Grid | None:
@@ -250,12 +279,12 @@ def _costmap(fields: Fields) -> Grid | None:
     (resolution,) = fields.numbers("f")
     width, height = fields.integers("I", 2)
     pose = fields.numbers("d", 7)
-    cells = _OCCUPANCY_OF_COST[fields.cells(height, width)]
+    cells = OCCUPANCY_OF_COST[fields.cells(height, width)]
     return make_grid(stamp_ns, frame_id, exact_resolution(resolution), pose, cells, fields.map_warnings)
 
 
 def _costmap_update(fields: Fields) -> Patch:
     stamp_ns, _ = fields.header()
     x, y, width, height = fields.integers("I", 4)
-    cells = _OCCUPANCY_OF_COST[fields.cells(height, width)]
+    cells = OCCUPANCY_OF_COST[fields.cells(height, width)]
     return Patch(stamp_ns, y, x, cells, tuple(fields.map_warnings))

@@ -11,7 +11,7 @@ from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
 
 from rose2_logs.config.mapping import MappingParameters
-from rose2_logs.config.parameters import ReadingParameters
+from rose2_logs.config.parameters import OccupancyParameters, ReadingParameters
 from rose2_logs.config.selection import Selection
 from rose2_logs.errors import LogError
 from rose2_logs.io.carmen_format import CARMEN_FORMAT, is_carmen
@@ -29,6 +29,7 @@ from rose2_logs.io.discovery import (
 )
 from rose2_logs.io.log import LogReader
 from rose2_logs.io.source import LogInfo, MessageSource
+from rose2_logs.system.text import counted
 from rose2_logs.system.warnings import log_warning
 
 if TYPE_CHECKING:
@@ -41,9 +42,12 @@ LogPath = str | Path | Sequence[str | Path]
 
 EVERYTHING = Selection()
 DEFAULT_LIMITS = ReadingParameters()
+USUAL = OccupancyParameters()
 DEFAULT_MAPPING = MappingParameters()
 DISK_LEFT_BYTES = 1 << 30
 """Disk space left free where the temporary folder is when a bag is decompressed there."""
+MASK_WORDS = ("mask", "keepout", "speed_limit")
+"""In the names of masks of costmap filters: where a robot must not go, or go slowly."""
 _MOST_NAMED = 3
 """Number of files that a warning names."""
 _FORMATS = (
@@ -59,6 +63,8 @@ def open_log(
     topic: str | None = None,
     selection: Selection = EVERYTHING,
     limits: ReadingParameters = DEFAULT_LIMITS,
+    occupancy: OccupancyParameters = USUAL,
+    part: int | None = None,
     map_from: str | None = None,
     map_frame: str | None = None,
     mapping: MappingParameters = DEFAULT_MAPPING,
@@ -77,6 +83,10 @@ def open_log(
         Which maps to read.
     limits : ReadingParameters
         The largest sizes that are accepted.
+    occupancy : OccupancyParameters
+        What the numbers in the cells mean.
+    part : int, optional
+        Which part of a topic, from 1, whose maps are not of one run; by default the one that tells most.
     map_from : str, optional
         Topic of laser scans to build the maps from, instead of reading recorded ones.
     map_frame : str, optional
@@ -96,12 +106,12 @@ def open_log(
     LogError
         If the log cannot be opened.
     """
-    source = open_source(path, limits)
+    source = open_source(path, limits, occupancy)
     try:
         if map_from is not None or source.info.format == CARMEN_FORMAT:
             built = _with_maps(source, map_from, map_frame, selection, limits, mapping)
-            return LogReader(built, topic or built.topic, selection)
-        return LogReader(source, topic, selection)
+            return LogReader(built, topic or built.topic, selection, occupancy, part)
+        return LogReader(source, topic, selection, occupancy, part)
     except BaseException:
         source.close()
         raise
@@ -146,12 +156,14 @@ def inspect_log(path: LogPath, limits: ReadingParameters = DEFAULT_LIMITS) -> Lo
     return source.info
 
 
-def open_source(path: LogPath, limits: ReadingParameters = DEFAULT_LIMITS) -> MessageSource:
+def open_source(
+    path: LogPath, limits: ReadingParameters = DEFAULT_LIMITS, occupancy: OccupancyParameters = USUAL
+) -> MessageSource:
     """Open a log to read several of its topics; the caller closes it.
 
     Parameters
     ----------
-    path, limits
+    path, limits, occupancy
         As for `open_log`.
 
     Raises
@@ -160,10 +172,12 @@ def open_source(path: LogPath, limits: ReadingParameters = DEFAULT_LIMITS) -> Me
         If the log cannot be opened.
     """
     try:
-        return _open_source(path, limits)
+        source = _open_source(path, limits)
     except OSError as error:
         where = error.filename or path
         raise LogError(f"{where}: cannot be read: {error.strerror or error}", file=str(where)) from error
+    source.occupancy = occupancy
+    return source
 
 
 def _open_source(path: LogPath, limits: ReadingParameters) -> MessageSource:
@@ -337,12 +351,22 @@ def _open_directory(log: Path, limits: ReadingParameters) -> MessageSource:
     images = {each.stem for each in inside if each.suffix.lower() in IMAGE_ENDINGS}
     described = [each for each in inside if each.suffix.lower() in MAP_ENDINGS]
     if maps := [each for each in described if each.stem in images or is_map_file(each)]:
-        return _open_files(log, _in_natural_order(maps), limits)
+        return _open_files(log, _in_natural_order(_without_masks(log, maps)), limits)
     raise LogError(
         f"{log}: contains neither a bag ({BAG_DESCRIPTION}) nor saved maps; give {_FORMATS}; "
         "analyze a folder of many logs as a batch",
         file=log,
     )
+
+
+def _without_masks(log: Path, maps: list[Path]) -> list[Path]:
+    """Leave out the masks of costmap filters, which are saved as maps are, from the maps of a folder."""
+    masks = [each for each in maps if any(word in each.stem.lower() for word in MASK_WORDS)]
+    if not masks or len(masks) == len(maps):
+        return maps
+    text = f"{log}: {', '.join(each.name for each in masks[:_MOST_NAMED])} left out, as a mask and no map"
+    log_warning(logger, "masks", f"{text}; name the file to read it", file=log)
+    return [each for each in maps if each not in masks]
 
 
 def _stored_in(log: Path) -> list[Path]:
@@ -383,11 +407,20 @@ def _files_of_bag(log: Path) -> list[Path]:
         log_warning(logger, "description", f"{error}; the files next to it are read", file=path)
         return files
     files = [file for file in named if file.is_file()]
-    for missing in [file for file in named if not file.is_file()]:
-        text = f"{missing}: is missing although {path} lists it"
+    missing = [file for file in named if not file.is_file()]
+    # Who renames the files of a bag leaves its description as it is.
+    if missing and (renamed := [each for each in _stored_in(log) if each not in files]):
+        text = (
+            f"{path}: lists {missing[0].name}, which is not there; {counted(len(renamed), 'file')} that it "
+            f"does not list, {', '.join(each.name for each in renamed[:_MOST_NAMED])}, read instead"
+        )
+        log_warning(logger, "file_missing", text, file=missing[0])
+        return files + renamed
+    for file in missing:
+        text = f"{file}: is missing although {path} lists it"
         if not files:
-            raise LogError(text, file=missing)
-        log_warning(logger, "file_missing", f"{text}; the other files are read", file=missing)
+            raise LogError(text, file=file)
+        log_warning(logger, "file_missing", f"{text}; the other files are read", file=file)
     if not files:
         raise LogError(f"{path}: lists no files; run `ros2 bag reindex` on {log}", file=path)
     return files

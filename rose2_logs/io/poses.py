@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import logging
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from itertools import islice
 
 import numpy as np
@@ -14,12 +16,17 @@ from rose2_logs.io.grids import yaw_of
 from rose2_logs.io.messages import CdrFields, Fields, Ros1Fields, ros_type
 from rose2_logs.io.source import DamagedMessageError, LoggedBytes, LogInfo, MessageSource
 from rose2_logs.model.occupancy import FloatArray
+from rose2_logs.system.warnings import log_warning
+
+logger = logging.getLogger(__name__)
 
 TRANSFORM_TYPES = ("tf2_msgs/TFMessage", "tf/tfMessage")
 ODOMETRY_TYPES = ("nav_msgs/Odometry",)
 POSE_TYPES = ("geometry_msgs/PoseStamped", "geometry_msgs/PoseWithCovarianceStamped")
 BASE_FRAMES = ("base_link", "base_footprint", "base", "base_frame")
 """Frames of a mobile base (REP 105, REP 120, and common drivers), the most common first."""
+ODOMETRY_FRAME = "odom"
+"""Frame whose only child is the robot's base, whatever its name (REP 105)."""
 REQUESTED_POSES = ("goal", "initial")
 """Topics with this in their name carry requested poses, not where the robot was."""
 POSE_STEP_S = 0.25
@@ -54,6 +61,10 @@ class RobotPath:
         Frame of the map.
     start_ns : int, optional
         Earlier poses are skipped.
+    map_topic : str
+        Topic of the map: of several robots, the one in its namespace is followed.
+    base_frame : str, optional
+        Frame of the robot's base; by default one of `BASE_FRAMES`, else the only frame below ``odom``.
 
     Attributes
     ----------
@@ -61,9 +72,18 @@ class RobotPath:
         Topics that the poses come from; empty if the log does not say where the robot was.
     """
 
-    def __init__(self, source: MessageSource, frame_id: str, start_ns: int | None = None) -> None:
+    def __init__(
+        self,
+        source: MessageSource,
+        frame_id: str,
+        start_ns: int | None = None,
+        *,
+        map_topic: str = "",
+        base_frame: str | None = None,
+    ) -> None:
         self._start_ns = start_ns or 0
-        topics, poses = _choose(source, _plain(frame_id) or "map", self._start_ns)
+        wanted = _Wanted(_plain(frame_id) or "map", _namespace(map_topic), _plain(base_frame or ""))
+        topics, poses = _choose(source, wanted, self._start_ns)
         self.origin = ", ".join(topics)
         self._poses = poses
         self._next: tuple[int, Pose] | None = next(self._poses, None)
@@ -89,21 +109,117 @@ class RobotPath:
         return np.array(taken, float).reshape(-1, 3)
 
 
+@dataclass(frozen=True)
+class _Wanted:
+    """Whose pose is looked for: the map's frame, its topic's namespace, the base's frame if it is known."""
+
+    frame: str
+    namespace: str
+    base: str = ""
+
+    def bases(self, edges: dict[str, _Edge]) -> list[str]:
+        """Frames that may be the robot's base, the likeliest first."""
+        if self.base in edges:
+            return [self.base]
+        if self.base:
+            return [name for name in edges if self.base in (name, name.rsplit("/", 1)[-1])]
+        rank = {name: place for place, name in enumerate(BASE_FRAMES)}
+        # With several robots, frame names start with the robot's name.
+        named = [name for name in edges if name.rsplit("/", 1)[-1] in rank]
+        own = f"{_plain(self.namespace)}/"
+        return sorted(named, key=lambda name: (rank[name.rsplit("/", 1)[-1]], not name.startswith(own), name))
+
+
 def _choose(
-    source: MessageSource, frame: str, start_ns: int
+    source: MessageSource, wanted: _Wanted, start_ns: int
 ) -> tuple[tuple[str, ...], Iterator[tuple[int, Pose]]]:
     """Topics that say where the robot was, and its poses."""
+    path = source.info.path
     transforms = _topics(source.info, TRANSFORM_TYPES)
-    tried = _transformed(islice(source.stream(transforms), TRIED_MESSAGES), frame, 0)
-    if transforms and next(tried, None) is not None:
-        return transforms, _transformed(source.stream(transforms), frame, start_ns)
+    connected: list[tuple[tuple[str, ...], _Wanted]] = []
+    for topics in _groups(transforms, wanted.namespace):
+        found = _connected(source, topics, wanted)
+        if found is not None:
+            connected.append((topics, found))
+            if _namespace(topics[0]) == wanted.namespace:
+                break
+    if connected:
+        topics, wanted = connected[0]
+        if others := [name for names, _ in connected[1:] for name in names if name not in topics]:
+            text = (
+                f"{path}: the robot's way is that of {topics[0]}; {', '.join(others)} tell of other robots, "
+                "which are not shown"
+            )
+            log_warning(logger, "one_robot", text, file=path, topic=topics[0])
+        return topics, _transformed(source.stream(topics), wanted, start_ns)
+    if wanted.base:
+        text = f"{path}: no transforms lead from {wanted.frame!r} to the base frame {wanted.base!r}"
+        log_warning(logger, "base_frame", text, file=path)
     for types, read in ((ODOMETRY_TYPES, _odometry), (POSE_TYPES, _pose)):
         topics = _topics(source.info, types)
-        # The topic with the most messages is the robot's own.
+        # The robot's own topic is in the map's namespace; of several, it has the most messages.
         counts = {item.name: item.message_count or 0 for item in source.info.topics}
-        if topics := tuple(sorted(topics, key=lambda name: (-counts[name], name))[:1]):
+        order = sorted(topics, key=lambda name: (_namespace(name) != wanted.namespace, -counts[name], name))
+        if topics := tuple(order[:1]):
+            _tell_other_frame(source, topics, wanted)
             return topics, _posed(source.stream(topics), read, start_ns)
     return (), iter(())
+
+
+def _tell_other_frame(source: MessageSource, topics: tuple[str, ...], wanted: _Wanted) -> None:
+    """Warn that poses are not in the frame of the map, and no transforms lead from one to the other."""
+    for message in islice(source.stream(topics), 1):
+        data = _data(message)
+        try:
+            frame = "" if data is None else _plain(_fields(message, data).header()[1])
+        except InvalidMapError:
+            return
+        if frame and frame != wanted.frame:
+            text = (
+                f"{source.info.path}: the robot's way is that of {topics[0]}, in the frame {frame!r} instead "
+                f"of {wanted.frame!r}: it may drift away from the map; base_frame=NAME names the "
+                "robot's frame if transforms lead to it"
+            )
+            log_warning(logger, "other_frame", text, file=source.info.path, topic=topics[0])
+
+
+def _namespace(topic: str) -> str:
+    """Namespace of a topic, without the slash at its end: nothing for ``/map``."""
+    return f"/{topic.lstrip('/')}".rpartition("/")[0]
+
+
+def _groups(topics: tuple[str, ...], namespace: str) -> list[tuple[str, ...]]:
+    """Topics with transforms that belong together: of one namespace each, that of the map first, then all."""
+    spaces = sorted(
+        {_namespace(name) for name in topics},
+        key=lambda space: (not f"{namespace}/".startswith(f"{space}/"), -len(space) if space else 0, space),
+    )
+    groups = [tuple(name for name in topics if _namespace(name) == space) for space in spaces]
+    return [*groups, topics] if len(groups) > 1 else groups
+
+
+def _connected(source: MessageSource, topics: tuple[str, ...], wanted: _Wanted) -> _Wanted | None:
+    """Whose pose transforms tell, by their first messages; None if they do not lead to the map's frame."""
+    path = source.info.path
+    edges: dict[str, _Edge] = {}
+    for message in islice(source.stream(topics), TRIED_MESSAGES):
+        if (data := _data(message)) is not None:
+            with suppress(InvalidMapError):
+                edges |= _transforms(_fields(message, data))
+    if robots := _robots_in(wanted, edges):
+        if len(robots) > 1:
+            text = (
+                f"{path}: the robot's way is that of {robots[0]}; {', '.join(robots[1:])} are other robots, "
+                "which are not shown; base_frame=NAME chooses one"
+            )
+            log_warning(logger, "one_robot", text, file=path, topic=topics[0])
+        return replace(wanted, base=robots[0])
+    below = [name for name, edge in edges.items() if edge.parent.rsplit("/", 1)[-1] == ODOMETRY_FRAME]
+    if wanted.base or len(below) != 1 or not _robots_in(replace(wanted, base=below[0]), edges):
+        return None
+    text = f"{path}: the robot's base is taken to be {below[0]!r}, the only frame below {ODOMETRY_FRAME}"
+    log_warning(logger, "base_frame", f"{text}; base_frame=NAME names another", file=path, topic=topics[0])
+    return replace(wanted, base=below[0])
 
 
 def _topics(info: LogInfo, types: tuple[str, ...]) -> tuple[str, ...]:
@@ -117,7 +233,9 @@ def _topics(info: LogInfo, types: tuple[str, ...]) -> tuple[str, ...]:
     )
 
 
-def _transformed(messages: Iterator[LoggedBytes], frame: str, start_ns: int) -> Iterator[tuple[int, Pose]]:
+def _transformed(
+    messages: Iterator[LoggedBytes], wanted: _Wanted, start_ns: int
+) -> Iterator[tuple[int, Pose]]:
     """Follow the transforms from the map's frame to that of the robot's base."""
     edges: dict[str, _Edge] = {}
     # The chain of frames from the map to the robot; other transforms, as of joints and sensors, are skipped.
@@ -135,7 +253,7 @@ def _transformed(messages: Iterator[LoggedBytes], frame: str, start_ns: int) -> 
             continue
         if latest_ns is not None and message.log_time_ns - latest_ns < POSE_STEP_S * 1e9:
             continue
-        pose, children = _base_in(frame, edges)
+        pose, children = _base_in(wanted, edges)
         chain = tuple(child.encode() for child in children)
         if pose is not None:
             latest_ns = message.log_time_ns
@@ -202,20 +320,27 @@ def _planar(fields: Fields) -> Pose:
     return x, y, yaw_of(*quaternion)
 
 
-def _base_in(frame: str, edges: dict[str, _Edge]) -> tuple[Pose | None, tuple[str, ...]]:
-    """Pose of the robot's base in a frame, and the chain of frames from the base up to it."""
-    for base in BASE_FRAMES:
-        # With several robots, frame names start with the robot's name.
-        for name in sorted(each for each in edges if each.rsplit("/", 1)[-1] == base):
-            pose, children = edges[name].pose, [name]
-            while (parent := edges[children[-1]].parent) != frame and parent in edges:
-                if parent in children:
-                    break
-                pose = _composed(edges[parent].pose, pose)
-                children.append(parent)
-            if parent == frame:
-                return pose, tuple(children)
+def _base_in(wanted: _Wanted, edges: dict[str, _Edge]) -> tuple[Pose | None, tuple[str, ...]]:
+    """Pose of the robot's base in the map's frame, and the chain of frames from the base up to it."""
+    for name in wanted.bases(edges):
+        pose, children = edges[name].pose, [name]
+        while (parent := edges[children[-1]].parent) != wanted.frame and parent in edges:
+            if parent in children:
+                break
+            pose = _composed(edges[parent].pose, pose)
+            children.append(parent)
+        if parent == wanted.frame:
+            return pose, tuple(children)
     return None, ()
+
+
+def _robots_in(wanted: _Wanted, edges: dict[str, _Edge]) -> list[str]:
+    """Bases that lead to the map's frame, the likeliest first, one for each beginning of their names."""
+    robots: dict[str, str] = {}
+    for name in wanted.bases(edges):
+        if _base_in(replace(wanted, base=name), edges)[0] is not None:
+            robots.setdefault(name.rpartition("/")[0], name)
+    return list(robots.values())
 
 
 def _composed(outer: Pose, inner: Pose) -> Pose:

@@ -97,6 +97,10 @@ class ScanMaps(MessageSource):
         """The log itself, without the maps."""
         return self._recorded
 
+    def made_from(self, topic: str) -> str:
+        """Topic that the messages of `topic` are made from: that of the scans for the maps."""
+        return self._scans.topic if topic == self.topic else topic
+
     def log_times(self, topic: str) -> Times:
         """Log times of the maps, nanoseconds, sorted; those of another topic from the log.
 

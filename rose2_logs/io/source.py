@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
+from rose2_logs.config.parameters import OccupancyParameters
 from rose2_logs.config.selection import Times
 from rose2_logs.errors import LogError
 from rose2_logs.io.grids import Grid, Patch
@@ -121,14 +123,32 @@ class LoggedBytes:
 
 
 class MessageSource(ABC):
-    """An open log: what it contains, and its map messages by topic and log time."""
+    """An open log: what it contains, and its map messages by topic and log time.
+
+    Attributes
+    ----------
+    info : LogInfo
+        What it contains.
+    occupancy : OccupancyParameters
+        What the numbers in the cells mean; only sources that decide it themselves heed it.
+    """
 
     info: LogInfo
+    occupancy = OccupancyParameters()
+
+    @property
+    def value_reading(self) -> Mapping[str, Any] | None:
+        """How the source itself turns what it stores into percent; None if it leaves that to the reader."""
+        return None
 
     @property
     def recorded(self) -> MessageSource:
         """The log itself, where this one adds maps that are built from it."""
         return self
+
+    def made_from(self, topic: str) -> str:
+        """Topic that the messages of `topic` are made from: the same one, if they were recorded."""
+        return topic
 
     @abstractmethod
     def log_times(self, topic: str) -> Times:
@@ -137,6 +157,10 @@ class MessageSource(ABC):
     @abstractmethod
     def read(self, topics: Sequence[str], times: Times) -> Iterator[LoggedMap]:
         """Yield the messages of `topics` logged at `times` (sorted, distinct), in log time order."""
+
+    def recorded_ns(self, time_ns: int) -> int:
+        """Return the log time that stands in the log, of a map whose own goes on where a clock was set."""
+        return time_ns
 
     def stream(self, topics: Sequence[str]) -> Iterator[LoggedBytes]:
         """Yield all messages of `topics` one at a time, roughly in log time order.

@@ -41,7 +41,8 @@ class RoomQuality:
         Share of each room's outline, with its predicted part, that occupied cells support; NaN for a room
         without outline. Doorways are not supported, so an ordinary room stays a little below 1.
     frontier_m : (R,) float
-        Length of each room's open frontier: cell sides between its free cells and unknown ones, meters.
+        Length of each room's open frontier: cell sides between its free cells and unknown ones, meters. What
+        is beyond the grid is unknown, as if the map had a border of unknown cells.
     """
 
     wall_support: FloatArray
@@ -110,9 +111,14 @@ def _within(mask: BoolArray, reach_cells: float) -> BoolArray:
 def _frontiers(snapshot: OccupancySnapshot, rooms: RoomMap) -> FloatArray:
     """Length (R,) in meters of the sides that cells of each room share with unknown ones."""
     known = known_window(rooms.labels > 0)
-    # What is beyond the canvas is not known to be unknown, so only neighbors on it count.
     window = tuple(slice(max(part.start - 1, 0), part.stop + 1) for part in known)
     labels, unknown = rooms.labels[window], snapshot.cells[window] == UNKNOWN
-    meet = contacts(np.where(unknown, UNKNOWN, labels))
+    marked = np.where(unknown, UNKNOWN, labels)
+    # A map may be cropped to its known cells, or grow only when something is seen.
+    margins = [
+        (int(part.start == 0), int(part.stop == size))
+        for part, size in zip(known, rooms.labels.shape, strict=True)
+    ]
+    meet = contacts(np.pad(marked, margins, constant_values=UNKNOWN))
     sides = np.bincount(meet.high[(meet.low == UNKNOWN) & (meet.high > 0)], minlength=len(rooms) + 1)
     return sides[1:].astype(np.float64) * snapshot.geometry.resolution_m

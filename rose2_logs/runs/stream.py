@@ -12,6 +12,7 @@ from pathlib import Path
 from rose2_logs.config.parameters import Parameters
 from rose2_logs.config.run_options import RunOptions
 from rose2_logs.errors import InvalidMapError
+from rose2_logs.io.cell_values import few_walls
 from rose2_logs.io.log import LogReader
 from rose2_logs.io.poses import RobotPath
 from rose2_logs.model.analysis import SnapshotAnalysis
@@ -106,6 +107,7 @@ class TrackedStream:
         parameters: Parameters,
         *,
         with_path: bool = False,
+        base_frame: str | None = None,
     ) -> TrackedStream:
         """Follow the rooms through an open log.
 
@@ -117,6 +119,8 @@ class TrackedStream:
             As for the class.
         with_path : bool
             Whether to read where the robot was.
+        base_frame : str, optional
+            Frame of the robot's base, where it is none of the usual ones.
 
         Raises
         ------
@@ -124,6 +128,9 @@ class TrackedStream:
             If the log holds no map that can be read.
         """
         last = reader.last()
+        if (text := few_walls(last, parameters.occupancy)) is not None:
+            text = f"{reader.info.path}: the last map on {reader.topic}: {text}"
+            log_warning(logger, "few_walls", text, file=reader.info.path, topic=reader.topic)
         stream = cls(
             reader.snapshots(),
             free_area_m2(last, parameters.occupancy),
@@ -131,7 +138,7 @@ class TrackedStream:
             parameters,
             source=str(reader.info.path),
             topic=reader.topic,
-            path=reader.robot_path(last.geometry.frame_id) if with_path else None,
+            path=reader.robot_path(last.geometry.frame_id, base_frame) if with_path else None,
         )
         stream.last_log_time_ns = last.log_time_ns
         return stream

@@ -26,6 +26,7 @@ def write_summary(
     *,
     selection: Mapping[str, Any],
     messages: Mapping[str, int],
+    decided: Mapping[str, Any],
     files: list[str],
     warnings: Mapping[str, Any],
     facts: Mapping[str, Any],
@@ -44,6 +45,8 @@ def write_summary(
         Results of the run.
     selection, messages : mapping
         Which maps were requested, and how many messages were used or left out.
+    decided : mapping
+        What was decided about how the log is read.
     files : list of str
         Names of the other files of the results.
     warnings : mapping
@@ -71,6 +74,7 @@ def write_summary(
         "selection": dict(selection),
         "parameters": info.parameters.resolved(),
         "messages": dict(messages),
+        "decided": dict(decided),
         "warnings": dict(warnings),
         "results": {
             "snapshots": totals.snapshots,

@@ -35,3 +35,16 @@ def counted(number: int, noun: str) -> str:
     ('1 room', '2 rooms')
     """
     return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
+def apart(nanoseconds: int) -> str:
+    """Return how long something lasts, in seconds or, from a year on, in years.
+
+    Examples
+    --------
+    >>> apart(114_000_000_000), apart(1_700_000_000_000_000_000)
+    ('114.0 s', '53.9 years')
+    """
+    seconds = nanoseconds / 1e9
+    years = seconds / (365.25 * 86400)
+    return f"{seconds:.1f} s" if years < 1 else f"{years:.1f} years"

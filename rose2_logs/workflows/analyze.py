@@ -134,7 +134,9 @@ def _analyze_log(
             path,
             topic=options.topic,
             selection=options.selection,
-            limits=options.parameters.reading,
+            limits=options.reading,
+            occupancy=options.parameters.occupancy,
+            part=options.part,
             map_from=options.map_from,
             map_frame=options.map_frame,
             mapping=options.parameters.mapping,
@@ -164,6 +166,7 @@ def _analyze_log(
                 summary,
                 selection=dataclasses.asdict(options.selection),
                 messages=dataclasses.asdict(reader.counts),
+                decided=reader.decided,
                 files=[file.name for name, file in planned.items() if name != "summary"],
                 warnings=warnings.as_json(),
                 facts=_facts_of(outputs),
@@ -203,7 +206,13 @@ def _follow(
     """Take the log's maps one by one to the history, the store and the sinks, and finish these."""
     parameters = options.parameters
     history = RunHistory(parameters, back_project=options.back_project)
-    stream = TrackedStream.of_log(reader, workers, parameters, with_path="path" in options.shown_layers)
+    stream = TrackedStream.of_log(
+        reader,
+        workers,
+        parameters,
+        with_path="path" in options.shown_layers,
+        base_frame=options.base_frame,
+    )
     store = RunStore(folder, parameters.occupancy, back_project=options.back_project)
     with store, abandoned_on_error(sinks):
         for sink in sinks:

@@ -97,14 +97,14 @@ def describe_log(log: str, parameters: Parameters | None = None) -> LogFacts:
     """
     # Opened once: the index of a large log is megabytes.
     used = parameters or Parameters()
-    with closing(open_source(log, used.reading)) as source:
+    with closing(open_source(log, used.reading, used.occupancy)) as source:
         topics = [topic for topic in source.info.topics if topic.is_map and topic.message_count != 0]
         return LogFacts(source.info, tuple(_topic_facts(source, topic.name, used) for topic in topics))
 
 
 def _topic_facts(source: MessageSource, topic: str, parameters: Parameters) -> TopicFacts:
     try:
-        reader = LogReader(source, topic, Selection())
+        reader = LogReader(source, topic, Selection(), parameters.occupancy)
         first, last = (_map_facts(each, parameters.occupancy) for each in (reader.first(), reader.last()))
         return TopicFacts(topic, first, last)
     except LogError as error:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from rose2_logs.config.parameters import Parameters, ReadingParameters
+from rose2_logs.config.parameters import Parameters
 from rose2_logs.config.run_options import with_detail
 from rose2_logs.drawing.drawing import Drawing
 from rose2_logs.drawing.image_files import write_label_image
@@ -20,8 +20,8 @@ from rose2_logs.drawing.plan import draw_segmentation
 from rose2_logs.drawing.plot import plot_plan
 from rose2_logs.errors import LogError, ParameterError
 from rose2_logs.io import open_log
+from rose2_logs.io.cell_values import few_walls
 from rose2_logs.io.discovery import IMAGE_ENDINGS
-from rose2_logs.io.opening import DEFAULT_LIMITS
 from rose2_logs.io.saved_maps import MapFilesSource
 from rose2_logs.model.analysis import SnapshotAnalysis, left_out_note
 from rose2_logs.model.borders import Border
@@ -34,8 +34,11 @@ from rose2_logs.outputs.exports.geojson import plan_geojson
 from rose2_logs.runs.summary import write_json
 from rose2_logs.segmentation.pipeline import RoomTree, analyze_with_tree
 from rose2_logs.system.files import refuse_existing, require_utf8
+from rose2_logs.system.warnings import log_warning
 
 logger = logging.getLogger(__name__)
+
+DEFAULTS = Parameters()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -149,7 +152,9 @@ def segment_snapshot(
     name: str = "map",
     voronoi: bool = False,
 ) -> Segmentation:
-    """Segment a single map; warn if it is so large that it was analyzed in coarser cells."""
+    """Segment a single map; warn if it has hardly any walls, or is so large that it took coarser cells."""
+    if (text := few_walls(snapshot, parameters.occupancy)) is not None:
+        log_warning(logger, "few_walls", f"{name}: {text}")
     found, tree = analyze_with_tree(snapshot, parameters, method, voronoi=voronoi)
     coarser = coarser_for_its_size(snapshot.geometry, found.resolution_m, parameters.occupancy)
     for note in (coarser, left_out_note(found.outside_m2, found.free_area_m2)):
@@ -202,7 +207,7 @@ def segment_map(
     )
     more = planned_files([each for each in formats if each != "geojson"], folder, name)
     refuse_existing([*files, *more], overwrite=overwrite)
-    snapshot = read_static_map(map_file, resolution_m, parameters.reading)
+    snapshot = read_static_map(map_file, resolution_m, parameters)
     found = segment_snapshot(snapshot, parameters, method, name=name)
     plan = found.plan()
     write_label_image(files[0], np.flipud(found.labels))
@@ -213,9 +218,11 @@ def segment_map(
 
 
 def read_static_map(
-    map_file: Path, resolution_m: float | None = None, limits: ReadingParameters = DEFAULT_LIMITS
+    map_file: Path, resolution_m: float | None = None, parameters: Parameters = DEFAULTS
 ) -> OccupancySnapshot:
     """Read a saved map; an image without a ``.yaml`` needs its resolution.
+
+    Of the parameters, those of ``reading`` and ``occupancy`` count.
 
     Raises
     ------
@@ -234,12 +241,17 @@ def read_static_map(
         raise ParameterError(
             f"{map_file}: its .yaml gives the resolution; leave out resolution_m={resolution_m:g}"
         )
-    with _described(map_file, resolution_m) as log, open_log(log, limits=limits) as reader:
+    limits, occupancy = parameters.reading, parameters.occupancy
+    with (
+        _described(map_file, resolution_m) as log,
+        open_log(log, limits=limits, occupancy=occupancy) as reader,
+    ):
         if not isinstance(reader.source, MapFilesSource):
             raise LogError(
                 f"{map_file}: is a log, not a saved map; analyze it as a log to find the rooms of its maps"
             )
-        return reader.first()
+        # Unlike `first`, this tells what is odd about the map.
+        return next(reader.snapshots())
 
 
 @contextmanager

@@ -71,8 +71,8 @@ def test_every_option_is_explained():
 
 def test_what_is_found_depends_on_the_maps_the_method_and_its_parameters():
     """Not on what is written, nor on how many processes work."""
-    names = {"topic", "map_from", "map_frame", "start_s", "end_s", "every_s", "min_change_m2"}
-    names |= {"max_snapshots", "method", "parameters"}
+    which = {"topic", "message_type", "part", "map_from", "map_frame", "start_s", "end_s", "every_s"}
+    names = which | {"min_change_m2", "max_snapshots", "method", "parameters"}
     assert set(RunOptions().deciding()) == names
     assert dataclasses.replace(RunOptions(), workers=3, recording=False).deciding() == RunOptions().deciding()
 

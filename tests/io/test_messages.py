@@ -1,5 +1,7 @@
 """Map messages decoded from bytes that rosbags and protobuf wrote."""
 
+import base64
+import json
 import math
 
 import numpy as np
@@ -7,9 +9,11 @@ import pytest
 from foxglove_grids import SCHEMA, foxglove_message
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from reader_logs import START_NS, Map, Update, serialized, serialized_costmap, typestore
+from reader_logs import START_NS, Map, Update, pose, serialized, serialized_costmap, typestore
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from rose2_logs.errors import InvalidMapError
+from rose2_logs.io.cell_values import STORED
 from rose2_logs.io.grids import Grid, Patch, flat_yaw_of
 from rose2_logs.io.messages import decoder
 
@@ -111,7 +115,9 @@ def test_any_quaternion_about_z_gives_its_yaw(quaternion, yaw):
 
 def test_values_outside_the_range_of_occupancy_count_as_unknown():
     cells = np.array([[-128, -2, -1, 0, 100, 101, 127]], np.int8)
-    assert decode(serialized(Map(cells), 2)).cells.tolist() == [[-1, -1, -1, 0, 100, -1, -1]]
+    read = STORED.of(decode(serialized(Map(cells), 2)))
+    assert read.cells.tolist() == [[-1, -1, -1, 0, 100, -1, -1]]
+    assert [each.kind for each in read.map_warnings] == ["odd_values"]
 
 
 def test_bytes_that_are_not_cdr_are_an_error():
@@ -143,7 +149,7 @@ def test_costs_of_nav2_become_percent_in_their_order():
 
 @pytest.mark.parametrize(
     ("message_type", "encoding"),
-    [("nav_msgs/msg/OccupancyGrid", "json"), ("sensor_msgs/msg/Image", "cdr"), ("foxglove.Grid", "json")],
+    [("nav2_msgs/msg/Costmap", "json"), ("sensor_msgs/msg/Image", "cdr"), ("foxglove.Grid", "flatbuffer")],
 )
 def test_other_types_and_encodings_are_not_maps(message_type, encoding):
     assert decoder(message_type, encoding) is None
@@ -161,7 +167,7 @@ def test_other_types_and_encodings_are_not_maps(message_type, encoding):
 )
 def test_a_foxglove_grid_of_one_channel_becomes_percent(padding, dtype, kind, values, expected):
     message = foxglove_message(np.array(values, dtype), kind, padding=padding)
-    grid = decode(message.SerializeToString(), "foxglove.Grid", "protobuf", SCHEMA)
+    grid = STORED.of(decode(message.SerializeToString(), "foxglove.Grid", "protobuf", SCHEMA))
     assert grid.cells.tolist() == expected
     assert grid.cells.dtype == np.int8
     assert grid.cells.flags.c_contiguous
@@ -214,3 +220,131 @@ def test_a_map_that_is_tilted_about_either_axis_is_no_flat_one(axis, degrees):
     else:
         with pytest.raises(InvalidMapError, match=f"tilted by {degrees:.0f} degrees"):
             flat_yaw_of(tuple(quaternion), [])
+
+
+CELLS = np.array([[0, 100, -1], [50, 0, -1]], np.int8)
+PLACE = {
+    "position": {"x": 1.5, "y": -2.5, "z": 0},
+    "orientation": {"x": 0, "y": 0, "z": math.sin(0.2), "w": math.cos(0.2)},
+}
+
+
+def foxglove_json(**changes):
+    return {
+        "timestamp": {"sec": 12, "nsec": 34},
+        "frame_id": "odom",
+        "pose": PLACE,
+        "column_count": 3,
+        "cell_size": {"x": 0.1, "y": 0.1},
+        "row_stride": 3,
+        "cell_stride": 1,
+        "fields": [{"name": "occupancy", "offset": 0, "type": 2}],
+        "data": base64.b64encode(CELLS.tobytes()).decode(),
+    } | changes
+
+
+def grid_json(**changes):
+    return {
+        "header": {"stamp": {"sec": 12, "nanosec": 34}, "frame_id": "odom"},
+        "info": {"resolution": 0.1, "width": 3, "height": 2, "origin": PLACE},
+        "data": CELLS.ravel().tolist(),
+    } | changes
+
+
+def is_as_written(grid):
+    assert grid.cells.tolist() == CELLS.tolist()
+    assert grid.stamp_ns == 12_000_000_034
+    assert grid.geometry.origin_xy_m == (1.5, -2.5)
+    assert (grid.geometry.resolution_m, grid.geometry.frame_id) == (0.1, "odom")
+    assert math.isclose(grid.geometry.yaw_rad, 0.4)
+
+
+@pytest.mark.parametrize(
+    ("kind", "message"),
+    [
+        ("foxglove.Grid", foxglove_json()),
+        ("foxglove_msgs/msg/Grid", foxglove_json()),
+        ("foxglove.Grid", foxglove_json(fields=[{"name": "any", "offset": 0, "type": "INT8"}])),
+        (GRID, grid_json()),
+        (GRID, grid_json(data=base64.b64encode(CELLS.tobytes()).decode())),
+        (GRID, grid_json(header={"stamp": {"secs": 12, "nsecs": 34}, "frame_id": "odom"})),
+    ],
+)
+def test_maps_in_json_are_read(kind, message):
+    is_as_written(decode(json.dumps(message).encode(), kind, "json"))
+
+
+@pytest.mark.parametrize(
+    ("kind", "text"),
+    [
+        (GRID, "[]"),
+        (GRID, "{"),
+        (GRID, "\xff"),
+        (GRID, json.dumps(grid_json(data=[0] * 5))),
+        (GRID, json.dumps(grid_json(data=["a"] * 6))),
+        (GRID, json.dumps(grid_json(info={}))),
+        (GRID, json.dumps(grid_json(info=grid_json()["info"] | {"width": 2**40}))),
+        ("foxglove.Grid", json.dumps(foxglove_json(data="?"))),
+        ("foxglove.Grid", json.dumps(foxglove_json(row_stride=4))),
+        ("foxglove.Grid", json.dumps(foxglove_json(fields=[]))),
+        ("foxglove.Grid", "[" * 100_000),
+    ],
+)
+def test_other_json_is_an_invalid_map_and_nothing_else(kind, text):
+    with pytest.raises(InvalidMapError):
+        decode(text.encode("latin-1"), kind, "json")
+
+
+FOXGLOVE_ROS = """
+builtin_interfaces/Time timestamp
+string frame_id
+geometry_msgs/Pose pose
+uint32 column_count
+foxglove_msgs/Vector2 cell_size
+uint32 row_stride
+uint32 cell_stride
+foxglove_msgs/PackedElementField[] fields
+uint8[] data
+"""
+
+
+@pytest.mark.parametrize("ros", [1, 2])
+def test_foxglove_grids_of_ros_are_read(ros):
+    store = get_typestore(Stores.ROS1_NOETIC if ros == 1 else Stores.ROS2_HUMBLE)
+    store.register(
+        get_types_from_msg("float64 x\nfloat64 y\n", "foxglove_msgs/msg/Vector2")
+        | get_types_from_msg(
+            "string name\nuint32 offset\nuint8 type\n", "foxglove_msgs/msg/PackedElementField"
+        )
+        | get_types_from_msg(FOXGLOVE_ROS, "foxglove_msgs/msg/Grid")
+    )
+    types = store.types
+    message = types["foxglove_msgs/msg/Grid"](
+        types["builtin_interfaces/msg/Time"](12, 34),
+        "odom",
+        pose(ros, (1.5, -2.5), 0.4),
+        3,
+        types["foxglove_msgs/msg/Vector2"](0.1, 0.1),
+        3,
+        1,
+        [types["foxglove_msgs/msg/PackedElementField"]("occupancy", 0, 2)],
+        CELLS.view(np.uint8).ravel(),
+    )
+    serialize = store.serialize_ros1 if ros == 1 else store.serialize_cdr
+    data = bytes(serialize(message, "foxglove_msgs/msg/Grid"))
+    is_as_written(decode(data, "foxglove_msgs/msg/Grid", ENCODINGS[ros]))
+    for length in range(0, len(data), 7):
+        with pytest.raises(InvalidMapError):
+            decode(data[:length], "foxglove_msgs/msg/Grid", ENCODINGS[ros])
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "nav_msgs::msg::dds_::OccupancyGrid_",
+        "nav_msgs/msg/dds_/OccupancyGrid_",
+        "nav_msgs::msg::OccupancyGrid",
+    ],
+)
+def test_type_names_may_be_spelled_as_dds_does(name):
+    assert decode(serialized(Map(CELLS), 2), name).cells.tolist() == CELLS.tolist()

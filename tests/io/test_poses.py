@@ -13,7 +13,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from rose2_logs.config.selection import Selection
 from rose2_logs.io import open_log
-from rose2_logs.io.poses import BASE_FRAMES, POSE_STEP_M, POSE_STEP_S
+from rose2_logs.io.poses import BASE_FRAMES, POSE_STEP_M, POSE_STEP_S, RobotPath
 
 PROJECT = Path(__file__).parents[2]
 ROS2, ROS1 = get_typestore(Stores.ROS2_HUMBLE), get_typestore(Stores.ROS1_NOETIC)
@@ -184,10 +184,60 @@ def test_broken_numbers_are_passed_over(tmp_path):
 
 
 def test_transforms_in_a_circle_end():
-    from rose2_logs.io.poses import _base_in, _Edge
+    from rose2_logs.io.poses import _base_in, _Edge, _Wanted
 
     edges = {BASE_FRAMES[0]: _Edge("odom", (1.0, 0.0, 0.0)), "odom": _Edge(BASE_FRAMES[0], (1.0, 0.0, 0.0))}
-    assert _base_in("map", edges) == (None, ())
+    assert _base_in(_Wanted("map", ""), edges) == (None, ())
+
+
+def both_robots(topics: tuple[str, str], bases: tuple[str, str]) -> Iterator[Message]:
+    """Drive two robots along two lines; each tells it on a topic of its own or on the same."""
+    kind = ROS2.types[TF]
+    for tick in range(100):
+        time = tick * SECOND // 2
+        for y, topic, base in zip((1.0, 7.0), topics, bases, strict=True):
+            yield time, topic, TF, kind([transform(ROS2, time, "map", base, tick / 5, y, 0.0)])
+
+
+def test_the_way_is_that_of_the_robot_in_the_namespace_of_the_map(tmp_path, caplog):
+    topics = ("/one/tf", "/two/tf")
+    path = write(tmp_path / "run.mcap", both_robots(topics, ("base_link", "base_link")))
+    with open_log(path) as log:
+        for topic, y in zip(topics, (1.0, 7.0), strict=True):
+            found = RobotPath(log.source, "map", map_topic=topic.replace("tf", "map"))
+            assert found.origin == topic
+            assert set(found.until(2**62)[:, 1]) == {y}
+        assert not caplog.text
+        assert set(RobotPath(log.source, "map", map_topic="/map").until(2**62)[:, 1]) == {1.0}
+    assert "/two/tf tell of other robots, which are not shown" in caplog.text
+
+
+def test_of_two_robots_on_one_topic_one_is_shown_and_the_other_is_told_of(tmp_path, caplog):
+    path = write(tmp_path / "run.mcap", both_robots(("/tf", "/tf"), ("one/base_link", "two/base_link")))
+    assert set(way(path)[1][:, 1]) == {1.0}
+    assert "two/base_link are other robots" in caplog.text
+    with open_log(path) as log:
+        assert set(log.robot_path("map", "two/base_link").until(2**62)[:, 1]) == {7.0}
+        assert log.decided["path"] == "/tf"
+
+
+def test_a_base_of_another_name_is_found_below_odom_or_named(tmp_path, caplog):
+    path = write(tmp_path / "run.mcap", drive(base="chassis"))
+    origin, found = way(path)
+    assert origin == "/tf"
+    assert found[:, 0] == pytest.approx(1.0)
+    assert "the robot's base is taken to be 'chassis'" in caplog.text
+    with open_log(path) as log:
+        np.testing.assert_array_equal(log.robot_path("map", "chassis").until(2**62), found)
+        assert log.robot_path("map", "wheel").origin == "/tf"
+        assert log.robot_path("map", "arm").origin == ""
+    assert "no transforms lead from 'map' to the base frame 'arm'" in caplog.text
+
+
+def test_odometry_in_another_frame_than_the_map_is_told_of(tmp_path, caplog):
+    messages = ((k * SECOND, "/odom", ODOMETRY, odometry(ROS2, k * SECOND, float(k))) for k in range(5))
+    assert way(write(tmp_path / "run.mcap", messages))[0] == "/odom"
+    assert "in the frame 'odom' instead of 'map'" in caplog.text
 
 
 @pytest.mark.parametrize("log", ["office.mcap", "wing.bag", "ring"])

@@ -122,7 +122,6 @@ def test_unknown_cells_saved_with_too_high_a_free_thresh_stay_unknown(tmp_path, 
         ({"free_thresh": -1}, "thresh"),
         ({"negate": "maybe"}, "negate"),
         ({"mode": "rgb"}, "mode"),
-        ({"image": "gone.pgm"}, "gone.pgm"),
         ({"image": None}, "image"),
     ],
 )
@@ -171,3 +170,75 @@ def test_an_image_alone_asks_for_its_description(tmp_path):
     Image.fromarray(PIXELS).save(tmp_path / "alone.png")
     with pytest.raises(LogError, match=r"alone\.yaml"):
         open_log(tmp_path / "alone.png")
+
+
+@pytest.mark.parametrize("resolution", ["5e-2", "0.05", ".05", '"0.05"', "5.0E-02", "+0.05"])
+def test_numbers_are_read_as_yaml_1_2_and_yaml_cpp_read_them(resolution, tmp_path):
+    path = save(tmp_path / "m", PIXELS, resolution=resolution, origin="[-9.39e-05, 1e-05, 010]")
+    geometry = read(path)[0].geometry
+    assert geometry.resolution_m == 0.05
+    assert geometry.origin_xy_m == (-9.39e-05, 1e-05)
+    assert geometry.yaw_rad == pytest.approx(math.remainder(10, math.tau))
+
+
+@pytest.mark.parametrize("resolution", ["0,05", "1:30", "0x10", "5e-2m", "yes", "1_0", "inf"])
+def test_what_is_no_number_there_is_none_here(resolution, tmp_path):
+    with (
+        open_log(save(tmp_path / "m", PIXELS, resolution=resolution)) as log,
+        pytest.raises(InvalidMapError, match="resolution is"),
+    ):
+        list(log.snapshots())
+
+
+@pytest.mark.parametrize("negate", ["0", "false", "False", "no", '"0"'])
+def test_negate_may_be_a_word(negate, tmp_path):
+    assert read(save(tmp_path / "m", PIXELS, negate=negate))[0].cells.tolist() == [[0, 0, -1], [100, 0, -1]]
+
+
+@pytest.mark.parametrize("yaw", [".nan", "nan", "-nan", ".NaN"])
+def test_a_yaw_that_is_not_a_number_is_none_and_told(yaw, tmp_path, caplog):
+    (snapshot,) = read(save(tmp_path / "m", PIXELS, origin=f"[1.0, 2.0, {yaw}]"))
+    assert snapshot.geometry.yaw_rad == 0
+    assert snapshot.geometry.origin_xy_m == (1.0, 2.0)
+    assert "the yaw of its origin is not a number" in caplog.text
+
+
+@pytest.mark.parametrize(
+    "named",
+    [
+        "maps/m.pgm",
+        "/home/robot/maps/m.pgm",
+        "~/m.pgm",
+        "file:///home/robot/m.pgm",
+        "package://maps/m.pgm",
+        r"C:\maps\m.pgm",
+        "../m.pgm",
+        "gone.pgm",
+    ],
+)
+def test_an_image_that_lies_elsewhere_is_the_one_beside_the_description(named, tmp_path, caplog, monkeypatch):
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    path = save(tmp_path / "m", PIXELS)
+    path.write_text(path.read_text().replace("image: m.pgm", f"image: '{named}'"))
+    assert read(path)[0].cells.tolist() == [[0, 0, -1], [100, 0, -1]]
+    assert "m.pgm next to m.yaml is read" in caplog.text
+
+
+@pytest.mark.parametrize("named", ["~/maps/m.pgm", "file://{}/home/maps/m.pgm", "home/maps/m.pgm"])
+def test_an_image_that_is_where_its_description_says_is_read_without_a_word(
+    named, tmp_path, caplog, monkeypatch
+):
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    path = save(tmp_path / "m", PIXELS)
+    (tmp_path / "home/maps").mkdir(parents=True)
+    (tmp_path / "m.pgm").rename(tmp_path / "home/maps/m.pgm")
+    path.write_text(path.read_text().replace("image: m.pgm", f"image: {named.format(tmp_path)}"))
+    assert len(read(path)) == 1
+    assert not caplog.text
+
+
+def test_an_image_that_is_nowhere_is_an_error_that_names_it(tmp_path):
+    path = save(tmp_path / "m", PIXELS)
+    (tmp_path / "m.pgm").unlink()
+    with open_log(path) as log, pytest.raises(InvalidMapError, match=r"m\.pgm"):
+        list(log.snapshots())

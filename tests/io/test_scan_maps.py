@@ -1,4 +1,5 @@
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,9 @@ from scan_logs import START_NS, Echoes, Move, Scan, ranges_in_box, turned, write
 import rose2_logs as rl
 from rose2_logs.errors import LogError, NoMapTopicError
 from rose2_logs.io import open_log
-from rose2_logs.io.log import LogReader
+from rose2_logs.io.log import LogReader, choose_topic
+from rose2_logs.io.scan_topics import mappable_topics
+from rose2_logs.io.source import LogInfo, TopicInfo
 
 BEARINGS = np.linspace(-math.pi, math.pi, 361)[:-1]
 LOW, HIGH = (0.025, 0.025), (6.025, 4.025)
@@ -223,6 +226,65 @@ def test_a_log_of_scans_without_maps_says_how_to_build_them(tmp_path):
     path = write_scans(tmp_path / "run.mcap", drive(duration_s=1.0))
     with pytest.raises(NoMapTopicError, match="map_from='/scan' builds maps from its laser scans"):
         open_log(path)
+
+
+def test_built_maps_are_read_as_recorded_ones_are(tmp_path):
+    """Their numbers are percent, they are of one run, and it is said where the way comes from."""
+    path = write_scans(tmp_path / "run.mcap", drive())
+    with rl.open_log(path, map_from="/scan", every_s=0.5) as reader:
+        assert len(list(reader.snapshots())) > 2
+        assert len(reader.robot_path("map").until(2**62)) > 5
+        assert reader.decided["values"]["values"] == "percent"
+        assert reader.decided["path"] == "/tf, /tf_static"
+        assert "part" not in reader.decided
+    with (
+        rl.open_log(path, map_from="/scan", part=2) as reader,
+        pytest.raises(LogError, match="/scan/map has no part 2; it has 1"),
+    ):
+        reader.last()
+
+
+@pytest.mark.parametrize(("robot", "y"), [("one", 2.0), ("two", 5.0)])
+def test_the_way_is_that_of_the_robot_whose_scans_the_map_is_built_from(tmp_path, robot, y):
+    logged = []
+    for name, shift in (("one", 0.0), ("two", 3.0)):
+        for topic, each in drive(duration_s=2.0):
+            if isinstance(each, Scan):
+                logged.append((f"/{name}/scan", replace(each, frame=f"{name}/laser")))
+                continue
+            parent = each.parent if each.parent == "map" else f"{name}/{each.parent}"
+            x, at, z = each.position
+            position = (x, at + shift, z) if parent == "map" else each.position
+            logged.append(
+                (topic, replace(each, parent=parent, child=f"{name}/{each.child}", position=position))
+            )
+    path = write_scans(tmp_path / "run.mcap", logged)
+    with rl.open_log(path, map_from=f"/{robot}/scan") as reader:
+        way = reader.robot_path("map").until(2**62)
+    np.testing.assert_allclose(way[:, 1], y)
+
+
+def test_type_names_as_dds_spells_them_are_scans_and_transforms():
+    topics = tuple(
+        TopicInfo(name, kind, 1, False, "cdr")
+        for name, kind in (
+            ("/scan", "sensor_msgs::msg::dds_::LaserScan_"),
+            ("/tf", "tf2_msgs::msg::dds_::TFMessage_"),
+        )
+    )
+    assert mappable_topics(LogInfo(Path("run.mcap"), "MCAP", 1, 0, 1, topics, True)) == ("/scan",)
+
+
+def test_both_ways_are_named_where_maps_may_lie_on_topics_without_a_type():
+    topics = (
+        TopicInfo("/map", "", 1, False, "cdr"),
+        TopicInfo("/scan", "sensor_msgs/msg/LaserScan", 1, False, "cdr"),
+        TopicInfo("/tf", "tf2_msgs/msg/TFMessage", 1, False, "cdr"),
+    )
+    with pytest.raises(
+        NoMapTopicError, match=r"message_type='nav_msgs/OccupancyGrid'\); map_from='/scan' builds"
+    ):
+        choose_topic(LogInfo(Path("run.mcap"), "MCAP", 1, 0, 1, topics, True))
 
 
 def test_memory_holds_one_map_and_any_map_can_be_read_again(tmp_path):

@@ -35,21 +35,31 @@ def frontiers(labels: np.ndarray, cells: np.ndarray, resolution_m: float = 1.0) 
 
 
 def test_a_frontier_is_counted_in_cell_sides():
-    """Sides towards unknown cells count; those towards walls, other rooms and the canvas' end do not."""
-    labels = rows("112", "112")
-    cells = np.array([[0, 0, 0], [0, 0, 0]])
+    """Sides towards unknown cells count; those towards walls and other rooms do not."""
+    labels = np.pad(rows("112", "112"), 1)
+    cells = np.pad(np.zeros((2, 3), int), 1, constant_values=100)
     assert frontiers(labels, cells) == [0, 0]
-    unknown_beside = np.pad(cells, ((0, 1), (1, 1)), constant_values=-1)
-    grown = np.pad(labels, ((0, 1), (1, 1)))
-    assert frontiers(grown, unknown_beside) == [4, 3]
-    unknown_beside[2] = 100
-    assert frontiers(grown, unknown_beside, 0.5) == [1, 1]
+    cells[3, :] = cells[:, 0] = cells[:, -1] = -1
+    assert frontiers(labels, cells) == [4, 3]
+    cells[3] = 100
+    assert frontiers(labels, cells, 0.5) == [1, 1]
+
+
+def test_what_is_beyond_the_grid_is_unknown_as_in_a_map_with_a_border():
+    labels, cells = rows("112", "112", "..2"), np.zeros((3, 3), int)
+    cells[2, :2] = 100
+    cropped = frontiers(labels, cells)
+    assert cropped == [4, 5]
+    assert frontiers(np.pad(labels, 2), np.pad(cells, 2, constant_values=-1)) == cropped
 
 
 def test_an_unknown_hole_is_a_frontier_too():
     """One unseen cell within a room has four sides."""
-    labels, cells = rows("111", "1.1", "111"), np.zeros((3, 3), int)
-    cells[1, 1] = -1
+    labels, cells = (
+        np.pad(rows("111", "1.1", "111"), 1),
+        np.pad(np.zeros((3, 3), int), 1, constant_values=100),
+    )
+    cells[2, 2] = -1
     assert frontiers(labels, cells) == [4]
 
 

@@ -11,6 +11,7 @@ import struct
 from collections import Counter, OrderedDict
 from collections.abc import Collection, Iterator
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import IO, Any
 
@@ -19,11 +20,11 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, ChunkIndex, Header, Metadata, Schema
 from mcap.records import Channel as McapChannel
 
-from rose2_logs.config.parameters import ReadingParameters
+from rose2_logs.config.parameters import NO_TYPE, ReadingParameters
 from rose2_logs.errors import LogError
 from rose2_logs.io.checked_file import CheckedFile
 from rose2_logs.io.decompression import REMEDY
-from rose2_logs.io.log_file import LATEST_NS, LogFile, Place, StoredMessage, check_count
+from rose2_logs.io.log_file import LATEST_NS, Channel, LogFile, Place, StoredMessage, check_count
 from rose2_logs.io.mcap.records import (
     INDEX,
     INDEX_ENTRY,
@@ -96,6 +97,13 @@ class McapFile(LogFile):
         except BaseException:
             self._stream.close()
             raise
+
+    def _typed(self, channel: Channel) -> Channel:
+        """Give a channel without schema the type that was named."""
+        named = self.limits.type_without_schema
+        if channel.schema_name or named == NO_TYPE:
+            return channel
+        return replace(channel, schema_name=named)
 
     def close(self) -> None:
         """Close the file."""
@@ -256,7 +264,7 @@ class McapFile(LogFile):
 
     def _take_summary(self) -> None:
         assert self.summary is not None
-        self.channels = self.summary.channels
+        self.channels = {number: self._typed(each) for number, each in self.summary.channels.items()}
         statistics = self.summary.statistics
         if statistics.message_count:
             self.message_counts.update(statistics.channel_message_counts)
@@ -320,7 +328,8 @@ class McapFile(LogFile):
             self._schemas[schema.id] = schema
         elif record.opcode == Opcode.CHANNEL:
             channel = parsed(McapChannel, record.content)
-            self.channels[channel.id] = channel_of(channel, self._schemas.get(channel.schema_id))
+            found = channel_of(channel, self._schemas.get(channel.schema_id))
+            self.channels[channel.id] = self._typed(found)
 
     def _add(self, head: memoryview, record: int, offset: int) -> None:
         channel_id, _, log_time_ns, _ = MESSAGE.unpack_from(head)

@@ -159,7 +159,9 @@ class AnnotatedMcap(Sink):
 
     def write(self, step: TrackedSnapshot) -> None:
         """Copy the input up to the map's log time, then add the results of the map."""
-        time_ns = step.snapshot.log_time_ns
+        source = self._source
+        assert source is not None  # it was opened by `begin`
+        time_ns = source.recorded_ns(step.snapshot.log_time_ns)
         self._extent.add(step)
         self._frame_id = step.analysis.geometry.frame_id
         with self._writing():

@@ -1,0 +1,284 @@
+"""What the numbers in a run's cells mean: decided once, from the numbers that the run's maps hold.
+
+Most maps say -1, 0 and 100. Others hold probabilities that a cell is occupied, -1, 0 and 1 as the definition
+of the ROS 2 message says, 50 where nothing is known, or the costs of a costmap. Each is turned into percent
+that map_server's thresholds tell apart, so that everything behind the reader sees one kind of map.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rose2_logs.config.parameters import OccupancyParameters
+from rose2_logs.io.grids import Cells, Grid, MapWarning, Patch, percent
+from rose2_logs.model.labels import label_sizes
+from rose2_logs.model.occupancy import HIGHEST_PERCENT, UNKNOWN, OccupancySnapshot, classify
+from rose2_logs.system.text import percent as as_percent
+
+Counts = NDArray[np.int64]
+"""Number of cells (256,) by the byte that they are stored as; 255 is -1."""
+Message = TypeVar("Message", bound=Grid | Patch)
+
+USUAL = OccupancyParameters()
+FREE_BELOW, OCCUPIED_ABOVE = USUAL.free_max_percent, USUAL.occupied_min_percent
+UNKNOWN_BYTE = 255
+HALF = 50
+"""Percent at which nothing speaks for free or for occupied."""
+LETHAL_COST = 254
+LEAST_CELLS = 1000
+"""Known cells, 2.5 m2 of 5 cm, below which the numbers of the maps decide nothing."""
+MAPS_LOOKED_AT = 5
+"""Maps, evenly spread over the run, whose numbers decide: the first, the last and some between."""
+UNSURE_SHARE = 0.2
+"""Where more of the cells below one half lie above the usual threshold of free ones, it does not fit: a tenth
+does in maps of probabilities whose rooms are right, none in maps of two values; costmaps, in which many do,
+are known by their own numbers. The same of the cells above one half and the threshold of occupied ones."""
+WALL_SHARE = 0.01
+"""Known cells that are walls at least: 4 to 10 % are, in the maps of buildings that were looked at."""
+WALLS_AT_MOST = 1 / 3
+"""Known cells above one half at most, if these are walls: a map with more is noise, or of no building."""
+FAINT_RATIO = 4
+"""Walls are faint where so many times more cells lie between the thresholds than above the upper one: up to
+0.9 times in saved maps whose walls are clear, 20 times in one whose walls are not."""
+SPIKE_RATIO = 5
+"""A number stands for something of its own if it comes so many times as often as its two neighbors."""
+UNKNOWN_SHARE = 0.01
+"""Cells that are unknown, at least, if one number stands for it: 4 % are, with two around a building."""
+BORDER_WALL_SHARE = 0.05
+"""Where less of the border of the free cells is wall, the map tells no rooms."""
+BORDER_LEAST_SIDES = 200
+"""Cell sides, 10 m of 5 cm, below which the border of the free cells says nothing."""
+
+
+@dataclass(frozen=True, eq=False)
+class CellReading:
+    """How the numbers in the cells of a run are turned into percent.
+
+    Attributes
+    ----------
+    name : str
+        What they are.
+    table : (256,) int8 or None
+        Percent, -1 for unknown, of each byte; None leaves -1..100 as they are.
+    free_below, occupied_above : float
+        Stored numbers below and above which cells are free and occupied.
+    why : str
+        What is told of it: one line; empty where the numbers are the usual ones or were said to be these.
+    """
+
+    name: str
+    table: Cells | None = None
+    free_below: float = FREE_BELOW
+    occupied_above: float = OCCUPIED_ABOVE
+    why: str = ""
+
+    def of(self, message: Message) -> Message:
+        """Return a map or a patch, whose cells are as they are stored, in percent."""
+        if self.table is OCCUPANCY_OF_COST:
+            return replace(message, cells=OCCUPANCY_OF_COST[message.cells.view(np.uint8)])
+        found: list[MapWarning] = []
+        cells = percent(message.cells, found)
+        if self.table is not None:
+            cells = self.table[cells.view(np.uint8)]
+        if cells is message.cells:
+            return message
+        return replace(message, cells=cells, map_warnings=(*message.map_warnings, *found))
+
+    def as_json(self) -> dict[str, str | float]:
+        """Return name and thresholds."""
+        return {
+            "values": self.name,
+            "free_below": self.free_below,
+            "occupied_above": self.occupied_above,
+        }
+
+
+STORED = CellReading("percent")
+"""Percent as they are stored."""
+
+
+def _bytes() -> Cells:
+    """Percent of each byte as it is stored: -1, 0..100; all others are unknown."""
+    table = np.full(256, UNKNOWN, np.int8)
+    table[: HIGHEST_PERCENT + 1] = np.arange(HIGHEST_PERCENT + 1)
+    return table
+
+
+def _zero_one_table() -> Cells:
+    table = np.full(256, UNKNOWN, np.int8)
+    table[:2] = 0, HIGHEST_PERCENT
+    return table
+
+
+def _without_fifty(table: Cells) -> Cells:
+    table = table.copy()
+    table[HALF] = UNKNOWN
+    return table
+
+
+def _cost_table() -> Cells:
+    table = np.empty(256, np.int8)
+    table[0], table[253], table[LETHAL_COST], table[UNKNOWN_BYTE] = 0, 99, HIGHEST_PERCENT, UNKNOWN
+    table[1:253] = 1 + (97 * (np.arange(1, 253) - 1)) // 251
+    return table
+
+
+OCCUPANCY_OF_COST = _cost_table()
+"""Occupancy per cost: 0 free, 1..252 to 1..98, 253 (inscribed) 99, 254 (lethal) 100, 255 unknown. nav2
+publishes its costmaps as occupancy grids by the same table."""
+OVERRULED = "the parameter occupancy.values=stored reads them as they are"
+"""Ends what is told of a decision."""
+READINGS = {
+    "zero_one": CellReading(
+        "0 and 1",
+        _zero_one_table(),
+        0.5,
+        0.5,
+        "the cells are 0 and 1, not percent: 0 is read as free, 1 as occupied",
+    ),
+    "fifty_unknown": CellReading(
+        "percent, 50 is unknown",
+        _without_fifty(_bytes()),
+        why="no cell is -1 and many are 50: these are read as unknown",
+    ),
+    "costs": CellReading(
+        "costs",
+        OCCUPANCY_OF_COST,
+        float(np.count_nonzero(OCCUPANCY_OF_COST[:253] < FREE_BELOW)),
+        float(np.flatnonzero(OCCUPANCY_OF_COST > OCCUPIED_ABOVE)[0] - 1),
+        "the cells are costs from 0 to 255, not percent: 254 is read as occupied, 255 as unknown",
+    ),
+}
+"""Readings that have a name among `CELL_VALUES`."""
+
+
+def read_as(parameters: OccupancyParameters) -> CellReading:
+    """Return the reading that parameters, whose `values` are not ``auto``, ask for."""
+    if parameters.values in READINGS:
+        return replace(READINGS[parameters.values], why="")
+    return replace(
+        STORED, free_below=parameters.free_max_percent, occupied_above=parameters.occupied_min_percent
+    )
+
+
+def count_values(cells: Cells) -> Counts:
+    """Count the cells (H, W) by the byte that they are stored as."""
+    return label_sizes(cells.view(np.uint8), UNKNOWN_BYTE)
+
+
+def decide(counts: Counts) -> CellReading:
+    """Decide what the numbers in the cells of a run mean.
+
+    Parameters
+    ----------
+    counts : (256,) int
+        Cells of some of its maps, by the byte that they are stored as.
+
+    Returns
+    -------
+    CellReading
+        That of the usual percent where these fit, or where there are too few known cells to say.
+    """
+    known = counts.copy()
+    known[UNKNOWN_BYTE] = 0
+    total = int(known.sum())
+    if total < LEAST_CELLS:
+        return STORED
+    if known[LETHAL_COST] > max(WALL_SHARE * total, known[HIGHEST_PERCENT]):
+        return READINGS["costs"]
+    if known[0] and known[1] > WALL_SHARE * total and not known[2:].any():
+        return READINGS["zero_one"]
+    is_fifty_unknown = (
+        known[HALF] > UNKNOWN_SHARE * total
+        and known[HALF] > SPIKE_RATIO * (known[HALF - 1] + known[HALF + 1])
+        and counts[UNKNOWN_BYTE] < UNKNOWN_SHARE * known[HALF]
+        and not _are_inflated_costs(known)
+    )
+    if not is_fifty_unknown:
+        return _of_percent(known[: HIGHEST_PERCENT + 1])
+    known[HALF] = 0
+    found, fifty = _of_percent(known[: HIGHEST_PERCENT + 1]), READINGS["fifty_unknown"]
+    if found.table is None:
+        return fifty
+    why = f"{fifty.why}; {found.why}"
+    return replace(found, name=f"{found.name}, 50 is unknown", table=_without_fifty(found.table), why=why)
+
+
+def _of_percent(known: Counts) -> CellReading:
+    """Decide the thresholds of percent, by the number (101,) of cells with each."""
+    total = int(known.sum())
+    free = int(known[: int(FREE_BELOW) + 1].sum())
+    below_half = int(known[:HALF].sum())
+    walls = int(known[int(OCCUPIED_ABOVE) + 1 :].sum())
+    if total < LEAST_CELLS or _are_inflated_costs(known):
+        return STORED
+    free_below, occupied_above = FREE_BELOW, OCCUPIED_ABOVE
+    above_half = total - below_half
+    between = known.copy()
+    between[: int(FREE_BELOW) + 1] = between[int(OCCUPIED_ABOVE) + 1 :] = 0
+    count = int(between.sum())
+    if below_half - free > UNSURE_SHARE * below_half and WALL_SHARE <= above_half / total <= WALLS_AT_MOST:
+        free_below = float(HALF)
+        if above_half - walls > UNSURE_SHARE * above_half:
+            occupied_above = float(HALF)
+    elif count > FAINT_RATIO * walls and WALL_SHARE <= count / total <= WALLS_AT_MOST:
+        mean = float(between @ np.arange(len(between))) / count
+        occupied_above = float(np.floor((FREE_BELOW + mean) / 2))
+    else:
+        return STORED
+    what = "probabilities" if free_below != FREE_BELOW else "percent with faint walls"
+    share = as_percent(count / total)
+    why = (
+        f"the cells hold {what}, {share} of the known ones between the usual thresholds of {FREE_BELOW:g} "
+        f"and {OCCUPIED_ABOVE:g}: below {free_below:g} is read as free, above {occupied_above:g} as occupied"
+    )
+    return CellReading(what, _threshold_table(free_below, occupied_above), free_below, occupied_above, why)
+
+
+def _are_inflated_costs(known: Counts) -> bool:
+    """Whether percent come from a costmap: next to obstacles it is 99, and falls off from there by a jump."""
+    inscribed, lethal, below = known[99], known[HIGHEST_PERCENT], known[95:99]
+    return bool(lethal and inscribed > SPIKE_RATIO * max(below.max(), 1) and SPIKE_RATIO * inscribed > lethal)
+
+
+def _threshold_table(free_below: float, occupied_above: float) -> Cells:
+    """Percent that the usual thresholds tell apart as these do the stored ones; order is kept."""
+    table = _bytes()
+    stored = np.arange(HIGHEST_PERCENT + 1)
+    free, occupied = stored < free_below, stored > occupied_above
+    between = ~free & ~occupied
+    for which, low, high in (
+        (free, 0, int(FREE_BELOW)),
+        (between, int(FREE_BELOW) + 1, int(OCCUPIED_ABOVE)),
+        (occupied, int(OCCUPIED_ABOVE) + 1, HIGHEST_PERCENT),
+    ):
+        table[:101][which] = np.round(np.linspace(low, high, np.count_nonzero(which)))
+    return table
+
+
+def few_walls(snapshot: OccupancySnapshot, parameters: OccupancyParameters) -> str | None:
+    """Say that hardly any of the border of a map's free cells is wall; None where enough of it is.
+
+    In costmaps the cells around walls are neither, and nothing is said of these.
+    """
+    if _are_inflated_costs(count_values(snapshot.cells)):
+        return None
+    free, occupied = classify(snapshot.cells, parameters)
+    walls = sides = 0
+    for one, other in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
+        sides += int(np.count_nonzero(free[one] != free[other]))
+        walls += int(np.count_nonzero(free[one] & occupied[other]))
+        walls += int(np.count_nonzero(occupied[one] & free[other]))
+    sides += sum(
+        int(np.count_nonzero(free[edge])) for edge in (np.s_[0], np.s_[-1], np.s_[:, 0], np.s_[:, -1])
+    )
+    if sides < BORDER_LEAST_SIDES or walls >= BORDER_WALL_SHARE * sides:
+        return None
+    return (
+        f"only {as_percent(walls / sides)} of the border of its free cells is wall: rooms cannot be told "
+        "apart; if walls are there but fainter, lower the parameter occupancy.occupied_min_percent"
+    )

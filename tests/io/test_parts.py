@@ -1,0 +1,167 @@
+"""Maps that are not of one run are told of and kept apart."""
+
+import numpy as np
+import pytest
+from PIL import Image
+from reader_logs import SHARED, START_NS, Map, McapLog, serialized
+
+import rose2_logs as rl
+from rose2_logs.config.parameters import ReadingParameters
+from rose2_logs.errors import LogError, NoMapTopicError, ParameterError
+from rose2_logs.io import open_log
+from rose2_logs.system.warnings import StrictError, collect_warnings
+
+
+def seen(columns, width=200, wall=100):
+    """A room of which more and more is seen."""
+    cells = np.full((100, width), -1, np.int8)
+    cells[10:90, 5:columns] = 0
+    cells[[9, 90], 5:columns] = wall
+    return cells
+
+
+def log_of(path, maps):
+    log = McapLog(path)
+    for k, each in enumerate(maps):
+        log.add("/map", START_NS + k * 10**9, each if isinstance(each, Map) else Map(each))
+    return log.close()
+
+
+def read(path, **options):
+    with collect_warnings() as found, open_log(path, **options) as reader:
+        free = [int((each.cells == 0).sum()) // 80 for each in reader.snapshots()]
+        return free, reader.decided.get("part"), found.kinds
+
+
+GROWING = [50, 80, 110, 140, 170]
+
+
+def test_two_publishers_are_kept_apart_and_the_one_that_grows_is_read(tmp_path):
+    pairs = [(Map(seen(columns)), Map(seen(140, 150))) for columns in GROWING]
+    path = log_of(tmp_path / "run.mcap", [each for pair in pairs for each in pair])
+    free, part, kinds = read(path)
+    assert free == [columns - 5 for columns in GROWING]
+    assert part == {"number": 1, "count": 2}
+    (told,) = kinds["parts"].first
+    assert "as of several publishers" in told["message"]
+    assert "part=2 takes another" in told["message"]
+    assert read(path, part=2) == ([135], {"number": 2, "count": 2}, {})
+    with pytest.raises(LogError, match="has no part 3; it has 2"):
+        read(path, part=3)
+    with pytest.raises(StrictError), collect_warnings(strict=True), open_log(path) as reader:
+        reader.first()
+
+
+def test_a_map_that_is_begun_anew_is_a_part_of_its_own(tmp_path):
+    path = log_of(tmp_path / "run.mcap", [seen(columns) for columns in (*GROWING, *GROWING[:4])])
+    free, part, kinds = read(path)
+    assert free == [columns - 5 for columns in GROWING]
+    assert part == {"number": 1, "count": 2}
+    assert "the map is begun anew" in kinds["parts"].first[0]["message"]
+    assert read(path, part=2)[0] == [columns - 5 for columns in GROWING[:4]]
+
+
+def test_the_place_where_a_map_is_begun_anew_is_found_in_a_long_log(tmp_path):
+    columns = [*range(30, 190), *range(20, 150)]
+    path = log_of(tmp_path / "run.mcap", [seen(each) for each in columns])
+    assert read(path)[0] == [each - 5 for each in columns[:160]]
+    assert read(path, part=2)[0] == [each - 5 for each in columns[160:]]
+
+
+def grown(columns, left):
+    """The same, cropped to what is known."""
+    cells = seen(columns)[:, left:]
+    return Map(cells, origin=(left * 0.05, 0.0))
+
+
+@pytest.mark.parametrize(
+    "maps",
+    [
+        [seen(each) for each in GROWING],
+        # One bad map between others, and a map that loses a third to a loop closure.
+        [seen(each) for each in (110, 140, 30, 140, 170)],
+        [seen(each) for each in (110, 170, 120, 130)],
+        # A grid that goes back and forth while the map stays what it is.
+        [
+            grown(columns, left)
+            for columns, left in zip((100, 101, 102, 103, 104, 105), (0, 4) * 3, strict=True)
+        ],
+    ],
+)
+def test_maps_of_one_run_are_one_part(maps, tmp_path):
+    free, part, kinds = read(log_of(tmp_path / "run.mcap", maps))
+    assert len(free) == len(maps)
+    assert part is None
+    assert not kinds
+
+
+@pytest.mark.skipif(not (SHARED / "faults").is_dir(), reason="needs ../shared/faults")
+@pytest.mark.parametrize(("name", "number"), [("two_publishers", 1), ("reset_moved", 2), ("gazebo_reset", 2)])
+def test_parts_of_logs_as_users_have_them(name, number):
+    with collect_warnings() as found, open_log(SHARED / "faults" / f"{name}.mcap") as reader:
+        free = [int((each.cells == 0).sum()) for each in reader.snapshots()]
+    assert free == [4862, 13862, 22448, 31130, 40130, 44896]
+    assert reader.decided["part"] == {"number": number, "count": 2}
+    assert found.kinds["parts"].count == 1
+
+
+def save(folder, name, cells):
+    pixels = np.flipud(np.select([cells == -1, cells == 0], [205, 254], 0)).astype(np.uint8)
+    Image.fromarray(pixels).save(folder / f"{name}.pgm")
+    text = f"image: {name}.pgm\nresolution: 0.05\norigin: [0, 0, 0]\nnegate: 0\n"
+    (folder / f"{name}.yaml").write_text(text + "occupied_thresh: 0.65\nfree_thresh: 0.196\n")
+
+
+def test_saved_maps_that_grow_from_each_other_are_one_run(tmp_path):
+    for k, columns in enumerate(GROWING):
+        save(tmp_path, f"map{k}", seen(columns))
+    save(tmp_path, "map2", np.full((100, 200), -1, np.int8))
+    free, part, kinds = read(tmp_path)
+    assert (len(free), part, kinds) == (5, None, {})
+
+
+@pytest.mark.parametrize("names", [("floor1", "floor2"), ("2nd floor", "3rd floor"), ("lab", "office")])
+def test_saved_maps_of_other_floors_and_masks_are_not_read_as_one_run(names, tmp_path):
+    upper = seen(170) if "floor" in names[0] else np.pad(seen(170).T, ((0, 0), (0, 100)))[:100]
+    save(tmp_path, names[0], seen(170))
+    save(tmp_path, names[1], upper)
+    save(tmp_path, "keepout_mask", np.where(seen(170) == 0, 100, 0).astype(np.int8))
+    free, part, kinds = read(tmp_path)
+    assert len(free) == 1
+    assert part["count"] == 2
+    assert set(kinds) == {"masks", "parts"}
+    assert "keepout_mask.yaml left out" in kinds["masks"].first[0]["message"]
+
+
+def test_the_choice_among_topics_is_told_unless_one_was_named(tmp_path):
+    log = McapLog(tmp_path / "run.mcap")
+    for k, topic in enumerate(("/one/map", "/map", "/two/map")):
+        log.add(topic, START_NS + k, Map(seen(100)))
+    path = log.close()
+    (told,) = read(path)[2]["topic"].first
+    assert told["message"].endswith(
+        "/map is read; /one/map, /two/map hold maps, too; topic='/one/map' chooses another"
+    )
+    assert not read(path, topic="/map")[2]
+
+
+def test_a_channel_without_a_schema_is_named_and_read_by_the_type_that_is_given(tmp_path):
+    log = McapLog(tmp_path / "run.mcap")
+    log.raw("/map", START_NS, ("", "", b""), "cdr", serialized(Map(seen(100)), 2))
+    path = log.close()
+    with pytest.raises(NoMapTopicError, match=r"/map has no schema .*message_type='nav_msgs/OccupancyGrid'"):
+        open_log(path)
+    limits = ReadingParameters(type_without_schema="nav_msgs/OccupancyGrid")
+    assert read(path, limits=limits)[0] == [95]
+    with rl.open_log(path, message_type="nav_msgs/OccupancyGrid") as reader:
+        assert len(list(reader.snapshots())) == 1
+    with pytest.raises(ParameterError, match="message_type='nav_msgs/Odometry'"):
+        rl.open_log(path, message_type="nav_msgs/Odometry")
+
+
+def test_the_part_is_chosen_in_python_as_on_the_command_line(tmp_path):
+    path = log_of(tmp_path / "run.mcap", [seen(columns) for columns in (*GROWING, *GROWING[:4])])
+    with rl.open_log(path, part=2) as reader:
+        assert len(list(reader.snapshots())) == 4
+    with pytest.raises(ParameterError, match="part=0: it must be a whole number"):
+        rl.open_log(path, part=0)
