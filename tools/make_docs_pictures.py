@@ -187,7 +187,7 @@ def _atoms_and_answers(
         part.free, part.occupied, scored.score, plan.face_of_cell, direction, cell_m, parameters.regions
     )
     answers = answering_network()(atoms.raster)
-    steps = np.rint(answers[:-1].max(0) * 1000).astype(np.int32)
+    steps = np.rint(answers[:2].max(0) * 1000).astype(np.int32)
     height, width = part.free.shape
     shown = part.labels(atoms.frame.back(steps, (height, width)))
     return part.labels(atoms.cells), (shown / 1000).astype(np.float32)
