@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from rose2_logs.config.regions import RegionParameters
 from rose2_logs.model.occupancy import BoolArray, FloatArray
-from rose2_logs.segmentation.regions.features import region_features
+from rose2_logs.segmentation.regions.features import join_features, joinable, region_features
 from rose2_logs.segmentation.regions.graph import RegionGraph
 from rose2_logs.segmentation.regions.joining import Strength
 from rose2_logs.segmentation.regions.plan_frame import Labels, grown_labels
@@ -83,3 +83,35 @@ def rooms_of(
     outside |= around
     room = ~outside & (area >= parameters.room_min_area_m2)
     return np.where(room, np.cumsum(room), 0), outside
+
+
+def leftovers_joined(
+    graph: RegionGraph, room: NDArray[np.int64], outside: BoolArray, strength: Strength
+) -> NDArray[np.int64]:
+    """Give regions too small for a room, such as the floor of a doorway, to the room they most likely are of.
+
+    Parameters
+    ----------
+    graph : RegionGraph
+    room : (N,) int64
+        Room 1.. of each region, 0 for none.
+    outside : (N,) bool
+    strength : callable
+        Log odds that two regions are one room.
+
+    Returns
+    -------
+    region : (N,) int64
+        Region that each is part of; itself but for those that are given away.
+    """
+    region = np.arange(len(room))
+    left = (room == 0) & ~outside
+    which = np.flatnonzero(joinable(graph))
+    ends = graph.ends[which]
+    ends = np.where(left[ends[:, :1]], ends, ends[:, ::-1])
+    beside = left[ends[:, 0]] & (room[ends[:, 1]] > 0)
+    if beside.any():
+        small, large = ends[beside].T
+        order = np.argsort(strength(join_features(graph, which[beside])), kind="stable")
+        region[small[order]] = large[order]
+    return region

@@ -22,7 +22,7 @@ from rose2_logs.segmentation.regions.atoms import cut_atoms
 from rose2_logs.segmentation.regions.borders import border_strengths
 from rose2_logs.segmentation.regions.graph import STRONG_SCORE, RegionGraph, build_graph
 from rose2_logs.segmentation.regions.joining import Joins, Strength, join_regions
-from rose2_logs.segmentation.regions.outside import edge_shares, rooms_of
+from rose2_logs.segmentation.regions.outside import edge_shares, leftovers_joined, rooms_of
 from rose2_logs.segmentation.regions.plan_frame import Labels, PlanFrame
 from rose2_logs.segmentation.regions.plan_raster import PlanRaster
 from rose2_logs.segmentation.regions.strengths import FittedStrength
@@ -140,6 +140,11 @@ class RegionTree:
         edge_share = np.bincount(region, self.edge_share).astype(float)
         is_room = FittedStrength.of_rooms(fitted.outside_trees(), self.parameters)
         room, outside = rooms_of(regions, edge_share, is_room, self.parameters)
+        kept, number = np.unique(
+            leftovers_joined(regions, room, outside, self.strength), return_inverse=True
+        )
+        regions, _ = regions.joined(number)
+        region, room, outside = number[region], room[kept], outside[kept]
         cells_of_atom = label_sizes(self.cells, len(region))[1:]
         outside_m2 = float(cells_of_atom[outside[region]].sum()) * self.resolution_m**2
         labels = room_labels(

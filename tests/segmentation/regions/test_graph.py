@@ -125,3 +125,10 @@ def test_features_do_not_hang_on_which_region_has_the_lower_number():
     )
     first = np.array([0])
     np.testing.assert_allclose(join_features(one, first), join_features(other, first), atol=1e-9)
+
+
+@pytest.mark.parametrize(("rows", "small", "large"), [(["1112222222"], 3, 7), (["2221111111"], 3, 7)])
+def test_the_smaller_region_is_the_small_one_whatever_its_number(rows, small, large):
+    features = join_features(drawn_graph(rows), np.array([0]))
+    areas = np.exp([column(features, FEATURES, f"log_area_{name}")[0] for name in ("small", "large")]) - 0.01
+    assert areas == pytest.approx([small * CELL_M**2, large * CELL_M**2])

@@ -2,10 +2,14 @@
 
 import numpy as np
 import pytest
+from drawn_floors import draw_floor
 
-from rose2_logs.config.parameters import FloorPlanParameters, TopologyParameters
+from rose2_logs.config.parameters import FloorPlanParameters, Parameters, TopologyParameters
+from rose2_logs.segmentation.regions.stage import RegionsResult, generous_floor_plan, generous_walls
 from rose2_logs.segmentation.rooms.borders import adopt_left_out, settle_borders
 from rose2_logs.segmentation.rooms.doorways import find_doorways
+from rose2_logs.segmentation.rooms.stage import finish_rooms
+from rose2_logs.segmentation.rose.stage import find_structure
 
 PARAMETERS, TOPOLOGY = FloorPlanParameters(), TopologyParameters()
 
@@ -47,3 +51,19 @@ def test_a_doorway_is_found_where_it_was_drawn():
 
 def test_rooms_that_do_not_touch_have_no_doorway():
     assert find_doorways(np.array([[1, 0, 2]], np.int32), 0.05, TOPOLOGY) == []
+
+
+def test_finished_rooms_have_no_strips_along_the_other_side_of_a_wall():
+    floor = draw_floor([(0, 0, 5, 4), (5.2, 0, 10.2, 4)], [(5, 1.5, 5.2, 2.4)], wall_m=0.2)
+    free, occupied, parameters = floor.cells == 0, floor.cells > 0, Parameters()
+    scored = find_structure(occupied, floor.resolution_m, parameters.spectrum)
+    built = generous_walls(scored, floor.resolution_m, parameters)
+    plan = generous_floor_plan(built, free, 0.0, floor.resolution_m, parameters)
+    labels = floor.rooms.astype(np.int32)
+    right = np.flatnonzero((labels == labels.max()).any(0))[0]
+    spilled = labels.copy()
+    spilled[:, right : right + 2][labels[:, right : right + 2] > 0] = labels[labels > 0].min()
+    found = RegionsResult(spilled, {}, 0.0)
+    rooms, _ = finish_rooms(found, plan, free, occupied, floor.resolution_m, parameters)
+    beside = rooms.labels[:, [right, right + 10]][labels[:, right] == labels.max()]
+    assert (beside[:, 0] == beside[:, 1]).mean() > 0.7
