@@ -63,13 +63,20 @@ class RegionParameters(ParameterBlock):
         0.0, "log odds", "Regions are rooms rather than outside from even odds on.", -20, 20
     )
     outside_max_share: float = number(
-        0.8, "share", "Where more than this share of a map would be outside, nothing is.", 0, 1
+        0.5, "share", "Where more than this share of a map would be outside, nothing is.", 0, 1
     )
     surroundings_min_edge: float = number(
         0.25,
         "share",
         "A region on this share of the map's edge is white around a drawn building, if such regions hold "
         "twice as much together; rooms are behind walls.",
+        0,
+        1,
+    )
+    surroundings_rest_min_edge: float = number(
+        0.05,
+        "share",
+        "Beside such regions, others on this share of the edge are cut off from them: rooms hold less.",
         0,
         1,
     )

@@ -251,5 +251,6 @@ def left_out_note(outside_m2: float, free_area_m2: float) -> str | None:
         return None
     return (
         f"{outside_m2:.0f} m2 of free floor, {percent(outside_m2 / free_area_m2)}, are taken to be outside "
-        "the building and in no room; regions.outside_max_share=0 keeps all of it"
+        "the building and in no room; regions.outside_max_share=0 and regions.surroundings_min_edge=1 keep "
+        "all of it"
     )

@@ -139,7 +139,7 @@ class RoomPlan:
     >>> run = rl.analyze("sample_logs/office.mcap", max_snapshots=3)
     >>> plan = run[-1].plan()
     >>> plan.title, len(plan.rooms), len(plan.doorways)
-    ('office, snapshot 2, coverage 100%', 18, 18)
+    ('office, snapshot 2, coverage 100%', 18, 19)
     """
 
     title: str

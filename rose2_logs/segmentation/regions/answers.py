@@ -19,7 +19,7 @@ ANSWER_STEPS = 1000
 """Answers are rounded to this many steps, so that they are the same whatever instructions a CPU has."""
 TILE_CELLS = 1536
 """Larger plans are looked at in tiles of this side, so that memory does not grow with the map."""
-OVERLAP_CELLS = 128
+OVERLAP_CELLS = 192
 """Tiles see this far beyond what they answer for; what lies further hardly matters to an answer."""
 
 

@@ -14,7 +14,7 @@ STEPS = 1000
 
 
 def border_strengths(
-    graph: RegionGraph, room: NDArray[np.int64], strength: Strength
+    graph: RegionGraph, room: NDArray[np.int64], strength: Strength, margin: float
 ) -> dict[tuple[int, int], float]:
     """Probability that two neighboring rooms are different ones, by their numbers, the smaller one first.
 
@@ -28,7 +28,9 @@ def border_strengths(
     room : (N,) int64
         Room 1.. of each region, 0 for none.
     strength : callable
-        Log odds that two regions are one room.
+        Log odds that two regions are one room, less a margin.
+    margin : float
+        That margin: it decides which joins are made, and is no part of the probability.
     """
     ends = room[graph.ends]
     faces_wall = graph.border_sums[:, BORDER_SUMS.index("facing_wall")] >= FACING_MIN_M
@@ -37,7 +39,7 @@ def border_strengths(
     opens = is_open[which]
     probability = np.ones(len(which))
     if opens.any():
-        log_odds = strength(join_features(graph, which[opens]))
+        log_odds = strength(join_features(graph, which[opens])) + margin
         probability[opens] = np.rint(STEPS / (1 + np.exp(log_odds))) / STEPS
     pairs = np.sort(ends[which], axis=1).tolist()
     return {(one, other): p for (one, other), p in zip(pairs, probability.tolist(), strict=True)}

@@ -49,7 +49,8 @@ def surroundings(edge_share: FloatArray, area_m2: FloatArray, parameters: Region
     rest_m2 = area_m2[~around].sum()
     if edge_share[around].sum() < least or rest_m2 < parameters.building_min_share * area_m2.sum():
         return np.zeros(len(area_m2), bool)
-    return around
+    # Where there is white around the building, a corner of it that is cut off is no room either.
+    return np.asarray(edge_share >= parameters.surroundings_rest_min_edge)
 
 
 def rooms_of(

@@ -140,9 +140,7 @@ class RegionTree:
         edge_share = np.bincount(region, self.edge_share).astype(float)
         is_room = FittedStrength.of_rooms(fitted.outside_trees(), self.parameters)
         room, outside = rooms_of(regions, edge_share, is_room, self.parameters)
-        kept, number = np.unique(
-            leftovers_joined(regions, room, outside, self.strength), return_inverse=True
-        )
+        kept, number = np.unique(leftovers_joined(regions, room, outside, self.strength), return_inverse=True)
         regions, _ = regions.joined(number)
         region, room, outside = number[region], room[kept], outside[kept]
         cells_of_atom = label_sizes(self.cells, len(region))[1:]
@@ -150,7 +148,8 @@ class RegionTree:
         labels = room_labels(
             self.cells, room[region], self.free, self.resolution_m, self.parameters.loose_reach_m
         )
-        return RegionsResult(labels, border_strengths(regions, room, self.strength), outside_m2)
+        borders = border_strengths(regions, room, self.strength, self.parameters.join_margin)
+        return RegionsResult(labels, borders, outside_m2)
 
 
 def generous_walls(scored: StructureResult, resolution_m: float, parameters: Parameters) -> WallResult:

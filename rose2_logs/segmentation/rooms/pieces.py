@@ -8,10 +8,15 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from rose2_logs.model.labels import label_sizes
+from rose2_logs.model.occupancy import BoolArray
 
 
 def rooms_in_one_piece(
-    labels: NDArray[np.int32], resolution_m: float, gap_m: float, piece_min_m2: float
+    labels: NDArray[np.int32],
+    occupied: BoolArray,
+    resolution_m: float,
+    gap_m: float,
+    piece_min_m2: float,
 ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
     """Make rooms of their own of the pieces of a room that do not hang together.
 
@@ -19,6 +24,8 @@ def rooms_in_one_piece(
     ----------
     labels : (H, W) int32
         Rooms 1.. of the free cells, 0 elsewhere.
+    occupied : (H, W) bool
+        Occupied cells: what they close is no gap.
     resolution_m : float
         Side of a cell.
     gap_m : float
@@ -42,12 +49,12 @@ def rooms_in_one_piece(
         if box is None:
             continue
         inside = labels[box] == room
-        grown = cv2.dilate(np.pad(inside.astype(np.uint8), reach), kernel)
+        grown = cv2.dilate(inside.astype(np.uint8), kernel, borderType=cv2.BORDER_CONSTANT, borderValue=0)
+        grown[occupied[box]] = 0
         number, components = cv2.connectedComponents(grown, connectivity=4)
         if number <= 2:
             continue
-        within = np.s_[reach : reach + inside.shape[0], reach : reach + inside.shape[1]]
-        piece: NDArray[np.int32] = np.where(inside, components[within], 0).astype(np.int32)
+        piece: NDArray[np.int32] = np.where(inside, components, 0).astype(np.int32)
         cells = label_sizes(piece, number - 1)
         cells[0] = 0
         large = np.flatnonzero(cells * resolution_m**2 >= piece_min_m2)

@@ -38,15 +38,15 @@ def test_answers_are_steps_between_0_and_1(raster, whole):
 
 
 def test_tiles_give_the_answers_of_the_whole_but_for_a_few(raster, whole, monkeypatch):
-    monkeypatch.setattr(module, "TILE_CELLS", 192)
-    monkeypatch.setattr(module, "OVERLAP_CELLS", 64)
+    monkeypatch.setattr(module, "TILE_CELLS", 256)
+    monkeypatch.setattr(module, "OVERLAP_CELLS", 96)
     tiled = fitted.answering_network()(raster)
     inside = raster.free > 0
     difference = np.abs(tiled - whole)[:, inside]
     # Not the same to the last step, for tiles begin elsewhere than in the middle of a coarse step.
-    assert difference.mean() < 0.01
+    assert difference.mean() < 0.015
     # The same pairs of cells are in different rooms, but for a few.
-    assert np.mean((tiled > 0.5) != (whole > 0.5)) < 0.01
+    assert np.mean((tiled > 0.5) != (whole > 0.5)) < 0.015
 
 
 def test_tiles_without_free_cells_are_not_looked_at(raster, monkeypatch):

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from drawn_floors import corridor_of_offices, turned
+from test_graph import drawn_graph
 
 from rose2_logs.config.regions import RegionParameters
 from rose2_logs.segmentation.regions.graph import (
@@ -12,7 +13,7 @@ from rose2_logs.segmentation.regions.graph import (
     NODE_SUMS,
     RegionGraph,
 )
-from rose2_logs.segmentation.regions.outside import edge_shares, rooms_of, surroundings
+from rose2_logs.segmentation.regions.outside import edge_shares, leftovers_joined, rooms_of, surroundings
 from rose2_logs.segmentation.regions.plan_frame import PlanFrame
 from rose2_logs.segmentation.regions.plan_raster import PlanRaster
 
@@ -47,7 +48,7 @@ def test_what_is_too_small_is_no_room_but_not_outside(area_m2, room):
     assert rooms([area_m2], [3.0]) == ([room], 0.0)
 
 
-@pytest.mark.parametrize(("outside_m2", "believed"), [(8.0, True), (8.1, False)])
+@pytest.mark.parametrize(("outside_m2", "believed"), [(5.0, True), (5.1, False)])
 def test_an_answer_by_which_hardly_anything_is_left_is_not_used(outside_m2, believed):
     found, left_out_m2 = rooms([outside_m2, 10 - outside_m2], [-9.0, 9.0])
     assert found == ([0, 1] if believed else [1, 2])
@@ -106,3 +107,15 @@ def test_rooms_behind_walls_hold_nothing_of_the_edge():
 def test_a_map_of_which_nothing_is_known_has_no_edge():
     nothing = np.zeros((3, 3), np.uint8)
     assert edge_shares(nothing.astype(np.int32), PlanRaster(nothing, nothing), 2).tolist() == [0, 0]
+
+
+def test_the_floor_of_a_doorway_goes_to_the_room_it_is_likeliest_of():
+    graph = drawn_graph(["1111#2222", "111133222", "1111#2222", "1111#2222"])
+    room, outside = np.array([1, 2, 0]), np.zeros(3, bool)
+    for likeliest in (0, 1):
+
+        def strength(features, likeliest=likeliest):
+            return np.where(np.arange(len(features)) == likeliest, 1.0, -1.0)
+
+        assert leftovers_joined(graph, room, outside, strength).tolist() == [0, 1, likeliest]
+    assert leftovers_joined(graph, room, np.array([False, False, True]), strength).tolist() == [0, 1, 2]
