@@ -40,7 +40,7 @@ def ablations(tmp_path: Path) -> Path:
     path = tmp_path / "ablations.toml"
     path.write_text(
         '[[ablation]]\nname = "no rooms"\nsentence = "No room is large enough."\n'
-        'set = ["floor_plan.room_min_area_m2 = 1e4"]\n'
+        'set = ["regions.room_min_area_m2 = 1e4"]\n'
     )
     return path
 

@@ -27,7 +27,7 @@ def huge_log(tmp_path_factory) -> Path:
     with SAMPLE.open("rb") as file:
         messages = list(islice(make_reader(file).iter_messages(topics=["/map"]), 40))
     path = tmp_path_factory.mktemp("sparse") / "huge.mcap"
-    maps = [message.data for _, _, message in messages] * 8
+    maps = [message.data for _, _, message in messages for _ in range(8)]
     write_sparse_log(path, 10_000_000_000, messages[0][0].data, maps)
     yield path
     path.unlink()
