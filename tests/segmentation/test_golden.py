@@ -13,8 +13,8 @@ from rose2_logs.config.parameters import Parameters
 from rose2_logs.segmentation.pipeline import analyze
 
 GOLDEN = sorted(Path(__file__).with_name("golden").glob("*.npz"))
-MOST_DIFFERENCE = 0.002
-"""Share of the cells of rooms: versions of OpenCV and SciPy differ in a few cells at borders."""
+MOST_DIFFERENCE = 0.01
+"""Share of the cells of rooms: versions of OpenCV and SciPy differ in some cells at borders."""
 
 
 def numbered_as(kept: NDArray[np.integer], found: NDArray[np.integer]) -> NDArray[np.integer]:
