@@ -53,27 +53,20 @@ def surroundings(edge_share: FloatArray, area_m2: FloatArray, parameters: Region
     return np.asarray(edge_share >= parameters.surroundings_rest_min_edge)
 
 
-def rooms_of(
+def outside_of(
     graph: RegionGraph, edge_share: FloatArray, is_room: Strength, parameters: RegionParameters
-) -> tuple[NDArray[np.int64], BoolArray]:
-    """Number the regions of a graph that are rooms.
+) -> BoolArray:
+    """Which regions (N,) of a graph are outside.
 
     Parameters
     ----------
     graph : RegionGraph
-        The final regions.
+        The regions at even odds.
     edge_share : (N,) float
         Share of the map's edge that each region holds, see `edge_shares`.
     is_room : callable
         Log odds (N,) of `region_features` (N, F).
     parameters : RegionParameters
-
-    Returns
-    -------
-    room : (N,) int64
-        Room 1.. of each region, 0 for none.
-    outside : (N,) bool
-        Regions that are outside; those that are too small are not.
     """
     area = graph.node_sums[:, 0]
     around = surroundings(edge_share, area, parameters)
@@ -81,9 +74,13 @@ def rooms_of(
     # An answer by which hardly anything is left is not believed.
     if area[outside].sum() > parameters.outside_max_share * area[~around].sum():
         outside[:] = False
-    outside |= around
-    room = ~outside & (area >= parameters.room_min_area_m2)
-    return np.where(room, np.cumsum(room), 0), outside
+    return outside | around
+
+
+def room_numbers(graph: RegionGraph, outside: BoolArray, parameters: RegionParameters) -> NDArray[np.int64]:
+    """Room 1.. of each region (N,), 0 for those that are outside or too small."""
+    room = ~outside & (graph.node_sums[:, 0] >= parameters.room_min_area_m2)
+    return np.where(room, np.cumsum(room), 0)
 
 
 def leftovers_joined(

@@ -22,7 +22,7 @@ from rose2_logs.segmentation.regions.atoms import cut_atoms
 from rose2_logs.segmentation.regions.borders import border_strengths
 from rose2_logs.segmentation.regions.graph import STRONG_SCORE, RegionGraph, build_graph
 from rose2_logs.segmentation.regions.joining import Joins, Strength, join_regions
-from rose2_logs.segmentation.regions.outside import edge_shares, leftovers_joined, rooms_of
+from rose2_logs.segmentation.regions.outside import edge_shares, leftovers_joined, outside_of, room_numbers
 from rose2_logs.segmentation.regions.plan_frame import Labels, PlanFrame
 from rose2_logs.segmentation.regions.plan_raster import PlanRaster
 from rose2_logs.segmentation.regions.strengths import FittedStrength
@@ -130,16 +130,26 @@ class RegionTree:
         regions, _ = self.graph.joined(joins.regions(EVEN_ODDS))
         return joins.then(join_regions(regions, self.strength, -DETAIL_MOST))
 
+    @cached_property
+    def _outside(self) -> BoolArray:
+        """Which atoms (N,) are outside, whatever the detail: regions at even odds tell it best."""
+        region = self._to_even_odds.regions(EVEN_ODDS)
+        regions, _ = self.graph.joined(region)
+        edge_share = np.bincount(region, self.edge_share).astype(float)
+        is_room = FittedStrength.of_rooms(fitted.outside_trees(), self.parameters)
+        return outside_of(regions, edge_share, is_room, self.parameters)[region]
+
     def rooms(self, detail: float) -> RegionsResult:
         """Join the atoms as far as a detail asks for, log odds; 0 for even odds, more for more rooms."""
         if not len(self.graph.node_sums):
             return RegionsResult(np.zeros(self.free.shape, np.int32), {}, 0.0)
         joins = self._to_even_odds if detail >= EVEN_ODDS else self._to_the_end
-        region = joins.regions(detail)
+        # With less detail, floor that is outside may be joined to a room: it is cut off again.
+        region = np.unique(2 * joins.regions(detail) + self._outside, return_inverse=True)[1]
+        outside = np.zeros(int(region.max()) + 1, bool)
+        outside[region] = self._outside
         regions, _ = self.graph.joined(region)
-        edge_share = np.bincount(region, self.edge_share).astype(float)
-        is_room = FittedStrength.of_rooms(fitted.outside_trees(), self.parameters)
-        room, outside = rooms_of(regions, edge_share, is_room, self.parameters)
+        room = room_numbers(regions, outside, self.parameters)
         kept, number = np.unique(leftovers_joined(regions, room, outside, self.strength), return_inverse=True)
         regions, _ = regions.joined(number)
         region, room, outside = number[region], room[kept], outside[kept]

@@ -92,3 +92,17 @@ def test_a_pickled_segmentation_leaves_the_tree_behind():
     found = rl.segment(snapshot(office()[0]))
     assert pickle.loads(pickle.dumps(found))._tree is None
     assert found._tree is not None
+
+
+def test_what_is_outside_is_so_at_any_detail():
+    """A drawing with white around it: at less detail the offices do not join the white and go with it."""
+    cells = np.pad(office()[0], 60, constant_values=0)
+    cells[cells < 0] = 0
+    _, grown = analyze_with_tree(snapshot(cells))
+    assert grown is not None
+    atoms, tree = grown.tree.cells > 0, grown.tree
+    outside_m2 = {detail: tree.rooms(detail).outside_m2 for detail in DETAILS}
+    assert outside_m2[0.0] > 30
+    assert set(outside_m2.values()) == {outside_m2[0.0]}
+    in_room = [(tree.rooms(detail).labels > 0) & atoms for detail in (-20.0, 0.0)]
+    assert np.array_equal(*in_room)

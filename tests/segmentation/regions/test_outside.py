@@ -13,7 +13,13 @@ from rose2_logs.segmentation.regions.graph import (
     NODE_SUMS,
     RegionGraph,
 )
-from rose2_logs.segmentation.regions.outside import edge_shares, leftovers_joined, rooms_of, surroundings
+from rose2_logs.segmentation.regions.outside import (
+    edge_shares,
+    leftovers_joined,
+    outside_of,
+    room_numbers,
+    surroundings,
+)
 from rose2_logs.segmentation.regions.plan_frame import PlanFrame
 from rose2_logs.segmentation.regions.plan_raster import PlanRaster
 
@@ -35,8 +41,9 @@ def lone_regions(*area_m2):
 
 def rooms(area_m2, log_odds, edge_share=None):
     edge = np.zeros(len(area_m2)) if edge_share is None else np.array(edge_share)
-    room, outside = rooms_of(lone_regions(*area_m2), edge, lambda _: np.array(log_odds), PARAMETERS)
-    return room.tolist(), float(np.array(area_m2)[outside].sum())
+    graph = lone_regions(*area_m2)
+    outside = outside_of(graph, edge, lambda _: np.array(log_odds), PARAMETERS)
+    return room_numbers(graph, outside, PARAMETERS).tolist(), float(np.array(area_m2)[outside].sum())
 
 
 def test_rooms_are_numbered_and_what_is_outside_is_measured():
