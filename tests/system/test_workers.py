@@ -228,9 +228,9 @@ def interrupted(script: Path, send: Callable[[int, int], None], delay_s: float) 
 @pytest.mark.parametrize("delay_s", [0.0, 0.5, 2.0])
 @pytest.mark.parametrize("send", [os.kill, os.killpg], ids=["process", "terminal"])
 def test_an_interrupt_ends_workers_that_are_still_starting(tmp_path, send, delay_s: float):
-    """At once, and all that is on stderr is the interrupt itself."""
+    """At once, and all that is on stderr is the interrupt itself, with what it came into the midst of."""
     (tmp_path / "many.py").write_text(MANY_WORKERS)
-    assert interrupted(tmp_path / "many.py", send, delay_s).count("Traceback") == 1
+    assert interrupted(tmp_path / "many.py", send, delay_s).count("\nKeyboardInterrupt") == 1
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
@@ -238,7 +238,7 @@ def test_an_interrupt_while_modules_are_imported_for_workers_is_told_once(tmp_pa
     """A terminal sends it to all processes."""
     (tmp_path / "slow.py").write_text("import time\ntime.sleep(1.5)\ndef work(x): return x\n")
     (tmp_path / "script.py").write_text(SLOW_IMPORT)
-    assert interrupted(tmp_path / "script.py", os.killpg, 0.7).count("Traceback") == 1
+    assert interrupted(tmp_path / "script.py", os.killpg, 0.7).count("\nKeyboardInterrupt") == 1
 
 
 def test_an_interrupt_waits_for_a_process_to_be_started(monkeypatch):
