@@ -22,7 +22,7 @@ from PIL import Image
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from fit_grouping.figures import figures_table
-from fit_grouping.maps_with_truth import FOLDS, TruthMap, load_benchmark
+from fit_grouping.maps_with_truth import FOLDS, TruthMap, load_benchmark, on_blocks
 from fit_grouping.scores import iou_sym, overlap_table
 from rose2_logs.config.parameters import OccupancyParameters
 from rose2_logs.evaluation.cases import load_cases
@@ -62,15 +62,7 @@ def scores_of_fold(
             image.parent.mkdir(parents=True, exist_ok=True)
             Image.fromarray(np.flipud(found.labels).astype(np.uint16)).save(image)
             part = ExploredPart.of(snapshot.cells, snapshot.geometry, OccupancyParameters())
-            labels = found.labels[part.window]
-            if part.factor > 1:
-                height, width = one.free.shape
-                missing = (
-                    (0, height * part.factor - labels.shape[0]),
-                    (0, width * part.factor - labels.shape[1]),
-                )
-                middle = part.factor // 2
-                labels = np.pad(labels, missing)[middle :: part.factor, middle :: part.factor]
+            labels = on_blocks(part, found.labels)
             scores[number] = max(iou_sym(overlap_table(labels, truth)) for truth in one.truths)
     return scores
 

@@ -91,7 +91,7 @@ def load_benchmark(cases: Path) -> list[TruthMap]:
     for case in load_cases(cases):
         snapshot = case.snapshot()
         part = ExploredPart.of(snapshot.cells, snapshot.geometry, OccupancyParameters())
-        truths = tuple(_on_blocks(part, np.flipud(labels)) for labels in case.truths().values())
+        truths = tuple(on_blocks(part, np.flipud(labels)) for labels in case.truths().values())
         maps.append(
             TruthMap(
                 case.group,
@@ -106,7 +106,7 @@ def load_benchmark(cases: Path) -> list[TruthMap]:
     return maps
 
 
-def _on_blocks(part: ExploredPart, labels: NDArray[np.integer]) -> Labels:
+def on_blocks(part: ExploredPart, labels: NDArray[np.integer]) -> Labels:
     """Labels of a canvas at the middle of each block of the explored part."""
     window = labels[part.window].astype(np.int32)
     side = part.factor

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-import cv2
 import numpy as np
 import shapely
 from numpy.typing import NDArray
@@ -23,7 +22,7 @@ from rose2_logs.segmentation.regions.borders import border_strengths
 from rose2_logs.segmentation.regions.graph import STRONG_SCORE, RegionGraph, build_graph
 from rose2_logs.segmentation.regions.joining import Joins, Strength, join_regions
 from rose2_logs.segmentation.regions.outside import edge_shares, leftovers_joined, outside_of, room_numbers
-from rose2_logs.segmentation.regions.plan_frame import Labels, PlanFrame
+from rose2_logs.segmentation.regions.plan_frame import Labels, PlanFrame, grown_labels
 from rose2_logs.segmentation.regions.plan_raster import PlanRaster
 from rose2_logs.segmentation.regions.strengths import FittedStrength
 from rose2_logs.segmentation.rose.clean_map import attached_cells
@@ -245,11 +244,5 @@ def room_labels(
     loose = free & (atoms == 0)
     if not loose.any() or not labels.any():
         return labels
-    distance, nearest = cv2.distanceTransformWithLabels(
-        (labels == 0).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
-    )
-    of_nearest = np.zeros(int(nearest.max()) + 1, np.int32)
-    of_nearest[nearest[labels > 0]] = labels[labels > 0]
-    near = loose & (distance * resolution_m <= reach_m)
-    labels[near] = of_nearest[nearest[near]]
+    np.copyto(labels, grown_labels(labels, reach_m / resolution_m), where=loose)
     return labels
