@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
@@ -61,6 +61,29 @@ def make_floor_plan(
     The plane is cut within a box along `direction_rad`, the strongest dominant direction: what lies beyond
     counts as unseen, so that a box along the axes of the raster would give other rooms to a turned map.
     """
+    plan = cut_by_lines(lines_m, walls, free, direction_rad, resolution_m, parameters)
+    graph, face_of_cell, seen = plan.graph, plan.face_of_cell, plan.seen
+    count = len(graph.polygons)
+    area = free_area(face_of_cell, free, count, resolution_m)
+    # Without any line the map is one face, however little of it was seen.
+    inside = (seen >= parameters.face_min_seen) | (count == 1)
+    widest = clearance(face_of_cell, free, walls, count, resolution_m)
+    area[~inside] = 0
+    group = 1 + group_faces(graph.edge_faces, plan.evidence, area, seen, widest, parameters)
+    labels = np.concatenate([np.zeros(1, np.int32), group])[face_of_cell]
+    labels[~free] = 0
+    return replace(plan, group=group, labels=labels)
+
+
+def cut_by_lines(
+    lines_m: FloatArray,
+    walls: BoolArray,
+    free: BoolArray,
+    direction_rad: float,
+    resolution_m: float,
+    parameters: FloorPlanParameters,
+) -> FloorPlanResult:
+    """Faces between lines (L, 4), with the weights of their edges, in no group yet."""
     graph = build_faces(
         lines_m, frame_along(free | walls, direction_rad, resolution_m, parameters.frame_margin_m)
     )
@@ -69,14 +92,8 @@ def make_floor_plan(
     face_of_cell = label_faces(graph, (free.shape[0], free.shape[1]), resolution_m)
     area = free_area(face_of_cell, free, count, resolution_m)
     seen = area / np.maximum(shapely.area(graph.polygons), 1e-12)
-    # Without any line the map is one face, however little of it was seen.
-    inside = (seen >= parameters.face_min_seen) | (count == 1)
-    widest = clearance(face_of_cell, free, walls, count, resolution_m)
-    area[~inside] = 0
-    group = 1 + group_faces(graph.edge_faces, evidence, area, seen, widest, parameters)
-    labels = np.concatenate([np.zeros(1, np.int32), group])[face_of_cell]
-    labels[~free] = 0
-    return FloorPlanResult(graph, face_of_cell, evidence, seen, group, labels)
+    no_group, no_labels = np.zeros(count, np.int32), np.zeros(free.shape, np.int32)
+    return FloorPlanResult(graph, face_of_cell, evidence, seen, no_group, no_labels)
 
 
 def frame_along(

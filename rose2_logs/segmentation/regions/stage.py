@@ -6,16 +6,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import shapely
 from numpy.typing import NDArray
 
 from rose2_logs.config.parameters import Parameters
 from rose2_logs.config.regions import DETAIL_MOST, RegionParameters
 from rose2_logs.model.labels import label_sizes
 from rose2_logs.model.occupancy import BoolArray, FloatArray
-from rose2_logs.segmentation.floor_plan.edge_weights import edge_evidence
-from rose2_logs.segmentation.floor_plan.faces import build_faces, free_area, label_faces
-from rose2_logs.segmentation.floor_plan.stage import FloorPlanResult, frame_along
+from rose2_logs.segmentation.floor_plan.stage import FloorPlanResult, cut_by_lines
 from rose2_logs.segmentation.regions import fitted
 from rose2_logs.segmentation.regions.atoms import cut_atoms
 from rose2_logs.segmentation.regions.borders import border_strengths
@@ -181,15 +178,7 @@ def generous_floor_plan(
 ) -> FloorPlanResult:
     """Faces between the lines of `generous_walls`, with the weights of their edges, in no group yet."""
     lines_m, walls = built.lines.ends_m, built.walls
-    margin_m = parameters.floor_plan.frame_margin_m
-    graph = build_faces(lines_m, frame_along(free | walls, direction_rad, resolution_m, margin_m))
-    count = len(graph.polygons)
-    evidence = edge_evidence(graph.edges_m, lines_m, walls, free, resolution_m, parameters.floor_plan)
-    face_of_cell = label_faces(graph, (free.shape[0], free.shape[1]), resolution_m)
-    area = free_area(face_of_cell, free, count, resolution_m)
-    seen = area / np.maximum(shapely.area(graph.polygons), 1e-12)
-    no_group, no_labels = np.zeros(count, np.int32), np.zeros(free.shape, np.int32)
-    return FloorPlanResult(graph, face_of_cell, evidence, seen, no_group, no_labels)
+    return cut_by_lines(lines_m, walls, free, direction_rad, resolution_m, parameters.floor_plan)
 
 
 def find_atoms(
