@@ -23,7 +23,7 @@ from rose2_logs.segmentation.regions.plan_raster import (
 WORN_SHARE = 0.45
 """Share of the crops that are worn or furnished."""
 STRETCHED_SHARE, STRETCH_MIN, STRETCH_MAX = 0.6, 0.8, 1.25
-"""Share of the crops that are stretched, each axis by itself: the same plan with rooms of other proportions."""
+"""Share of the crops that are stretched, each axis by itself: rooms of other proportions."""
 DIFFERENT_WEIGHT = (3.0, 2.0, 1.5)
 """Pairs in different rooms are rarer than others, the nearer the more so."""
 
@@ -54,7 +54,7 @@ class TruthRaster:
 def random_crop(
     rng: np.random.Generator, one: TruthRaster, size: int
 ) -> tuple[FloatImage, FloatImage, FloatImage]:
-    """Cut a square of a map around a cell of a room, mirrored, turned by quarters, stretched and worn at times.
+    """Cut a square of a map around a cell of a room: mirrored, turned by quarters, at times stretched and worn.
 
     Returns
     -------
