@@ -23,8 +23,8 @@ OTHER_KINDS = {
     "arena": {"none": 1.0},
     "passage": {"none": 0.74, "slant": 0.1, "arc": 0.08, "bend": 0.08},
 }
-"""The same for kinds of plans that differ: wings of villas are turned anyway, halls may lie in an arc, and the grounds of
-depots and arenas are not bent with them."""
+"""The same for kinds of plans that differ: wings of villas are turned anyway, halls may lie in an arc,
+and the grounds of depots and arenas are not bent with them."""
 
 
 def bent(rng: Generator, walled: WalledPlan, furniture: Mask) -> tuple[WalledPlan, Mask]:

@@ -15,8 +15,8 @@ from fit_grouping.buildings.walls import WalledPlan
 from fit_grouping.buildings.workrooms import furnish_workroom
 
 STYLES = ("none", "survey", "home", "office", "dense", "work")
-"""Ways to furnish: not at all, dots and boxes as drawn by hand, as in homes, as in offices, cluttered, and with
-rows of desks, screens and cabinets."""
+"""Ways to furnish: not at all, dots and boxes as drawn by hand, as in homes, as in offices, cluttered, and
+with rows of desks, screens and cabinets."""
 HALLS = {
     "rows": 0.2,
     "pillars": 0.1,

@@ -26,7 +26,14 @@ MAKERS: tuple[tuple[Callable[[Generator], Plan], float], ...] = (
     (shop, 0.03),
 )
 """Makers of plans and their shares."""
-TIDY_CORNERS = {"villa": (0.0, 0.0), "passage": (0.0, 0.0), "hall": (0.5, 0.0), "depot": (0.2, 0.0), "shop": (0.5, 0.0)}
+TIDY_CORNERS = {
+    "villa": (0.0, 0.0),
+    "passage": (0.0, 0.0),
+    "hall": (0.5, 0.0),
+    "depot": (0.2, 0.0),
+    "shop": (0.5, 0.0),
+    "arena": (0.1, 0.1),
+}
 """How many corners are cut off a building of a kind and how many of its rooms are cut in two, on average."""
 USUAL_CORNERS = (0.35, 0.15)
 

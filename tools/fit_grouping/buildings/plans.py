@@ -136,7 +136,7 @@ class Plan:
         for kinds in (self.corridors, self.halls, self.public, self.lobbies, self.labs):
             now = {int(n) for n in number if n and was[n] in kinds}
             kinds.clear()
-            kinds |= now
+            kinds.update(now)
         self.rooms = number[pieces].astype(np.int32)
 
 

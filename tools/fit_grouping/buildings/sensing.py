@@ -31,10 +31,13 @@ WORKPLACES = frozenset({"offices", "faculty"})
 """Kinds of plans that are mapped from their corridors, often while they are still explored."""
 SEEN_FROM_DOORS = (0.0, 0.2, 0.5, 0.85)
 """Share of the rooms of a workplace that are seen through their doors only."""
-IN_PROGRESS, PROGRESS = 0.5, (0.15, 0.85)
-"""How often the exploration of a workplace is still in progress, and the share of the views that it has."""
+IN_PROGRESS, PROGRESS, PROGRESS_VIEWS_MIN = 0.45, (0.25, 0.9), 6
+"""How often the exploration of a workplace is still in progress, the share of the views that it has,
+and how many at least."""
 BEAMS_APART = (1, 1, 2, 3, 4)
 """Every which ray of a view a workplace's lidar has: few leave fans of single rays in far rooms."""
+FRONT_TRANSMISSION = (0.02, 0.25)
+"""Share of the rays that pass whole fronts: single ones, as through blinds and between posts."""
 YARD_VIEWS = (3, 12)
 """Views from the ground outside."""
 DRAWN_SHARE = {"villa": 0.05, "offices": 0.05, "faculty": 0.05, "depot": 0.15, "arena": 0.03}
@@ -172,7 +175,11 @@ def _sensed(rng: Generator, walled: WalledPlan, solid: Mask) -> tuple[str, NDArr
     rooms, neighbors = walled.plan.rooms, walled.neighbors
     reach_m = float(rng.choice(REACHES_M, p=HOME_REACHES if walled.plan.kind in HOMES else USUAL_REACHES))
     numbers = list(neighbors)
-    start = numbers[rng.integers(len(numbers))]
+    if walled.plan.kind in WORKPLACES and walled.plan.corridors:
+        ways = [n for n in numbers if n in walled.plan.corridors] or numbers
+        start = ways[rng.integers(len(ways))]
+    else:
+        start = numbers[rng.integers(len(numbers))]
     share = 1.0 if chance(rng, 0.75 if walled.plan.kind in HOMES else 0.62) else rng.uniform(0.15, 0.9)
     order, queue, met = [], [start], {start}
     while queue:
@@ -214,7 +221,8 @@ def _sensed(rng: Generator, walled: WalledPlan, solid: Mask) -> tuple[str, NDArr
     if len(views) > VIEWS_MAX:
         views = [views[i] for i in rng.choice(len(views), VIEWS_MAX, replace=False)]
     if work and chance(rng, IN_PROGRESS):
-        kind, views = "progress", _nearest(rng, views, max(1, round(len(views) * rng.uniform(*PROGRESS))))
+        count = max(PROGRESS_VIEWS_MIN, round(len(views) * rng.uniform(*PROGRESS)))
+        kind, views = "progress", _nearest(rng, views, count)
     if walled.plan.yard is not None:
         at_yard = np.argwhere((walled.plan.yard > 0) & away)
         if len(at_yard):
@@ -222,6 +230,8 @@ def _sensed(rng: Generator, walled: WalledPlan, solid: Mask) -> tuple[str, NDArr
             views += [(int(row), int(column)) for row, column in at_yard[chosen]]
     every = int(rng.choice(BEAMS_APART)) if work else 1
     sensor = Sensor(rng, solid, walled.glass, cells(reach_m), every)
+    if walled.plan.glazed:
+        sensor.transmission = rng.uniform(*FRONT_TRANSMISSION)
     for row, column in views:
         sensor.look(row, column)
     free, occupied = sensor.map()

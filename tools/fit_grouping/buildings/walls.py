@@ -26,14 +26,14 @@ STUB_MIN_M = 0.2
 SHOULDER_MIN_M = 0.4
 """Rooms without a jamb between them are parted where one is wider by this."""
 LOOK_ALONG_M = 8.0
-DOUBLE_DOOR_M = (1.5, 2.6)
-"""Width of the double doors that part corridors."""
+DOUBLE_DOOR_M, DOUBLE_LEAF_SHARE = (1.5, 2.6), 0.6
+"""Width of the double doors that part corridors, and how often a leaf of them stands half open."""
 CABINET_M, CABINET_GAP_M, CABINET_DEEP_M = (1.0, 3.2), (0.6, 2.4), (0.25, 0.6)
 """Cabinets and pieces of wall between a lab and a corridor, and the gaps between them."""
 FRAYED_GAP_M, FRAYED_PIECE_M, FRAYED_DOT_STEP_M = (0.15, 0.7), (0.2, 1.6), (0.1, 0.22)
-"""What is seen of a frayed wall: gaps between pieces, or dots so near to each other that nobody walks through."""
+"""What is seen of a frayed wall: gaps between pieces, or dots too near to each other to walk through."""
 GATE_M = (0.9, 3.5)
-DOUBLE_LEAF_SHARE = 0.6
+"""Width of openings to the outside: doors to gates."""
 PUBLIC_AGAIN = 0.4
 """Probability of one more opening between living rooms that are joined already."""
 WINDOWS, HOME_WINDOWS = 2.0, 2.5

@@ -82,7 +82,7 @@ def faculty(rng: Generator) -> Plan:
                 row_of_rooms(rng, plan, strip, rng.uniform(7, 14), least_m=5)
                 plan.labs |= {n for n in range(before + 1, int(plan.rooms.max()) + 1) if chance(rng, 0.15)}
             elif way == "scattered":
-                _scattered(rng, plan, strip)
+                _scattered(rng, plan, strip, (side,))
     _halls(plan)
     bays(rng, plan, 1.0)
     corner_rooms(rng, plan, 1.0, 1.2, 3.0)
@@ -146,7 +146,7 @@ def arena(rng: Generator) -> Plan:
 def shop(rng: Generator) -> Plan:
     """A shop: one floor of shelves and islands, of L shape at times, and few rooms behind it."""
     plan = _ground(rng, "shop", between(rng, 8, 30), between(rng, 8, 24))
-    x0, y0, x1, y1 = plan.inner
+    x0, y0, x1, _ = plan.inner
     if chance(rng, 0.5):
         _uneven_row(rng, plan, (x0, y0, x1, y0 + between(rng, 2, 4.5)))
     plan.hall(plan.inner)
@@ -193,8 +193,11 @@ def _uneven_row(rng: Generator, plan: Plan, strip: Rectangle) -> None:
         at = end
 
 
-def _scattered(rng: Generator, plan: Plan, strip: Rectangle) -> None:
-    """Rooms here and there along a strip, some of which open widely: suites, stair wells, places to wait."""
+def _scattered(rng: Generator, plan: Plan, strip: Rectangle, sides: tuple[int, ...]) -> None:
+    """Rooms here and there along a strip, some of which open widely: suites, stair wells, places to wait.
+
+    They lie at its low side (0) or at its high one (1), of those at which there is a corridor.
+    """
     x0, y0, x1, y1 = strip
     lies = x1 - x0 >= y1 - y0
     length, deep = max(x1 - x0, y1 - y0), min(x1 - x0, y1 - y0)
@@ -202,9 +205,7 @@ def _scattered(rng: Generator, plan: Plan, strip: Rectangle) -> None:
     while at < length - cells(2.0) and deep > cells(1.5):
         end = min(at + between(rng, 2.2, 8.0), length)
         own = round(deep * rng.uniform(0.5, 1.0))
-        near = chance(rng, 0.5)
-        low, high = (0, own) if near else (deep - own, deep)
-        # Both sides of the strip may be the corridor's: only the half of the rooms that touch it are reached.
+        low, high = (deep - own, deep) if rng.choice(sides) else (0, own)
         if lies:
             number = plan.paint((x0 + at, y0 + low, x0 + end, y0 + high))
         else:
@@ -251,7 +252,7 @@ def _twin(rng: Generator, plan: Plan) -> list[Rectangle]:
     if chance(rng, 0.6):
         _uneven_row(rng, plan, (left, low + width, right, high))
     else:
-        _scattered(rng, plan, (left, low + width, right, high))
+        _scattered(rng, plan, (left, low + width, right, high), (0, 1))
     if chance(rng, 0.5) and high + width + cells(4) < y1:  # a bridge to a hall
         at = int(rng.integers(left, right - cells(8)))
         reach = between(rng, 2, 5)
@@ -270,14 +271,14 @@ def _spine(rng: Generator, plan: Plan) -> list[Rectangle]:
     plan.corridor(segments[0])
     _double_doors(rng, plan, segments)
     for _ in range(rng.integers(0, 3)):
-        at, own, up = int(rng.integers(x0 + cells(4), x1 - cells(6))), between(rng, 1.5, 3.0), chance(rng, 0.5)
-        arm = (at, y + width, at + own, y1) if up else (at, y0, at + own, y)
+        at, own = int(rng.integers(x0 + cells(4), x1 - cells(6))), between(rng, 1.5, 3.0)
+        arm = (at, y + width, at + own, y1) if chance(rng, 0.5) else (at, y0, at + own, y)
         plan.corridor(arm)
         segments.append(arm)
     for _ in range(rng.integers(0, 3)):
         at, broad, deep = int(rng.integers(x0, x1 - cells(8))), between(rng, 4, 14), between(rng, 3, 12)
-        where = (at, y - deep, at + broad, y) if chance(rng, 0.5) else (at, y + width, at + broad, y + width + deep)
-        own = (where[0], max(where[1], y0), min(where[2], x1), min(where[3], y1))
+        low, high = (y - deep, y) if chance(rng, 0.5) else (y + width, y + width + deep)
+        own = (at, max(low, y0), min(at + broad, x1), min(high, y1))
         if chance(rng, 0.3):  # the corridor ends in it and goes on behind it
             own = (own[0], min(own[1], y), own[2], max(own[3], y + width))
             plan.rooms[own[1] : own[3], own[0] : own[2]] = 0
