@@ -278,11 +278,11 @@ def _spine(rng: Generator, plan: Plan) -> list[Rectangle]:
     for _ in range(rng.integers(0, 3)):
         at, broad, deep = int(rng.integers(x0, x1 - cells(8))), between(rng, 4, 14), between(rng, 3, 12)
         low, high = (y - deep, y) if chance(rng, 0.5) else (y + width, y + width + deep)
-        own = (at, max(low, y0), min(at + broad, x1), min(high, y1))
+        room = (at, max(low, y0), min(at + broad, x1), min(high, y1))
         if chance(rng, 0.3):  # the corridor ends in it and goes on behind it
-            own = (own[0], min(own[1], y), own[2], max(own[3], y + width))
-            plan.rooms[own[1] : own[3], own[0] : own[2]] = 0
-        plan.lobbies.add(plan.paint(own))
+            room = (room[0], min(room[1], y), room[2], max(room[3], y + width))
+            plan.rooms[room[1] : room[3], room[0] : room[2]] = 0
+        plan.lobbies.add(plan.paint(room))
     return segments
 
 
