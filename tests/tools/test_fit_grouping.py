@@ -386,15 +386,17 @@ def run(script, *arguments):
 def check_fitted(work, cases):
     """The folder for the package is whole, and the analysis runs with what was fitted without each fold."""
     from rose2_logs.segmentation.regions.features import REGION_FEATURES
-    from rose2_logs.segmentation.regions.fitted import JOINS, MANIFEST, NETWORK, OUTSIDE, sha256_of
+    from rose2_logs.segmentation.regions.fitted import FILES, JOINS, MANIFEST, OUTSIDE, OWN_ROOMS, sha256_of
+    from rose2_logs.segmentation.regions.own_rooms import OWN_ROOM_FEATURES
     from rose2_logs.segmentation.regions.strengths import read_trees
 
     ships = work / "seed0/all"
     manifest = json.loads((ships / MANIFEST).read_text(encoding="utf-8"))
-    assert manifest["sha256"] == {name: sha256_of(ships / name) for name in (NETWORK, JOINS, OUTSIDE)}
+    assert manifest["sha256"] == {name: sha256_of(ships / name) for name in FILES}
     assert manifest["real maps"] == 3
     assert len(read_trees(ships / JOINS).feature) == 8
     read_trees(ships / OUTSIDE, REGION_FEATURES)
+    read_trees(ships / OWN_ROOMS, OWN_ROOM_FEATURES)
     assert "| mean of the seeds |" in run("left_out_figures.py", work, "--cases", cases, "--seeds", 1)
     assert len(list((work / "seed0/predictions/homes").glob("*.png"))) == 3
 

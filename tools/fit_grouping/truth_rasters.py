@@ -54,7 +54,7 @@ class TruthRaster:
 def random_crop(
     rng: np.random.Generator, one: TruthRaster, size: int
 ) -> tuple[FloatImage, FloatImage, FloatImage]:
-    """Cut a square of a map around a cell of a room: mirrored, turned by quarters, at times stretched and worn.
+    """Cut a square of a map around a cell of a room, turned, mirrored, at times stretched or worn.
 
     Returns
     -------
