@@ -349,11 +349,11 @@ def test_network_answers_the_same_from_its_file(tmp_path, prepared):
 
     torch.manual_seed(0)
     network = RoomNetwork((4, 6, 8, 8, 8)).eval()
-    export_onnx([network], tmp_path / "n.onnx")
+    export_onnx(network, tmp_path / "n.onnx")
     raster = prepared.atoms.raster
     height, width = (side // 32 * 32 for side in raster.wall.shape)
     whole = PlanRaster(raster.wall[:height, :width], raster.free[:height, :width])
-    answers = AnsweringNetwork(tmp_path / "n.onnx")(whole)
+    answers = AnsweringNetwork(tmp_path / "n.onnx")(whole, views=1)
     inputs = torch.from_numpy(network_input(shares_of(whole.wall), shares_of(whole.free))[None])
     expected = torch.sigmoid(network(inputs))[0].detach().numpy()
     assert answers.shape == (OUTPUTS, height, width)

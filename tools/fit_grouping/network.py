@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -66,26 +65,25 @@ class RoomNetwork(nn.Module):  # type: ignore[misc]
         return out
 
 
-class _MeanAnswer(nn.Module):  # type: ignore[misc]
-    """Mean of the probabilities of networks, as blocks of 2 x 2 cells: as the package reads them."""
+class _Answers(nn.Module):  # type: ignore[misc]
+    """Probabilities of a network, as blocks of 2 x 2 cells: as the package reads them."""
 
-    def __init__(self, networks: Sequence[RoomNetwork]) -> None:
+    def __init__(self, network: RoomNetwork) -> None:
         super().__init__()
-        self.networks = nn.ModuleList(networks)
+        self.network = network
 
     def forward(self, inputs: Tensor) -> Tensor:
-        total: Tensor = sum(torch.sigmoid(network.blocks(inputs)) for network in self.networks)
-        return total / len(self.networks)
+        return torch.sigmoid(self.network.blocks(inputs))
 
 
-def export_onnx(networks: Sequence[RoomNetwork], path: Path) -> None:
-    """Write networks as one ONNX file that gives the mean of their probabilities, at any size.
+def export_onnx(network: RoomNetwork, path: Path) -> None:
+    """Write a network as an ONNX file that gives its probabilities, at any size.
 
     Norms are folded in, and weights are kept in 16 bits, which OpenCV reads as 32.
     """
     axes = {"map": {2: "rows", 3: "columns"}, "answers": {2: "rows", 3: "columns"}}
     torch.onnx.export(
-        _MeanAnswer(networks).eval(),
+        _Answers(network).eval(),
         (torch.zeros(1, INPUTS, 256, 256),),
         str(path),
         input_names=["map"],

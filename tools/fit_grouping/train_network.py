@@ -5,8 +5,7 @@
 
 OUT.pt is the checkpoint (weights, their running mean, the optimizer's state, steps and seconds done), written
 every few minutes; a run whose OUT.pt exists goes on from it until it has trained for that long all told.
-OUT.onnx answers with the running mean of the weights, and, where it began with a checkpoint, with that one
-too: it holds the mean of both answers.
+OUT.onnx answers with the running mean of the weights.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ import copy
 import os
 import sys
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from pathlib import Path
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
@@ -153,7 +152,6 @@ def main() -> None:
     optimizer = torch.optim.AdamW(network.parameters(), arguments.learning_rate, weight_decay=WEIGHT_DECAY)
     steps, before = 0, 0.0
     checkpoint = arguments.out.with_suffix(".pt")
-    begun_with = [_network_of(arguments.start)] if arguments.start else []
     mean = copy.deepcopy(network).eval()
     if checkpoint.exists():
         state = torch.load(checkpoint, map_location=device)
@@ -164,8 +162,9 @@ def main() -> None:
         if before >= arguments.seconds:
             return
     elif arguments.start:
-        network.load_state_dict(begun_with[0].state_dict())
-        mean.load_state_dict(begun_with[0].state_dict())
+        begun_with = torch.load(arguments.start, map_location=device)["mean"]
+        network.load_state_dict(begun_with)
+        mean.load_state_dict(begun_with)
     keep: Path | None = arguments.keep
     simulated, held_out = kept(
         keep and keep / "simulated.pkl", lambda: simulated_rasters(arguments.simulated, arguments.seed)
@@ -217,26 +216,9 @@ def main() -> None:
             print(f"{now - start:6.0f} s {steps:6d} steps: loss {np.mean(losses):.3f}, {told}", flush=True)
             losses.clear()
             # The network first: where there is a checkpoint, there is the network of it or of a later one.
-            write_network(checkpoint.with_suffix(".onnx"), [*begun_with, mean])
+            with replacing(checkpoint.with_suffix(".onnx")) as part:
+                export_onnx(copy.deepcopy(mean).cpu(), part)
             _save(checkpoint, network, mean, optimizer, steps, now - start)
-
-
-def _network_of(checkpoint: Path) -> RoomNetwork:
-    """Mean network of a checkpoint."""
-    network = RoomNetwork()
-    network.load_state_dict(torch.load(checkpoint, map_location="cpu")["mean"])
-    network.eval()
-    return network
-
-
-def write_network(path: Path, networks: Sequence[RoomNetwork]) -> None:
-    """Write the mean answer of networks.
-
-    A network that was trained further on real maps errs elsewhere than the one that it began with, which saw
-    simulated maps only: together they are better than each.
-    """
-    with replacing(path) as part:
-        export_onnx([copy.deepcopy(network).cpu() for network in networks], part)
 
 
 def _save(

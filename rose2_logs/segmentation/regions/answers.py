@@ -9,7 +9,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rose2_logs.segmentation.regions.plan_raster import OUTPUTS, PlanRaster, network_input, shares_of
+from rose2_logs.segmentation.regions.plan_raster import (
+    OFFSETS,
+    OUTPUTS,
+    FloatImage,
+    PlanRaster,
+    network_input,
+    shares_of,
+)
 
 STRIDE = 32
 """Inputs are padded to a multiple of this many cells, the coarsest step of the network."""
@@ -21,6 +28,8 @@ TILE_CELLS = 1536
 """Larger plans are looked at in tiles of this side, so that memory does not grow with the map."""
 OVERLAP_CELLS = 192
 """Tiles see this far beyond what they answer for; what lies further hardly matters to an answer."""
+VIEWS = 2
+"""The network sees a map as it is and turned by half: it errs in different places, and the mean errs less."""
 
 
 class AnsweringNetwork:
@@ -29,11 +38,11 @@ class AnsweringNetwork:
     def __init__(self, path: Path) -> None:
         self._network = cv2.dnn.readNetFromONNX(str(path))
 
-    def __call__(self, raster: PlanRaster) -> NDArray[np.float32]:
-        """Answers (OUTPUTS, H, W) in [0, 1] for a raster (H, W)."""
+    def __call__(self, raster: PlanRaster, views: int = VIEWS) -> NDArray[np.float32]:
+        """Answers (OUTPUTS, H, W) in [0, 1] for a raster (H, W), the mean of those for one or two views."""
         height, width = raster.wall.shape
         if max(height, width) <= TILE_CELLS:
-            return self._answers(raster)
+            return self._answers(raster, views)
         answers = np.zeros((OUTPUTS, height, width), np.float32)
         step = TILE_CELLS - 2 * OVERLAP_CELLS
         for top, left in product(range(0, height, step), range(0, width, step)):
@@ -42,21 +51,41 @@ class AnsweringNetwork:
             tile = PlanRaster(raster.wall[seen], raster.free[seen])
             if tile.free.any():
                 own = np.s_[:, top - low[0] : top - low[0] + step, left - low[1] : left - low[1] + step]
-                answers[:, top : top + step, left : left + step] = self._answers(tile)[own]
+                answers[:, top : top + step, left : left + step] = self._answers(tile, views)[own]
         return answers
 
-    def _answers(self, raster: PlanRaster) -> NDArray[np.float32]:
+    def _answers(self, raster: PlanRaster, views: int) -> NDArray[np.float32]:
         height, width = raster.wall.shape
         rows, columns = (-(-side // STRIDE) * STRIDE for side in (height, width))
         # Half of the padding on each side, but a whole number of pairs of cells.
         top, left = (rows - height) // 4 * 2, (columns - width) // 4 * 2
         pad = ((top, rows - height - top), (left, columns - width - left))
         inputs = network_input(shares_of(np.pad(raster.wall, pad)), shares_of(np.pad(raster.free, pad)))
-        self._network.setInput(np.ascontiguousarray(inputs[None]))
-        blocks = self._network.forward()[0].reshape(OUTPUTS, BLOCK, BLOCK, rows // BLOCK, columns // BLOCK)
-        out = blocks.transpose(0, 3, 1, 4, 2).reshape(OUTPUTS, rows, columns)
+        out = self._forward(inputs)
+        if views > 1:
+            out = (out + turned_by_half(self._forward(inputs[:, ::-1, ::-1]))) / np.float32(2)
         out = out[:, top : top + height, left : left + width]
         rounded: NDArray[np.float32] = np.rint(out * ANSWER_STEPS).astype(np.float32) / np.float32(
             ANSWER_STEPS
         )
         return rounded
+
+    def _forward(self, inputs: FloatImage) -> FloatImage:
+        rows, columns = inputs.shape[1:]
+        self._network.setInput(np.ascontiguousarray(inputs[None]))
+        blocks = self._network.forward()[0].reshape(OUTPUTS, BLOCK, BLOCK, rows // BLOCK, columns // BLOCK)
+        out: FloatImage = blocks.transpose(0, 3, 1, 4, 2).reshape(OUTPUTS, rows, columns)
+        return out
+
+
+def turned_by_half(answers: FloatImage) -> FloatImage:
+    """Answers (OUTPUTS, H, W) for a map turned by half, as those for the map.
+
+    A pair of cells is told of at the one that is lower or further right, which is the other one when turned.
+    Where there is no pair, the answer is 0.
+    """
+    back, out = answers[:, ::-1, ::-1], np.zeros_like(answers)
+    rows, columns = answers.shape[1:]
+    for k, (down, right) in enumerate((*OFFSETS, (0, 0))):
+        out[k, down:, right:] = back[k, : max(rows - down, 0), : max(columns - right, 0)]
+    return out

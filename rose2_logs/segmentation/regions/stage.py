@@ -218,7 +218,8 @@ def region_tree(
     atoms: Atoms, free: BoolArray, resolution_m: float, parameters: RegionParameters
 ) -> RegionTree:
     """Judge the borders of atoms, to join these to rooms."""
-    graph = atoms.graph(fitted.answering_network()(atoms.raster) if atoms.count else None)
+    answers = fitted.answering_network()(atoms.raster, parameters.answer_views) if atoms.count else None
+    graph = atoms.graph(answers)
     strength = FittedStrength.of_joins(fitted.join_trees(), parameters)
     return RegionTree(atoms.cells, free, resolution_m, graph, atoms.edge_shares(), strength, parameters)
 

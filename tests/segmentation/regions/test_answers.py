@@ -6,9 +6,10 @@ from drawn_floors import room_grid
 
 from rose2_logs.segmentation.regions import answers as module
 from rose2_logs.segmentation.regions import fitted
-from rose2_logs.segmentation.regions.answers import ANSWER_STEPS, STRIDE
+from rose2_logs.segmentation.regions.answers import ANSWER_STEPS, STRIDE, turned_by_half
 from rose2_logs.segmentation.regions.plan_raster import (
     DISTANCE_MAX,
+    OFFSETS,
     OUTPUTS,
     SHARE_STEPS,
     PlanRaster,
@@ -35,6 +36,23 @@ def test_answers_are_steps_between_0_and_1(raster, whole):
     assert whole.min() >= 0
     assert whole.max() <= 1
     assert np.array_equal(np.rint(whole * ANSWER_STEPS).astype(np.float32) / np.float32(ANSWER_STEPS), whole)
+
+
+def test_a_map_turned_by_half_has_the_same_answers_turned(raster, whole):
+    """Each pair of cells is told of at its lower or right cell, which is the other one when turned."""
+    turned = fitted.answering_network()(PlanRaster(raster.wall[::-1, ::-1], raster.free[::-1, ::-1]))
+    back = turned_by_half(turned)
+    for k, (down, right) in enumerate((*OFFSETS, (0, 0))):
+        np.testing.assert_allclose(back[k, down:, right:], whole[k, down:, right:], atol=2e-3)
+
+
+def test_answers_are_the_mean_of_those_for_both_views(raster, whole):
+    network = fitted.answering_network()
+    one = network(raster, views=1)
+    other = turned_by_half(network(PlanRaster(raster.wall[::-1, ::-1], raster.free[::-1, ::-1]), views=1))
+    seen = np.s_[:, 14:, 14:]
+    np.testing.assert_allclose(whole[seen], ((one + other) / 2)[seen], atol=2e-3)
+    assert np.abs(one - whole).max() > 0.01
 
 
 def test_tiles_give_the_answers_of_the_whole_but_for_a_few(raster, whole, monkeypatch):
