@@ -32,7 +32,8 @@ from rose2_logs.system.files import reason_of
 CELL_VALUES = ("auto", "stored", "percent", "zero_one", "fifty_unknown", "costs")
 """How the numbers in the cells of maps can be read."""
 
-
+FAR_CELLS = ("leave_out", "keep")
+"""What can be done with known cells far from the rest of a map."""
 NO_TYPE = "none"
 TYPES_WITHOUT_SCHEMA = (NO_TYPE, "nav_msgs/OccupancyGrid", "nav2_msgs/Costmap", "foxglove_msgs/Grid")
 
@@ -110,6 +111,25 @@ class OccupancyParameters(ParameterBlock):
         "Explored areas with more cells are analyzed in blocks: 220 m by 220 m at 5 cm.",
         10_000,
         2**40,
+    )
+    far_cells: str = choice(
+        "leave_out",
+        FAR_CELLS,
+        "Whether stray specks and rays far from what was explored are left out: with them a map costs as if "
+        "all between were explored.",
+    )
+    far_margin_m: float = number(
+        5.0, "m", "What is nearer to explored floor always stays: rays into the next room.", 0.0, 1000.0
+    )
+    far_min_area_m2: float = number(
+        3.0, "m2", "Floor of this area stays wherever it is: the smallest room.", 0.0
+    )
+    far_min_gain: float = number(
+        1.25,
+        "1",
+        "Only what makes the rectangle around the known cells so many times larger is left out.",
+        1.0,
+        1000.0,
     )
 
     def __post_init__(self) -> None:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from rose2_logs.config.parameters import OccupancyParameters
 from rose2_logs.io.grids import Cells, Grid, MapWarning, Patch, percent
-from rose2_logs.model.labels import label_sizes
+from rose2_logs.model.labels import cells_where, label_sizes
 from rose2_logs.model.occupancy import HIGHEST_PERCENT, UNKNOWN, OccupancySnapshot, classify
 from rose2_logs.system.text import percent as as_percent
 
@@ -167,7 +167,11 @@ def read_as(parameters: OccupancyParameters) -> CellReading:
 
 def count_values(cells: Cells) -> Counts:
     """Count the cells (H, W) by the byte that they are stored as."""
-    return label_sizes(cells.view(np.uint8), UNKNOWN_BYTE)
+    flat = cells.reshape(-1).view(np.uint8)
+    known = cells_where(flat, lambda part: part != UNKNOWN_BYTE)  # of a large canvas mostly few
+    counts = label_sizes(flat[known], UNKNOWN_BYTE)
+    counts[UNKNOWN_BYTE] = flat.size - known.size
+    return counts
 
 
 def decide(counts: Counts) -> CellReading:

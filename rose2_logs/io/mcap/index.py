@@ -46,6 +46,8 @@ logger = logging.getLogger(__name__)
 
 # Reading alternates between chunks that overlap in time; two are cached so that each is decompressed once.
 _CHUNKS_KEPT = 2
+_KEPT_BYTES = 1 << 24
+"""Large chunks, each with a single large map, are not kept together."""
 # What parsing damaged data raises; ValueError includes TooLargeError.
 DAMAGE = (McapError, ValueError, KeyError, EOFError, struct.error)
 
@@ -347,6 +349,8 @@ class McapFile(LogFile):
         if begin in self._chunks:
             self._chunks.move_to_end(begin)
             return self._chunks[begin]
+        while sum(map(len, self._chunks.values())) > _KEPT_BYTES:
+            self._chunks.popitem(last=False)
         self._chunks[begin] = records = chunk_records(self._record(begin), self.limits.chunk_max_bytes)
         if len(self._chunks) > _CHUNKS_KEPT:
             self._chunks.popitem(last=False)
