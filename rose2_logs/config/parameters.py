@@ -58,6 +58,13 @@ class ReadingParameters(ParameterBlock):
         1024,
         2**40,
     )
+    unpacked_max_bytes: int = number(
+        2**38,
+        "bytes",
+        "Largest log that a compressed file is unpacked to, if the disk has room: 275 GB, hours of cameras.",
+        1024,
+        2**50,
+    )
     map_max_messages: int = number(
         2_000_000, "messages", "Most map messages in a log: one per second for 23 days.", 1, 10**12
     )

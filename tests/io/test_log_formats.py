@@ -164,6 +164,29 @@ def test_maps_behind_a_clock_that_was_set_back_come_in_the_order_of_the_file(nam
     assert "goes back by 120.0 s at message 4 of the file" in caplog.text
 
 
+@pytest.mark.parametrize("kind", ["bags", "ROS 2 bag", "databases"])
+def test_files_behind_a_clock_that_was_set_back_come_in_their_order(kind, tmp_path, caplog):
+    maps = growing_maps()
+    times = [START_NS + seconds * 10**9 for seconds in (0, 10, -100, -90, -80, -300)]
+    log = [("/map", time, each) for time, each in zip(times, maps, strict=True)]
+    folder = tmp_path / "run"
+    folder.mkdir()
+    paths = []
+    for number, part in enumerate((log[:2], log[2:5], log[5:])):
+        match kind:
+            case "bags":
+                paths.append(write_bag(folder / f"run_{number}.bag", part))
+            case "ROS 2 bag":
+                paths.append(write_mcap(folder / f"run_{number}.mcap", part))
+            case _:
+                written = write_rosbag2(tmp_path / f"bag{number}", part)
+                paths.append(next(written.glob("*.db3")).rename(folder / f"run_{number}.db3"))
+    goes_on = [START_NS + k * 10**10 for k in range(6)]
+    assert_are(read(folder if kind == "ROS 2 bag" else paths), maps, goes_on)
+    assert f"goes back by 110.0 s from {paths[0].name} to this file" in caplog.text
+    assert f"goes back by 220.0 s from {paths[1].name} to this file" in caplog.text
+
+
 @pytest.mark.parametrize("name", IN_ANY_ORDER)
 def test_maps_before_a_clock_was_set_to_the_right_year_are_moved_up_to_it(name, tmp_path, caplog):
     maps = growing_maps()
