@@ -151,7 +151,14 @@ class MapStream:
             self._counts.skipped += 1
             return None
         taken = OccupancySnapshot(
-            self._index, log_time_ns, now.stamp_ns, self._topic, now.cells, now.geometry, self._repeats
+            self._index,
+            log_time_ns,
+            now.stamp_ns,
+            self._topic,
+            now.cells,
+            now.geometry,
+            self._repeats,
+            is_percent=True,
         )
         self._yielded = now
         self._index += 1
