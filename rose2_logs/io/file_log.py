@@ -334,13 +334,18 @@ class FileLog(MessageSource):
         return self._decoders[key](data)
 
     def _topics(self) -> tuple[TopicInfo, ...]:
-        topics: dict[tuple[str, str, str], tuple[int, bool]] = {}
+        topics: dict[tuple[str, str, str, str], tuple[int, bool]] = {}
         for file in self._files:
             for channel in file.channels.values():
-                key = (channel.topic, channel.schema_name, channel.message_encoding)
+                key = (
+                    channel.topic,
+                    channel.schema_name,
+                    channel.message_encoding,
+                    channel.schema_encoding,
+                )
                 count, is_map = topics.get(key, (0, False))
                 topics[key] = (count + file.message_counts[channel.id], is_map or channel.is_map)
         return tuple(
-            TopicInfo(name, message_type, count, is_map, encoding)
-            for (name, message_type, encoding), (count, is_map) in sorted(topics.items())
+            TopicInfo(name, message_type, count, is_map, encoding, language)
+            for (name, message_type, encoding, language), (count, is_map) in sorted(topics.items())
         )

@@ -19,7 +19,7 @@ from rose2_logs.errors import InvalidMapError, LogError, NoMapTopicError
 from rose2_logs.io.cell_values import MAPS_LOOKED_AT, OVERRULED, CellReading, count_values, decide, read_as
 from rose2_logs.io.grids import Grid, MapWarning, Patch
 from rose2_logs.io.map_stream import MapChecks, MapStream, ReadCounts, without_far_cells
-from rose2_logs.io.messages import is_patch_type
+from rose2_logs.io.messages import is_called_map, is_patch_type, ros_type
 from rose2_logs.io.parts import MapFacts, Part, Parts, facts_of, find_parts, find_saved_parts
 from rose2_logs.io.poses import RobotPath
 from rose2_logs.io.saved_maps import MapFilesSource
@@ -352,6 +352,16 @@ class LogReader:
         return kind(text, file=self.info.path, topic=self.topic)
 
 
+def _why_unread(topic: TopicInfo) -> str:
+    """Say that a topic's maps cannot be read, and what to do."""
+    language = f", defined in {topic.schema_encoding}" if topic.schema_encoding else ""
+    return (
+        f"{topic.name} holds {topic.message_type} in the encoding {topic.encoding or 'none'}{language}, which is "
+        "not read; read are nav_msgs/OccupancyGrid as cdr, ros1 or json, and foxglove.Grid as protobuf, "
+        "flatbuffer or json: record or convert to one of these"
+    )
+
+
 def choose_topic(info: LogInfo, asked: str | None = None) -> str:
     """Choose the map topic: the requested one, else ``/map``, else the only one with messages.
 
@@ -380,6 +390,8 @@ def choose_topic(info: LogInfo, asked: str | None = None) -> str:
             "that says what its messages are; if they are maps, name their type "
             "(message_type='nav_msgs/OccupancyGrid')" + (f"; {building}" if building else "")
         )
+    if not maps and (unread := [each for each in info.topics if is_called_map(ros_type(each.message_type))]):
+        raise NoMapTopicError(f"{where} {_why_unread(unread[0])}" + (f"; {building}" if building else ""))
     if not maps:
         others = ", ".join(sorted({topic.message_type for topic in info.topics})[:MOST_LISTED])
         found = f", only {others}" if others else ""

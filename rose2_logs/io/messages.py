@@ -52,6 +52,11 @@ def is_patch_type(message_type: str) -> bool:
     return ros_type(message_type) in PATCH_TYPES
 
 
+def is_called_map(message_type: str) -> bool:
+    """Whether a type has the name of a map, whatever the encoding and the package."""
+    return message_type.replace(".", "/").rpartition("/")[2] in ("OccupancyGrid", "Costmap", "Grid")
+
+
 def is_map_type(message_type: str, encoding: str) -> bool:
     """Whether messages of this type and encoding are whole maps that `decoder` can read."""
     if encoding in ("protobuf", "flatbuffer"):

@@ -199,6 +199,25 @@ def test_maps_before_a_clock_was_set_to_the_right_year_are_moved_up_to_it(name, 
     assert inspect_log(path).duration_s == 50.0
 
 
+@pytest.mark.parametrize(
+    ("name", "language", "encoding"),
+    [
+        ("nav_msgs/msg/OccupancyGrid", "ros2msg", "cbor"),
+        ("nav_msgs.OccupancyGrid", "protobuf", "protobuf"),
+        ("foxglove.Grid", "flatbuffer", "msgpack"),
+    ],
+)
+def test_maps_that_cannot_be_read_are_named_with_their_encoding(name, language, encoding, tmp_path):
+    log = McapLog(tmp_path / "run.mcap")
+    log.raw("/grid", START_NS, (name, language, b""), encoding, b"\x00")
+    with pytest.raises(NoMapTopicError) as refused:
+        open_log(log.close())
+    text = str(refused.value)
+    assert f"/grid holds {name} in the encoding {encoding}, defined in {language}, which is not read" in text
+    assert "convert" in text
+    assert "\n" not in text
+
+
 def test_channels_of_other_encodings_beside_the_map_do_no_harm(tmp_path):
     log = McapLog(tmp_path / "mixed.mcap")
     log.raw("/pose", START_NS - 5, ("foxglove.Pose", "protobuf", SCHEMA), "protobuf", b"\x0a\x00")
