@@ -356,9 +356,9 @@ def _why_unread(topic: TopicInfo) -> str:
     """Say that a topic's maps cannot be read, and what to do."""
     language = f", defined in {topic.schema_encoding}" if topic.schema_encoding else ""
     return (
-        f"{topic.name} holds {topic.message_type} in the encoding {topic.encoding or 'none'}{language}, which is "
-        "not read; read are nav_msgs/OccupancyGrid as cdr, ros1 or json, and foxglove.Grid as protobuf, "
-        "flatbuffer or json: record or convert to one of these"
+        f"{topic.name} holds {topic.message_type} in the encoding {topic.encoding or 'none'}{language}, "
+        "which is not read; read are nav_msgs/OccupancyGrid as cdr, ros1 or json, and foxglove.Grid as "
+        "protobuf, flatbuffer or json: record or convert to one of these"
     )
 
 
