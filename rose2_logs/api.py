@@ -311,7 +311,7 @@ def _snapshot_of_array(
     geometry = GridGeometry(resolution_m, (0.0, 0.0), 0.0, "map", cells.shape)
     if cells.dtype.kind in "iu":
         if isinstance(cells, np.ma.MaskedArray):
-            cells = cells.astype(np.int64).filled(UNKNOWN)
+            cells = np.ma.filled(cells.astype(np.int64), UNKNOWN)
         cells = stored_bytes(cells)
         cells = reading_of([cells], occupancy, "array").percent_of(cells)
     return OccupancySnapshot(0, 0, 0, "array", cells, geometry, is_percent=True)

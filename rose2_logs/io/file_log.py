@@ -18,7 +18,7 @@ from rose2_logs.config.parameters import ReadingParameters
 from rose2_logs.config.selection import Times
 from rose2_logs.errors import LogError
 from rose2_logs.io.grids import Decoder, Grid, Patch
-from rose2_logs.io.log_file import LogFile, Place
+from rose2_logs.io.log_file import LATEST_NS, LogFile, Place
 from rose2_logs.io.messages import decoder
 from rose2_logs.io.source import LoggedBytes, LoggedMap, LogInfo, MessageSource, TopicInfo
 from rose2_logs.system.text import apart
@@ -242,6 +242,8 @@ class FileLog(MessageSource):
             wanted = [each.id for each in file.channels.values() if each.topic in topics]
             clock = Clock(self._delays.get(number, []))
             for message in file.messages(wanted) if wanted else ():
+                if message.log_time_ns > LATEST_NS:  # damage; no map of such a time is read either
+                    continue
                 channel = message.channel
                 is_cdr = channel.message_encoding == "cdr"
                 read = partial(file.decompressed if is_cdr else memoryview, message.data)

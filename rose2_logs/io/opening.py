@@ -457,11 +457,11 @@ def _decompressed(file: Path, directory: Path, limits: ReadingParameters) -> Pat
     except DAMAGED as error:
         text = f"{file}: cannot be decompressed: {error}"
         if isinstance(error, TooLargeError):
-            is_disk = free < limits.unpacked_max_bytes
-            where = f"free some disk space in {directory.parent.parent}, or name another folder in TMPDIR"
-            remedy = (
-                where if is_disk else "if that is correct, raise the parameter reading.unpacked_max_bytes"
-            )
+            remedy = "if that is correct, raise the parameter reading.unpacked_max_bytes"
+            if free < limits.unpacked_max_bytes:
+                remedy = (
+                    f"free some disk space in {directory.parent.parent}, or name another folder in TMPDIR"
+                )
             raise LogError(f"{text}; {remedy}", file=file) from error
         if not target.exists() or not target.stat().st_size:
             raise LogError(text, file=file) from error
