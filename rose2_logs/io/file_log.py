@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rose2_logs.config.parameters import ReadingParameters
+from rose2_logs.config.reading import ReadingParameters
 from rose2_logs.config.selection import Times
 from rose2_logs.errors import LogError
 from rose2_logs.io.grids import Decoder, Grid, Patch

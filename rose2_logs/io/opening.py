@@ -11,7 +11,8 @@ from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
 
 from rose2_logs.config.mapping import MappingParameters
-from rose2_logs.config.parameters import OccupancyParameters, ReadingParameters
+from rose2_logs.config.parameters import OccupancyParameters
+from rose2_logs.config.reading import ReadingParameters
 from rose2_logs.config.selection import Selection
 from rose2_logs.errors import LogError
 from rose2_logs.io.carmen_format import CARMEN_FORMAT, is_carmen

@@ -19,7 +19,7 @@ from urllib.parse import unquote
 import numpy as np
 from numpy.typing import NDArray
 
-from rose2_logs.config.parameters import ReadingParameters
+from rose2_logs.config.reading import ReadingParameters
 from rose2_logs.config.selection import Times
 from rose2_logs.errors import InvalidMapError, LogError
 from rose2_logs.io.cell_values import (

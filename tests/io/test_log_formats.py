@@ -31,7 +31,7 @@ from reader_logs import (
 )
 from scipy.ndimage import binary_dilation
 
-from rose2_logs.config.parameters import ReadingParameters
+from rose2_logs.config.reading import ReadingParameters
 from rose2_logs.config.selection import Selection
 from rose2_logs.errors import InvalidMapError, LogError, NoMapTopicError
 from rose2_logs.io import inspect_log, open_log

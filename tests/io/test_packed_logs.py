@@ -14,7 +14,7 @@ import pytest
 import zstandard
 from reader_logs import START_NS, Map, write_bag, write_rosbag2
 
-from rose2_logs.config.parameters import ReadingParameters
+from rose2_logs.config.reading import ReadingParameters
 from rose2_logs.errors import LogError
 from rose2_logs.io import open_log
 from rose2_logs.io.discovery import is_bag, is_storage, logs_among, plain_name, stem_of

@@ -8,7 +8,7 @@ import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from rose2_logs.config.parameters import ReadingParameters
+from rose2_logs.config.reading import ReadingParameters
 from rose2_logs.config.selection import Selection
 from rose2_logs.errors import LogError
 from rose2_logs.io import open_log

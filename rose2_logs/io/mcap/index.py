@@ -20,7 +20,7 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, ChunkIndex, Header, Metadata, Schema
 from mcap.records import Channel as McapChannel
 
-from rose2_logs.config.parameters import NO_TYPE, ReadingParameters
+from rose2_logs.config.reading import NO_TYPE, ReadingParameters
 from rose2_logs.errors import LogError
 from rose2_logs.io.checked_file import CheckedFile
 from rose2_logs.io.decompression import REMEDY
