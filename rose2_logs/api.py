@@ -16,13 +16,20 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rose2_logs.comparison.layouts import LayoutComparison
-from rose2_logs.config.parameters import Parameters
+from rose2_logs.config.parameters import OccupancyParameters, Parameters
 from rose2_logs.config.run_options import RunOptions, check_option, options_of, with_detail
 from rose2_logs.config.selection import Selection
 from rose2_logs.errors import InvalidMapError, ParameterError
 from rose2_logs.io import open_log as open_log_reader
+from rose2_logs.io.cell_values import (
+    LEAST_CELLS,
+    MAPS_LOOKED_AT,
+    CellReading,
+    reading_of,
+    stored_bytes,
+)
 from rose2_logs.io.log import LogReader
-from rose2_logs.model.occupancy import GridGeometry, OccupancySnapshot, free_area_m2
+from rose2_logs.model.occupancy import UNKNOWN, GridGeometry, OccupancySnapshot, free_area_m2
 from rose2_logs.runs.run import Run
 from rose2_logs.runs.sink import Sink
 from rose2_logs.runs.stream import TrackedStream, start_workers
@@ -190,9 +197,35 @@ def _tracked(maps: LogReader | Iterable[OccupancySnapshot], options: RunOptions)
         if isinstance(maps, LogReader):
             yield from TrackedStream.of_log(maps, workers, parameters)
             return
-        last = _checked_map(maps[-1]) if isinstance(maps, Sequence) and len(maps) else None
-        final_m2 = None if last is None else free_area_m2(last, parameters.occupancy)
-        yield from TrackedStream(map(_checked_map, maps), final_m2, workers, parameters)
+        final_m2, reading = None, None
+        if isinstance(maps, Sequence) and len(maps):
+            some = np.unique(np.linspace(0, len(maps) - 1, MAPS_LOOKED_AT).round().astype(int)).tolist()
+            reading = _decided_reading([_checked_map(maps[k]) for k in some], parameters.occupancy)
+            final_m2 = free_area_m2(_in_percent(maps[-1], reading), parameters.occupancy)
+        read = _all_in_percent(map(_checked_map, maps), reading, parameters.occupancy)
+        yield from TrackedStream(read, final_m2, workers, parameters)
+
+
+def _all_in_percent(
+    maps: Iterable[OccupancySnapshot], reading: CellReading | None, occupancy: OccupancyParameters
+) -> Iterator[OccupancySnapshot]:
+    """Read the numbers of all maps alike; of an iterator, as the first that knows enough says."""
+    for each in maps:
+        if reading is None and np.count_nonzero(each.cells != UNKNOWN) >= LEAST_CELLS:
+            reading = _decided_reading([each], occupancy)
+        yield _in_percent(each, reading)
+
+
+def _decided_reading(maps: Sequence[OccupancySnapshot], occupancy: OccupancyParameters) -> CellReading | None:
+    """What the numbers of maps mean; None if a reader has decided it already."""
+    undecided = [each.cells for each in maps if not each.is_percent]
+    return reading_of(undecided, occupancy, maps[0].topic) if undecided else None
+
+
+def _in_percent(snapshot: OccupancySnapshot, reading: CellReading | None) -> OccupancySnapshot:
+    if reading is None or reading.table is None or snapshot.is_percent:
+        return snapshot
+    return dataclasses.replace(snapshot, cells=reading.percent_of(snapshot.cells), is_percent=True)
 
 
 def _checked_map(given: OccupancySnapshot) -> OccupancySnapshot:
@@ -216,7 +249,8 @@ def segment(
     ----------
     map_ : (H, W) array of int, str, path or OccupancySnapshot
         Occupancy in percent, -1 for unknown, row 0 at the origin as in ROS messages; or the file of a saved
-        map.
+        map. Of an array, and of a snapshot that no reader made, it is decided as of a log what the numbers
+        mean (probabilities, 0 and 1, costs), with a warning where they are not the usual ones.
     resolution_m : float, optional
         Side of a cell in meters, for an array or an image without a ``.yaml`` next to it.
     method : str
@@ -253,17 +287,19 @@ def segment(
     """
     used = with_detail(Parameters.from_any(parameters), detail, method)
     if isinstance(map_, OccupancySnapshot):
-        snapshot = map_
+        snapshot = _in_percent(map_, _decided_reading([map_], used.occupancy))
     elif isinstance(map_, str | Path | bytes):
         snapshot = _read_map(map_, resolution_m, used)  # type: ignore[arg-type]
     else:
-        snapshot = _snapshot_of_array(map_, resolution_m)
+        snapshot = _snapshot_of_array(map_, resolution_m, used.occupancy)
     if not snapshot.cells.size:
         raise InvalidMapError("the map has no cells")
     return segment_snapshot(snapshot, used, method, name=snapshot.topic, voronoi=voronoi)
 
 
-def _snapshot_of_array(array: ArrayLike, resolution_m: float | None) -> OccupancySnapshot:
+def _snapshot_of_array(
+    array: ArrayLike, resolution_m: float | None, occupancy: OccupancyParameters
+) -> OccupancySnapshot:
     if array is None or isinstance(array, Mapping):
         raise ParameterError(f"a map is an array, a path or an OccupancySnapshot, not {_type(array)}")
     if resolution_m is None:
@@ -273,7 +309,12 @@ def _snapshot_of_array(array: ArrayLike, resolution_m: float | None) -> Occupanc
     except ValueError as error:
         raise InvalidMapError("all rows of a map must have the same number of cells") from error
     geometry = GridGeometry(resolution_m, (0.0, 0.0), 0.0, "map", cells.shape)
-    return OccupancySnapshot(0, 0, 0, "array", cells, geometry)
+    if cells.dtype.kind in "iu":
+        if isinstance(cells, np.ma.MaskedArray):
+            cells = np.ma.filled(cells.astype(np.int64), UNKNOWN)
+        cells = stored_bytes(cells)
+        cells = reading_of([cells], occupancy, "array").percent_of(cells)
+    return OccupancySnapshot(0, 0, 0, "array", cells, geometry, is_percent=True)
 
 
 def open_log(

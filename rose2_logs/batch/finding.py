@@ -12,7 +12,7 @@ from urllib.request import url2pathname
 
 from rose2_logs.batch.location import WEB_SCHEMES, Location
 from rose2_logs.errors import LogError
-from rose2_logs.io.discovery import MAP_ENDINGS, STORAGE_ENDINGS, is_bag, is_storage, logs_among
+from rose2_logs.io.discovery import MAP_ENDINGS, STORAGE_ENDINGS, is_bag, is_storage, logs_among, plain_name
 
 
 def find_logs(arguments: Sequence[str], out: Path) -> list[Location]:
@@ -115,7 +115,7 @@ def _remote(url: str, is_bag_at: Callable[[str], bool]) -> list[str]:
                 logs.append(folder if is_storage(match) and is_bag_at(folder) else match)
         return logs
     inside = url.partition("::")[0]
-    if inside.partition("?")[0].lower().endswith((*STORAGE_ENDINGS, *MAP_ENDINGS)):
+    if plain_name(inside.partition("?")[0].lower()).endswith((*STORAGE_ENDINGS, *MAP_ENDINGS)):
         remote.check(url)
         return [url]
     return _in_remote_folder(url)

@@ -15,6 +15,7 @@ from rose2_logs.io.discovery import (
     IMAGE_ENDINGS,
     MAP_ENDINGS,
     STORAGE_ENDINGS,
+    plain_name,
 )
 
 EXTRA = "pip install 'rose2-logs[batch]'"
@@ -130,7 +131,7 @@ def describe(url: str) -> list[RemoteFile]:
         about = files.info(path)
         # HTTP knows no folders: what is not named like a log is one.
         is_folder = about["type"] == "directory"
-        is_folder |= _is_web(url) and not name.lower().endswith((*STORAGE_ENDINGS, *MAP_ENDINGS))
+        is_folder |= _is_web(url) and not plain_name(name.lower()).endswith((*STORAGE_ENDINGS, *MAP_ENDINGS))
         paths = sorted(files.find(path)) if is_folder else [path, *_images_of(files, path)]
         described = []
         for each in paths:

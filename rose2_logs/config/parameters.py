@@ -11,9 +11,9 @@ import difflib
 import math
 import tomllib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
 from rose2_logs.config.baselines import (
     DistanceParameters,
@@ -24,6 +24,7 @@ from rose2_logs.config.baselines import (
 from rose2_logs.config.comparison import ComparisonParameters
 from rose2_logs.config.fields import ParameterBlock, choice, number
 from rose2_logs.config.mapping import MappingParameters
+from rose2_logs.config.reading import ReadingParameters
 from rose2_logs.config.regions import RegionParameters
 from rose2_logs.config.tracking import QualityParameters, TrackingParameters
 from rose2_logs.errors import ParameterError
@@ -32,43 +33,8 @@ from rose2_logs.system.files import reason_of
 CELL_VALUES = ("auto", "stored", "percent", "zero_one", "fifty_unknown", "costs")
 """How the numbers in the cells of maps can be read."""
 
-
-NO_TYPE = "none"
-TYPES_WITHOUT_SCHEMA = (NO_TYPE, "nav_msgs/OccupancyGrid", "nav2_msgs/Costmap", "foxglove_msgs/Grid")
-
-
-@dataclass(frozen=True, repr=False)
-class ReadingParameters(ParameterBlock):
-    """How much a log may claim before it is refused as damaged or hostile; real ones stay far below."""
-
-    block: ClassVar[str] = "reading"
-
-    map_max_cells: int = number(
-        2**27,
-        "cells",
-        "Largest map that is read: 579 m by 579 m at 5 cm. Reading an image of this size takes 2.7 GB.",
-        1,
-        2**40,
-    )
-    chunk_max_bytes: int = number(
-        2**28,
-        "bytes",
-        "Largest decompressed chunk or message: enough for the largest map; 1 MB is usual.",
-        1024,
-        2**40,
-    )
-    map_max_messages: int = number(
-        2_000_000, "messages", "Most map messages in a log: one per second for 23 days.", 1, 10**12
-    )
-    type_without_schema: str = choice(
-        NO_TYPE,
-        TYPES_WITHOUT_SCHEMA,
-        "Type of the messages on channels that have no schema: such a log does not say it itself.",
-    )
-
-    def with_type(self, name: str | None) -> Self:
-        """Return these with the type of channels without a schema that was named, if one was."""
-        return self if name is None else replace(self, type_without_schema=name)
+FAR_CELLS = ("leave_out", "keep")
+"""What can be done with known cells far from the rest of a map."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -110,6 +76,25 @@ class OccupancyParameters(ParameterBlock):
         "Explored areas with more cells are analyzed in blocks: 220 m by 220 m at 5 cm.",
         10_000,
         2**40,
+    )
+    far_cells: str = choice(
+        "leave_out",
+        FAR_CELLS,
+        "Whether stray specks and rays far from what was explored are left out: with them a map costs as if "
+        "all between were explored.",
+    )
+    far_margin_m: float = number(
+        5.0, "m", "What is nearer to explored floor always stays: rays into the next room.", 0.0, 1000.0
+    )
+    far_min_area_m2: float = number(
+        3.0, "m2", "Floor of this area stays wherever it is: the smallest room.", 0.0
+    )
+    far_min_gain: float = number(
+        1.25,
+        "1",
+        "Only what makes the rectangle around the known cells so many times larger is left out.",
+        1.0,
+        1000.0,
     )
 
     def __post_init__(self) -> None:

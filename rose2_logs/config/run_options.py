@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from rose2_logs.config.baselines import METHODS
 from rose2_logs.config.fields import changed_text
-from rose2_logs.config.parameters import TYPES_WITHOUT_SCHEMA, Parameters, ReadingParameters
+from rose2_logs.config.parameters import Parameters
+from rose2_logs.config.reading import TYPES_WITHOUT_SCHEMA, ReadingParameters
 from rose2_logs.config.regions import DETAIL_MOST
 from rose2_logs.errors import ParameterError
 

@@ -20,13 +20,9 @@ from numpy.typing import NDArray
 from PIL import Image, UnidentifiedImageError
 
 from rose2_logs.errors import CasesError
-from rose2_logs.model.occupancy import UNKNOWN, GridGeometry, OccupancySnapshot
+from rose2_logs.io.saved_maps import cells_of_image
+from rose2_logs.model.occupancy import GridGeometry, OccupancySnapshot
 from rose2_logs.system.files import reason_of
-
-OCCUPIED_MAX_GRAY = 89
-"""Darker is occupied: (255 - gray) / 255 above map_server's default occupied_thresh of 0.65."""
-FREE_MIN_GRAY = 206
-"""Lighter is free: (255 - gray) / 255 below map_server's default free_thresh of 0.196; 205 is unknown."""
 
 Truth = Literal["rooms", "rooms_other"]
 """One of the true rooms of a case, by its name in the list of cases."""
@@ -61,6 +57,8 @@ class Case:
     def snapshot(self) -> OccupancySnapshot:
         """Read the map as an occupancy grid; its origin is (0, 0) where it is not known.
 
+        Where the usual thresholds do not fit its grays, others are decided as for any saved map, and told.
+
         Raises
         ------
         CasesError
@@ -69,9 +67,7 @@ class Case:
         gray = _read_image(self.map_path)
         if gray.ndim != 2 or gray.dtype != np.uint8:
             raise CasesError(f"{self.map_path}: the map must be an 8-bit gray image")
-        cells = np.full(gray.shape, UNKNOWN, np.int8)
-        cells[gray <= OCCUPIED_MAX_GRAY] = 100
-        cells[gray >= FREE_MIN_GRAY] = 0
+        cells = cells_of_image(self.map_path, gray)
         geometry = GridGeometry(self.resolution_m, self.origin_xy_m or (0.0, 0.0), 0.0, "map", gray.shape)
         return OccupancySnapshot(
             0, 0, 0, str(self.map_path), np.ascontiguousarray(np.flipud(cells)), geometry

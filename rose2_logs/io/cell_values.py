@@ -7,6 +7,8 @@ that map_server's thresholds tell apart, so that everything behind the reader se
 
 from __future__ import annotations
 
+import logging
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
@@ -14,10 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rose2_logs.config.parameters import OccupancyParameters
+from rose2_logs.errors import InvalidMapError
 from rose2_logs.io.grids import Cells, Grid, MapWarning, Patch, percent
-from rose2_logs.model.labels import label_sizes
+from rose2_logs.model.labels import cells_where, label_sizes
 from rose2_logs.model.occupancy import HIGHEST_PERCENT, UNKNOWN, OccupancySnapshot, classify
 from rose2_logs.system.text import percent as as_percent
+from rose2_logs.system.warnings import log_warning
+
+logger = logging.getLogger(__name__)
 
 Counts = NDArray[np.int64]
 """Number of cells (256,) by the byte that they are stored as; 255 is -1."""
@@ -87,6 +93,10 @@ class CellReading:
         if cells is message.cells:
             return message
         return replace(message, cells=cells, map_warnings=(*message.map_warnings, *found))
+
+    def percent_of(self, cells: Cells) -> Cells:
+        """Return cells (H, W), each as the byte that it was stored as, in percent."""
+        return cells if self.table is None else self.table[cells.view(np.uint8)]
 
     def as_json(self) -> dict[str, str | float]:
         """Return name and thresholds."""
@@ -167,7 +177,11 @@ def read_as(parameters: OccupancyParameters) -> CellReading:
 
 def count_values(cells: Cells) -> Counts:
     """Count the cells (H, W) by the byte that they are stored as."""
-    return label_sizes(cells.view(np.uint8), UNKNOWN_BYTE)
+    flat = cells.reshape(-1).view(np.uint8)
+    known = cells_where(flat, lambda part: part != UNKNOWN_BYTE)  # of a large canvas mostly few
+    counts = label_sizes(flat[known], UNKNOWN_BYTE)
+    counts[UNKNOWN_BYTE] = flat.size - known.size
+    return counts
 
 
 def decide(counts: Counts) -> CellReading:
@@ -258,6 +272,54 @@ def _threshold_table(free_below: float, occupied_above: float) -> Cells:
     ):
         table[:101][which] = np.round(np.linspace(low, high, np.count_nonzero(which)))
     return table
+
+
+def reading_of(maps: Iterable[Cells], parameters: OccupancyParameters, name: str) -> CellReading:
+    """Decide what the numbers of maps mean that are given as arrays, by the same rule, and tell it.
+
+    Parameters
+    ----------
+    maps : iterable of (H, W) int8
+        Some maps of a run; of an endless one the first that are enough are taken.
+    parameters : OccupancyParameters
+        Thresholds that are named there win.
+    name : str
+        What the maps are called in what is told.
+    """
+    if parameters.values != "auto":
+        return read_as(parameters)
+    counts = np.zeros(UNKNOWN_BYTE + 1, np.int64)
+    for cells in maps:
+        counts += count_values(cells)
+    found = decide(counts)
+    if found.why:
+        log_warning(logger, "values", f"{name}: {found.why}; {OVERRULED}")
+    return found
+
+
+def stored_bytes(values: NDArray[np.integer]) -> Cells:
+    """Return integers of an array as the bytes that a map would store them as; -1 is that of unknown.
+
+    Raises
+    ------
+    InvalidMapError
+        If they are neither percent nor the costs of a costmap, whose highest ones are few.
+    """
+    low, high = (int(values.min()), int(values.max())) if values.size else (0, 0)
+    if low < UNKNOWN or high > UNKNOWN_BYTE:
+        raise InvalidMapError(
+            f"cells must lie between {UNKNOWN} and {HIGHEST_PERCENT}, not from {low} to {high}"
+        )
+    cells = values.astype(np.uint8).view(np.int8)
+    if high > HIGHEST_PERCENT:
+        counts = count_values(cells)
+        # Where more is 254 than 0, it is an image in which that is the gray of free floor.
+        if decide(counts).table is not OCCUPANCY_OF_COST or counts[LETHAL_COST] > counts[0]:
+            raise InvalidMapError(
+                f"cells must lie between {UNKNOWN} and {HIGHEST_PERCENT}, not from {low} to {high}; "
+                "of an image of grays, save it and give its path"
+            )
+    return cells
 
 
 def few_walls(snapshot: OccupancySnapshot, parameters: OccupancyParameters) -> str | None:

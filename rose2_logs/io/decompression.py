@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import bz2
-from collections.abc import Callable
+import gzip
+import lzma
+import zlib
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import zstandard
 
@@ -105,21 +109,80 @@ _BY_NAME: dict[str, Callable[[bytes | memoryview, int, bool], bytes]] = {
 }
 
 
+GZIP_MAGIC = b"\x1f\x8b"
+XZ_MAGIC = b"\xfd7zXZ\x00"
+LZ4_MAGIC = b"\x04\x22\x4d\x18"
+DAMAGED = (zstandard.ZstdError, ValueError, OSError, EOFError, RuntimeError, zlib.error, lzma.LZMAError)
+"""What the libraries raise for damaged data."""
+
+
+def is_packed(begin: bytes) -> bool:
+    """Whether a file is compressed, by its first bytes."""
+    return begin.startswith(tuple(_PACKED))
+
+
+@contextmanager
+def opened_packed(packed: Path) -> Iterator[Any]:
+    """Open a compressed file to read what is in it, as far as it goes, with ``read1``."""
+    with packed.open("rb") as source:
+        begin = source.read(_LONGEST_MAGIC)
+        source.seek(0)
+        opened = next(opener for magic, opener in _PACKED.items() if begin.startswith(magic))
+        with opened(source) as stream:
+            yield stream
+
+
+def first_bytes(packed: Path, count: int) -> bytes:
+    """Return what a compressed file begins with once it is decompressed; nothing if it is damaged."""
+    found = b""
+    with suppress(*DAMAGED), opened_packed(packed) as stream:
+        while len(found) < count and (part := stream.read1(count - len(found))):
+            found += part
+    return found
+
+
 def decompress_file(packed: Path, plain: Path, most_bytes: int) -> None:
-    """Decompress a zstd file into another file.
+    """Decompress a file into another file.
+
+    Parameters
+    ----------
+    packed, plain : path
+        The two files; what the first is compressed with, its first bytes tell.
+    most_bytes : int
+        The largest size that is accepted.
 
     Raises
     ------
     TooLargeError
-        If more than `most_bytes` come out.
-    OSError, zstandard.ZstdError
-        If a file cannot be read or written, or is damaged.
+        If more come out.
+    DAMAGED
+        If a file cannot be read or written, or is damaged; what comes before the damage is written.
     """
     left = most_bytes
-    with packed.open("rb") as source, plain.open("wb") as target:
-        stream = zstandard.ZstdDecompressor().stream_reader(source, read_across_frames=True)
-        while part := stream.read(COPIED_AT_ONCE):
+    with opened_packed(packed) as stream, plain.open("wb") as target:
+        while part := stream.read1(COPIED_AT_ONCE):
             left -= len(part)
             if left < 0:
-                raise TooLargeError(f"it decompresses to more than {most_bytes} bytes; free some disk space")
+                raise TooLargeError(f"it decompresses to more than {most_bytes} bytes")
             target.write(part)
+
+
+def _open_zstd(source: IO[bytes]) -> Any:
+    return zstandard.ZstdDecompressor().stream_reader(source, read_across_frames=True)
+
+
+def _open_lz4(source: IO[bytes]) -> Any:
+    from lz4.frame import LZ4FrameFile
+
+    return LZ4FrameFile(source)
+
+
+_PACKED: dict[bytes, Callable[[IO[bytes]], Any]] = {
+    GZIP_MAGIC: lambda source: gzip.GzipFile(fileobj=source),
+    b"\x28\xb5\x2f\xfd": _open_zstd,
+    b"BZh": bz2.BZ2File,
+    XZ_MAGIC: lzma.LZMAFile,
+    LZ4_MAGIC: _open_lz4,
+}
+"""How a compressed file is opened, by its first bytes."""
+_LONGEST_MAGIC = max(map(len, _PACKED))

@@ -16,8 +16,8 @@ STORAGE_ENDINGS = (".mcap", ".db3", ".bag", ".bag.active")
 """``.bag.active`` is a bag that its recorder did not close."""
 CARMEN_ENDINGS = (".log.gz", ".clf.gz", ".log", ".clf")
 """Usual endings of CARMEN logs, which are recognized by their content; many other files end in ``.log``."""
-COMPRESSED_ENDING = ".zstd"
-"""Ending of the files of a ROS 2 bag that was compressed file by file."""
+COMPRESSED_ENDINGS = (".zstd", ".zst", ".gz", ".bz2", ".xz", ".lz4")
+"""Endings of logs that were compressed as a whole: ROS 2 writes the first, people the others."""
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 """First bytes of zstd data. No CDR message starts like this: its first byte is 0."""
 ANNOTATED_ENDING = ".rose2.mcap"
@@ -25,8 +25,18 @@ ANNOTATED_ENDING = ".rose2.mcap"
 BAG_DESCRIPTION = "metadata.yaml"
 
 
+def plain_name(name: str) -> str:
+    """Name of a log without the ending that says it is compressed."""
+    for ending in COMPRESSED_ENDINGS:
+        plain = name.removesuffix(ending)
+        if plain != name and plain.lower().endswith(STORAGE_ENDINGS):
+            return plain
+    return name
+
+
 def stem_of(name: str) -> str:
     """Name of a log without its format's ending."""
+    name = plain_name(name)
     for ending in (*STORAGE_ENDINGS, *MAP_ENDINGS, *CARMEN_ENDINGS):
         name = name.removesuffix(ending)
     return name
@@ -66,7 +76,9 @@ def logs_among(files: Iterable[str], folder_name: str) -> list[str]:
             bags.append(folder)
             found.append(folder)
         elif stored := [name for name in names if is_storage(name)]:
-            found += [f"{folder}/{name}" if folder else name for name in stored]
+            # One that was compressed and kept is there twice.
+            once = [name for name in stored if plain_name(name) == name or plain_name(name) not in stored]
+            found += [f"{folder}/{name}" if folder else name for name in once]
         elif _holds_maps(names):
             found.append(folder)
     return sorted(found)
@@ -78,16 +90,20 @@ def is_bag(names: Sequence[str], folder_name: str) -> bool:
     A bag has ``metadata.yaml`` next to its storage files. A recording that was not closed has only the
     storage files ``FOLDER_0``, ``FOLDER_1``, and so on.
     """
-    stored = [name for name in names if is_storage(name.removesuffix(COMPRESSED_ENDING))]
+    stored = [name for name in names if is_storage(name)]
     if not stored or BAG_DESCRIPTION in names:
         return bool(stored)
     parts = {f"{folder_name}_{number}" for number in range(len(stored))}
-    return {PurePosixPath(name.removesuffix(COMPRESSED_ENDING)).stem for name in stored} == parts
+    return {PurePosixPath(plain_name(name)).stem for name in stored} == parts
 
 
 def is_storage(name: str) -> bool:
-    """Whether a name belongs to an MCAP file, a bag or a database that is not an annotated log."""
-    return name.lower().endswith(STORAGE_ENDINGS) and not name.endswith(ANNOTATED_ENDING)
+    """Whether a name belongs to an MCAP file, a bag or a database that is not an annotated log.
+
+    It may be compressed.
+    """
+    plain = plain_name(name)
+    return plain.lower().endswith(STORAGE_ENDINGS) and not plain.endswith(ANNOTATED_ENDING)
 
 
 def _text(folder: PurePosixPath) -> str:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import logging
-from bisect import bisect_left
+import re
+from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from itertools import pairwise
@@ -13,11 +14,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rose2_logs.config.parameters import ReadingParameters
+from rose2_logs.config.reading import ReadingParameters
 from rose2_logs.config.selection import Times
 from rose2_logs.errors import LogError
 from rose2_logs.io.grids import Decoder, Grid, Patch
-from rose2_logs.io.log_file import LogFile, Place
+from rose2_logs.io.log_file import LATEST_NS, LogFile, Place
 from rose2_logs.io.messages import decoder
 from rose2_logs.io.source import LoggedBytes, LoggedMap, LogInfo, MessageSource, TopicInfo
 from rose2_logs.system.text import apart
@@ -31,6 +32,8 @@ more than this, the recorder's clock was set back."""
 
 LONGEST_RUN_NS = 366 * 86400 * 10**9
 """No robot is on the way for a year; a clock that is set after the start makes a log last for decades."""
+_LAST_NUMBER = re.compile(r"_(\d+)(\.[a-z][a-z0-9]*)+$", re.IGNORECASE)
+"""Recorders number the files of a recording one after the other, at the end of their names."""
 OpenFile = Callable[[Path, ReadingParameters], LogFile]
 
 
@@ -235,19 +238,26 @@ class FileLog(MessageSource):
 
     def stream(self, topics: Sequence[str]) -> Iterator[LoggedBytes]:
         """Yield all messages of `topics` one at a time, roughly in log time order."""
-        for number, file in sorted(enumerate(self._files), key=lambda each: each[1].start_ns or 0):
+        for number, file in sorted(enumerate(self._files), key=self._begin_ns):
             wanted = [each.id for each in file.channels.values() if each.topic in topics]
             clock = Clock(self._delays.get(number, []))
             for message in file.messages(wanted) if wanted else ():
+                if message.log_time_ns > LATEST_NS:  # damage; no map of such a time is read either
+                    continue
                 channel = message.channel
                 is_cdr = channel.message_encoding == "cdr"
                 read = partial(file.decompressed if is_cdr else memoryview, message.data)
                 time_ns = clock.continued(message.log_time_ns)
                 yield LoggedBytes(time_ns, channel.topic, channel.message_encoding, read)
 
+    def _begin_ns(self, numbered: tuple[int, LogFile]) -> int:
+        """When a file begins, in times that go on where a clock jumps."""
+        number, file = numbered
+        return (file.start_ns or 0) + self._delays.get(number, [0])[0]
+
     def _topic_places(self, topic: str) -> list[Timed]:
         if topic not in self._places:
-            found = []
+            found: dict[int, list[Place]] = {}
             for number, file in enumerate(self._files):
                 channels = [each for each in file.channels.values() if each.topic == topic]
                 for channel in channels:
@@ -258,32 +268,57 @@ class FileLog(MessageSource):
                         )
                         log_warning(logger, "type_changes", text, file=file.path, topic=topic)
                 places = file.places([channel.id for channel in channels if channel.is_wanted])
-                found += [Timed(time, number, place) for time, place in self._timed(number, topic, places)]
-            self._places[topic] = sorted(found)
+                if len(places) > 1 and places[0].log_time_ns == places[-1].log_time_ns:
+                    text = (
+                        f"{file.path}: all {len(places)} messages on {topic} have the log time "
+                        f"{places[0].log_time_ns} ns"
+                    )
+                    log_warning(logger, "clock_stands", text, file=file.path, topic=topic)
+                found[number] = sorted(places, key=lambda place: place[1:3])
+            self._places[topic] = sorted(
+                timed for files in self._sequences() for timed in self._timed(topic, files, found)
+            )
         return self._places[topic]
 
-    def _timed(self, number: int, topic: str, places: list[Place]) -> list[tuple[int, Place]]:
-        """Log times of a topic's messages in a file, continued where its clock jumps."""
-        file = self._files[number]
-        times = np.array([place.log_time_ns for place in places], np.int64)
-        if len(times) > 1 and times[0] == times[-1]:
-            text = f"{file.path}: all {len(times)} messages on {topic} have the log time {times[0]} ns"
-            log_warning(logger, "clock_stands", text, file=file.path, topic=topic)
-        along_file = sorted(places, key=lambda place: place[1:3])
-        written = [place.log_time_ns for place in along_file]
+    def _sequences(self) -> list[list[int]]:
+        """Files that a recorder wrote one after the other; one alone where it is not known."""
+        numbered = [_LAST_NUMBER.search(file.path.name) for file in self._files]
+        numbers = [int(found[1]) for found in numbered if found is not None]
+        if len(numbers) < len(self._files) or np.any(np.diff(sorted(numbers)) != 1):
+            return [[number] for number in range(len(self._files))]
+        return [np.argsort(numbers).tolist()]
+
+    def _timed(self, topic: str, files: list[int], found: dict[int, list[Place]]) -> list[Timed]:
+        """Give a topic's messages, in the order of files and in each, times that go on at jumps."""
+        places = [(number, place) for number in files for place in found[number]]
+        written = [place.log_time_ns for _, place in places]
         jumps = Clock([]).jumps(written)
-        if jumps and number not in self._delays:
-            self._delays[number] = delays_of(written, jumps)
-        clock = Clock(self._delays.get(number, []))
+        firsts = np.cumsum([0] + [len(found[number]) for number in files]).tolist()
+        if jumps and self._delays.keys().isdisjoint(files):
+            delays = delays_of(written, jumps)
+            for number, (begin, end) in zip(files, pairwise(firsts), strict=True):
+                last = max(end - 1, 0)
+                # A file without this topic goes on from the one before.
+                parts = [bisect_right(jumps, k) for k in (min(begin, last), last)]
+                self._delays[number] = delays[parts[0] : parts[1] + 1]
         for k in jumps:
             before, after = written[k - 1], written[k]
+            number = places[k][0]
+            path, earlier = self._files[number].path, self._files[places[k - 1][0]].path
             kind, way = ("clock_set_back", "back") if after < before else ("clock_set_forward", "forward")
-            text = (
-                f"{file.path}: the log time on {topic} goes {way} by {apart(abs(after - before))} at message "
-                f"{k + 1} of the file; messages are read in the order of the file, with log times that go on"
+            first = firsts[files.index(number)]
+            at = (
+                f"at message {k - first + 1} of the file"
+                if k > first
+                else f"from {earlier.name} to this file"
             )
-            log_warning(logger, kind, text, file=file.path, topic=topic, index=k + 1)
-        return [(clock.continued(time), place) for time, place in zip(written, along_file, strict=True)]
+            text = (
+                f"{path}: the log time on {topic} goes {way} by {apart(abs(after - before))} {at}; messages "
+                "are read in the order of the file, with log times that go on"
+            )
+            log_warning(logger, kind, text, file=path, topic=topic, index=k - first + 1)
+        clocks = {number: Clock(self._delays.get(number, [])) for number in files}
+        return [Timed(clocks[number].continued(place.log_time_ns), number, place) for number, place in places]
 
     def _decode(self, number: int, place: Place) -> Grid | Patch | None:
         file = self._files[number]
@@ -301,13 +336,18 @@ class FileLog(MessageSource):
         return self._decoders[key](data)
 
     def _topics(self) -> tuple[TopicInfo, ...]:
-        topics: dict[tuple[str, str, str], tuple[int, bool]] = {}
+        topics: dict[tuple[str, str, str, str], tuple[int, bool]] = {}
         for file in self._files:
             for channel in file.channels.values():
-                key = (channel.topic, channel.schema_name, channel.message_encoding)
+                key = (
+                    channel.topic,
+                    channel.schema_name,
+                    channel.message_encoding,
+                    channel.schema_encoding,
+                )
                 count, is_map = topics.get(key, (0, False))
                 topics[key] = (count + file.message_counts[channel.id], is_map or channel.is_map)
         return tuple(
-            TopicInfo(name, message_type, count, is_map, encoding)
-            for (name, message_type, encoding), (count, is_map) in sorted(topics.items())
+            TopicInfo(name, message_type, count, is_map, encoding, language)
+            for (name, message_type, encoding, language), (count, is_map) in sorted(topics.items())
         )

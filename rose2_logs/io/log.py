@@ -18,8 +18,8 @@ from rose2_logs.config.selection import Selection, Times
 from rose2_logs.errors import InvalidMapError, LogError, NoMapTopicError
 from rose2_logs.io.cell_values import MAPS_LOOKED_AT, OVERRULED, CellReading, count_values, decide, read_as
 from rose2_logs.io.grids import Grid, MapWarning, Patch
-from rose2_logs.io.map_stream import MapChecks, MapStream, ReadCounts
-from rose2_logs.io.messages import is_patch_type
+from rose2_logs.io.map_stream import MapChecks, MapStream, ReadCounts, without_far_cells
+from rose2_logs.io.messages import is_called_map, is_patch_type, ros_type
 from rose2_logs.io.parts import MapFacts, Part, Parts, facts_of, find_parts, find_saved_parts
 from rose2_logs.io.poses import RobotPath
 from rose2_logs.io.saved_maps import MapFilesSource
@@ -221,9 +221,11 @@ class LogReader:
     ) -> Iterator[OccupancySnapshot]:
         """Yield the distinct maps as they are at the `chosen` times (sorted); log warnings if `warn`."""
         wanted = set(chosen.tolist())
-        stream = MapStream(self.topic, counts, min_change_m2)
+        has_patches = len(self._topics) > 1
+        stream = MapStream(self.topic, counts, min_change_m2, self._occupancy, has_patches=has_patches)
         map_checks = MapChecks()
         reading = self.cell_reading
+        has_told_far = False
         for message in self.source.read(self._topics, self._needed(chosen)):
             is_wanted = message.log_time_ns in wanted
             map_warnings: tuple[MapWarning, ...] = ()
@@ -251,6 +253,10 @@ class LogReader:
             for map_warning in map_warnings if warn else ():
                 self._warn(message, map_warning)
             if is_wanted and (snapshot := stream.snapshot(message.log_time_ns)) is not None:
+                if warn and (far := stream.far_cells) is not None and not has_told_far:
+                    self._warn(message, MapWarning("far_cells", f"{far.note}; so are those of later maps"))
+                    has_told_far = True
+                del message, decoded  # a large canvas is not kept while what it shows is analyzed
                 yield snapshot
 
     def _place(self, message: LoggedMap) -> str:
@@ -315,7 +321,7 @@ class LogReader:
             with suppress(LogError):  # it is told of where the map is needed
                 decoded = message.decode()
                 if isinstance(decoded, Grid):
-                    return self.cell_reading.of(decoded)
+                    return without_far_cells(self.cell_reading.of(decoded), self._occupancy)[0]
         return None
 
     def _times_in_range(self) -> Times:
@@ -346,6 +352,16 @@ class LogReader:
         return kind(text, file=self.info.path, topic=self.topic)
 
 
+def _why_unread(topic: TopicInfo) -> str:
+    """Say that a topic's maps cannot be read, and what to do."""
+    language = f", defined in {topic.schema_encoding}" if topic.schema_encoding else ""
+    return (
+        f"{topic.name} holds {topic.message_type} in the encoding {topic.encoding or 'none'}{language}, "
+        "which is not read; read are nav_msgs/OccupancyGrid as cdr, ros1 or json, and foxglove.Grid as "
+        "protobuf, flatbuffer or json: record or convert to one of these"
+    )
+
+
 def choose_topic(info: LogInfo, asked: str | None = None) -> str:
     """Choose the map topic: the requested one, else ``/map``, else the only one with messages.
 
@@ -374,6 +390,8 @@ def choose_topic(info: LogInfo, asked: str | None = None) -> str:
             "that says what its messages are; if they are maps, name their type "
             "(message_type='nav_msgs/OccupancyGrid')" + (f"; {building}" if building else "")
         )
+    if not maps and (unread := [each for each in info.topics if is_called_map(ros_type(each.message_type))]):
+        raise NoMapTopicError(f"{where} {_why_unread(unread[0])}" + (f"; {building}" if building else ""))
     if not maps:
         others = ", ".join(sorted({topic.message_type for topic in info.topics})[:MOST_LISTED])
         found = f", only {others}" if others else ""

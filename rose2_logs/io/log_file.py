@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
-from rose2_logs.config.parameters import ReadingParameters
+from rose2_logs.config.reading import ReadingParameters
 from rose2_logs.errors import LogError
 from rose2_logs.io.decompression import decompress
 from rose2_logs.io.discovery import ZSTD_MAGIC

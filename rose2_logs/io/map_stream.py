@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rose2_logs.config.parameters import OccupancyParameters
 from rose2_logs.errors import InvalidMapError
 from rose2_logs.io.grids import Cells, Grid, MapWarning, Patch
+from rose2_logs.model.far_cells import FarCells, find_far_cells
 from rose2_logs.model.occupancy import UNKNOWN, BoolArray, OccupancySnapshot
 from rose2_logs.system.text import apart
+
+USUAL = OccupancyParameters()
 
 
 @dataclass
@@ -53,12 +57,32 @@ class MapStream:
         Updated along the way.
     min_change_m2 : float, optional
         Minimum change of the known area since the previous snapshot.
+    occupancy : OccupancyParameters, optional
+        What is left out of a map as far from the rest of it.
+    has_patches : bool
+        Whether patches may come, which need the whole of the map before them.
+
+    Attributes
+    ----------
+    far_cells : FarCells or None
+        What was left out of the latest map.
     """
 
-    def __init__(self, topic: str, counts: ReadCounts, min_change_m2: float | None = None) -> None:
+    def __init__(
+        self,
+        topic: str,
+        counts: ReadCounts,
+        min_change_m2: float | None = None,
+        occupancy: OccupancyParameters = USUAL,
+        *,
+        has_patches: bool = True,
+    ) -> None:
+        self._has_patches = has_patches
+        self.far_cells: FarCells | None = None
         self._topic = topic
         self._counts = counts
         self._min_change_m2 = min_change_m2
+        self._occupancy = occupancy
         self._map: Grid | None = None
         self._cells_are_shared = True
         self._seen: Grid | None = None
@@ -110,6 +134,9 @@ class MapStream:
         if now is None:
             self._counts.skipped += 1
             return None
+        now, self.far_cells = without_far_cells(now, self._occupancy)
+        if not self._has_patches:
+            self._map = now
         if self._seen is not None and _equal(now, self._seen):
             self._counts.repeats += 1
             self._repeats += 1
@@ -124,12 +151,29 @@ class MapStream:
             self._counts.skipped += 1
             return None
         taken = OccupancySnapshot(
-            self._index, log_time_ns, now.stamp_ns, self._topic, now.cells, now.geometry, self._repeats
+            self._index,
+            log_time_ns,
+            now.stamp_ns,
+            self._topic,
+            now.cells,
+            now.geometry,
+            self._repeats,
+            is_percent=True,
         )
         self._yielded = now
         self._index += 1
         self._repeats = 0
         return taken
+
+
+def without_far_cells(grid: Grid, occupancy: OccupancyParameters) -> tuple[Grid, FarCells | None]:
+    """Return the part of a map that is analyzed, and what was left out; the map itself if nothing was."""
+    found = find_far_cells(grid.cells, grid.geometry.resolution_m, occupancy)
+    if found is None:
+        return grid, None
+    # A copy, so that the canvas is not kept.
+    cells, geometry = grid.cells[found.window].copy(), grid.geometry.part(found.window)
+    return replace(grid, geometry=geometry, cells=cells), found
 
 
 def _equal(one: Grid, other: Grid) -> bool:

@@ -52,9 +52,14 @@ def is_patch_type(message_type: str) -> bool:
     return ros_type(message_type) in PATCH_TYPES
 
 
+def is_called_map(message_type: str) -> bool:
+    """Whether a type has the name of a map, whatever the encoding and the package."""
+    return message_type.replace(".", "/").rpartition("/")[2] in ("OccupancyGrid", "Costmap", "Grid")
+
+
 def is_map_type(message_type: str, encoding: str) -> bool:
     """Whether messages of this type and encoding are whole maps that `decoder` can read."""
-    if encoding == "protobuf":
+    if encoding in ("protobuf", "flatbuffer"):
         return message_type == FOXGLOVE_GRID_TYPE
     name = ros_type(message_type)
     if encoding == "json":
@@ -72,9 +77,9 @@ def decoder(
     message_type : str
         ROS message type, with or without ``/msg/``, or protobuf message name.
     encoding : str
-        ``cdr``, ``ros1``, ``protobuf`` or ``json``.
+        ``cdr``, ``ros1``, ``protobuf``, ``flatbuffer`` or ``json``.
     schema : bytes
-        The schema stored in the log; needed for protobuf only.
+        The schema stored in the log; needed for protobuf and FlatBuffers.
     most_cells : int
         Number of cells of the largest map that is accepted.
 
@@ -88,6 +93,10 @@ def decoder(
         from rose2_logs.io.foxglove_grid import grid_decoder
 
         return grid_decoder(schema, most_cells)
+    if is_map_type(message_type, encoding) and encoding == "flatbuffer":
+        from rose2_logs.io.flatbuffer_maps import flatbuffer_decoder
+
+        return flatbuffer_decoder(schema, most_cells)
     if is_map_type(message_type, encoding) and encoding == "json":
         from rose2_logs.io.json_maps import json_decoder
 

@@ -11,26 +11,27 @@ from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
 
 from rose2_logs.config.mapping import MappingParameters
-from rose2_logs.config.parameters import OccupancyParameters, ReadingParameters
+from rose2_logs.config.parameters import OccupancyParameters
+from rose2_logs.config.reading import ReadingParameters
 from rose2_logs.config.selection import Selection
 from rose2_logs.errors import LogError
 from rose2_logs.io.carmen_format import CARMEN_FORMAT, is_carmen
+from rose2_logs.io.decompression import DAMAGED, TooLargeError, decompress_file, first_bytes, is_packed
 from rose2_logs.io.discovery import (
     ANNOTATED_ENDING,
     BAG_DESCRIPTION,
-    COMPRESSED_ENDING,
     IMAGE_ENDINGS,
     MAP_ENDINGS,
     STORAGE_ENDINGS,
-    ZSTD_MAGIC,
     is_bag,
     is_storage,
     load_yaml,
+    plain_name,
 )
 from rose2_logs.io.log import LogReader
 from rose2_logs.io.source import LogInfo, MessageSource
 from rose2_logs.system.text import counted
-from rose2_logs.system.warnings import log_warning
+from rose2_logs.system.warnings import UNCOUNTED, log_warning
 
 if TYPE_CHECKING:
     from rose2_logs.io.file_log import FileLog, OpenFile
@@ -48,6 +49,8 @@ DISK_LEFT_BYTES = 1 << 30
 """Disk space left free where the temporary folder is when a bag is decompressed there."""
 MASK_WORDS = ("mask", "keepout", "speed_limit")
 """In the names of masks of costmap filters: where a robot must not go, or go slowly."""
+_TOLD_FROM_BYTES = 100_000_000
+"""Compressed files of this size or more take a while, and their room on the disk."""
 _MOST_NAMED = 3
 """Number of files that a warning names."""
 _FORMATS = (
@@ -55,6 +58,7 @@ _FORMATS = (
     "a CARMEN log"
 )
 _MAGIC = {b"\x89MCAP0\r\n": ".mcap", b"#ROSBAG ": ".bag", b"SQLite f": ".db3"}
+_MAGIC_BYTES = 8
 
 
 def open_log(
@@ -243,7 +247,7 @@ def _open_storage(
     try:
         if scratch is not None:
             files = [
-                _decompressed(file, Path(scratch.name, str(number))) if _is_packed(file) else file
+                _decompressed(file, Path(scratch.name, str(number)), limits) if _is_packed(file) else file
                 for number, file in enumerate(files)
             ]
         return FileLog(
@@ -296,12 +300,12 @@ def _kinds(files: list[Path]) -> set[str]:
 def _kind(file: Path) -> str:
     """Kind of a file by its first bytes, else by its name."""
     with file.open("rb") as stream:
-        begin = stream.read(8)
+        begin = stream.read(_MAGIC_BYTES)
     if begin in _MAGIC:
         return _MAGIC[begin]
     name = file.name.lower()
-    if _is_packed(file) and begin.startswith(ZSTD_MAGIC):
-        return PurePosixPath(name.removesuffix(COMPRESSED_ENDING)).suffix
+    if is_packed(begin) and (kind := _MAGIC.get(first_bytes(file, len(begin)))) is not None:
+        return kind
     suffix = file.suffix.lower()
     if suffix in MAP_ENDINGS:
         return ".yaml"
@@ -309,16 +313,18 @@ def _kind(file: Path) -> str:
         return "image"
     if is_carmen(file):
         return CARMEN_FORMAT
-    if _is_packed(file) or name.endswith(STORAGE_ENDINGS):
-        what = "is empty" if not begin else f"does not start like a {suffix} file"
+    if (plain := plain_name(name)).endswith(STORAGE_ENDINGS):
+        kind = PurePosixPath(plain).suffix
+        holds = "holds no" if is_packed(begin) else "does not start like a"
+        what = "is empty" if not begin else f"{holds} {kind} file"
         raise LogError(f"{file}: {what}; was it copied completely?", file=file)
     raise LogError(f"{file}: is not a supported kind of log; give {_FORMATS}", file=file)
 
 
 def _is_packed(file: Path) -> bool:
-    """Whether a file belongs to a ROS 2 bag that was compressed file by file."""
-    name = file.name.lower()
-    return name.endswith(COMPRESSED_ENDING) and name.removesuffix(COMPRESSED_ENDING).endswith(STORAGE_ENDINGS)
+    """Whether a file is compressed as a whole."""
+    with file.open("rb") as stream:
+        return is_packed(stream.read(_MAGIC_BYTES))
 
 
 def _yaml_beside(image: Path) -> Path:
@@ -374,8 +380,10 @@ def _stored_in(log: Path) -> list[Path]:
     inside = [each for each in log.iterdir() if each.is_file()]
     inside = [each for each in inside if not each.name.endswith(ANNOTATED_ENDING)] or inside
     for suffix in STORAGE_ENDINGS:
-        endings = (suffix, suffix + COMPRESSED_ENDING)
-        if files := [each for each in inside if each.name.lower().endswith(endings)]:
+        files = [each for each in inside if plain_name(each.name).lower().endswith(suffix)]
+        names = {each.name for each in files}
+        # One that was compressed and kept is there twice.
+        if files := [each for each in files if not names & {plain_name(each.name)} - {each.name}]:
             return _in_natural_order(files)
     return []
 
@@ -384,7 +392,7 @@ def _warn_files_as_one(log: Path, files: list[Path]) -> None:
     """Warn that files without a description are read as one run: they may be several, or incomplete."""
     names = [file.name for file in files]
     inside = [each.name for each in log.iterdir() if each.is_file()]
-    stored = {name for name in inside if is_storage(name.removesuffix(COMPRESSED_ENDING))}
+    stored = set(filter(is_storage, inside))
     others = sorted(stored.difference(names))
     if not others and (len(names) == 1 or is_bag(names, log.resolve().name)):
         return
@@ -436,19 +444,27 @@ def _described_files(path: Path) -> list[str]:
         ) from error
 
 
-def _decompressed(file: Path, directory: Path) -> Path:
-    from zstandard import ZstdError
-
-    from rose2_logs.io.decompression import TooLargeError, decompress_file
-
+def _decompressed(file: Path, directory: Path, limits: ReadingParameters) -> Path:
     # One folder per file: files from different folders may have the same name.
     directory.mkdir()
     target = directory / file.stem
+    free = max(shutil.disk_usage(directory).free - DISK_LEFT_BYTES, 0)
+    if file.stat().st_size >= _TOLD_FROM_BYTES:
+        where = directory.parent.parent
+        text = f"{file}: is decompressed into {where} for now, where {free / 1e9:.1f} GB are free"
+        logger.warning("%s", text, extra=UNCOUNTED)
     try:
-        decompress_file(file, target, max(shutil.disk_usage(directory).free - DISK_LEFT_BYTES, 0))
-    except (ZstdError, ValueError, OSError) as error:
+        decompress_file(file, target, min(free, limits.unpacked_max_bytes))
+    except DAMAGED as error:
         text = f"{file}: cannot be decompressed: {error}"
-        if not target.exists() or not target.stat().st_size or isinstance(error, TooLargeError):
+        if isinstance(error, TooLargeError):
+            remedy = "if that is correct, raise the parameter reading.unpacked_max_bytes"
+            if free < limits.unpacked_max_bytes:
+                remedy = (
+                    f"free some disk space in {directory.parent.parent}, or name another folder in TMPDIR"
+                )
+            raise LogError(f"{text}; {remedy}", file=file) from error
+        if not target.exists() or not target.stat().st_size:
             raise LogError(text, file=file) from error
         log_warning(logger, "cut_off", f"{text}; everything before the damage is read", file=file)
     return target

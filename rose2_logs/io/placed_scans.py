@@ -119,8 +119,8 @@ class RosScans:
             )
         self._fixed_topics = tuple(name for name in transforms if "static" in name)
         self._moving_topics = tuple(name for name in transforms if "static" not in name)
-        self.frame_id = self._fixed_frame(frame)
         self.left_out: Counter[str] = Counter()
+        self.frame_id = self._fixed_frame(frame)
         # Latest stamps, to tell clocks that differ.
         self._scan_ns = self._transform_ns = 0
 

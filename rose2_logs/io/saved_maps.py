@@ -19,7 +19,7 @@ from urllib.parse import unquote
 import numpy as np
 from numpy.typing import NDArray
 
-from rose2_logs.config.parameters import ReadingParameters
+from rose2_logs.config.reading import ReadingParameters
 from rose2_logs.config.selection import Times
 from rose2_logs.errors import InvalidMapError, LogError
 from rose2_logs.io.cell_values import (
@@ -259,6 +259,28 @@ def _unknown_levels(counts: NDArray[np.int64], between: NDArray[np.bool_]) -> ND
             unknown[levels] = True
             break
     return unknown
+
+
+def cells_of_image(path: Path, gray: NDArray[np.uint8], values: str = "auto") -> Cells:
+    """Occupancy (H, W) in percent of an image without a description, as a saved map of it would be read.
+
+    Parameters
+    ----------
+    path : path
+        The image, to be named in what is told.
+    gray : (H, W) uint8
+        Its pixels, row 0 at the top.
+    values : str
+        As the parameter ``occupancy.values``: whether the thresholds may be decided.
+    """
+    shade = gray.astype(np.float32) / np.float32(LEVELS - 1)
+    reading = None
+    if values == "auto":
+        counts = np.bincount(LEVELS - 1 - gray.ravel(), minlength=LEVELS)
+        reading = _decided(counts, FREE_THRESH, OCCUPIED_THRESH)
+        if reading is not None:
+            log_warning(logger, "values", f"{path}: {reading.why}; {OVERRULED}", file=path)
+    return _cells(path, {}, shade, None, reading, [])
 
 
 def read_map(

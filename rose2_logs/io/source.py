@@ -26,6 +26,8 @@ class TopicInfo:
         None if it is known only after reading the whole log.
     is_map : bool
         Whether the messages are occupancy grids that can be read.
+    schema_encoding : str
+        Language of the type's definition, as stored in the log; empty without one.
     """
 
     name: str
@@ -33,6 +35,7 @@ class TopicInfo:
     message_count: int | None
     is_map: bool
     encoding: str
+    schema_encoding: str = ""
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rose2_logs.config.mapping import MappingParameters
-from rose2_logs.config.parameters import ReadingParameters
+from rose2_logs.config.reading import ReadingParameters
 from rose2_logs.errors import InvalidMapError
 from rose2_logs.model.occupancy import HIGHEST_PERCENT, UNKNOWN, BoolArray, FloatArray, GridGeometry
 

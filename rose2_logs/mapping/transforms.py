@@ -16,6 +16,8 @@ from rose2_logs.model.occupancy import FARTHEST_ORIGIN_M, FloatArray
 
 Link = tuple[str, str]
 """A parent frame and its child."""
+QUATERNION_LENGTHS = (1e-3, 1e3)
+"""Those of rotations are 1 up to rounding; numbers far from that are damage, and their squares overflow."""
 KEPT_WAITS = 3
 """Transforms are kept for so many times as long as a scan may wait for them."""
 PRUNED_FROM = 1024
@@ -42,9 +44,11 @@ class Transform:
 
     @property
     def is_usable(self) -> bool:
-        """Whether it consists of finite numbers and its quaternion is not zero."""
-        length = math.hypot(*self.pose[3:])
-        return all(map(math.isfinite, self.pose)) and math.isfinite(length) and length > 0
+        """Whether it consists of finite numbers, is a place on earth, and its quaternion is no damage."""
+        # NaN compares false.
+        is_place = all(abs(part) <= FARTHEST_ORIGIN_M for part in self.pose[:3])
+        shortest, longest = QUATERNION_LENGTHS
+        return is_place and shortest <= math.hypot(*self.pose[3:]) <= longest
 
 
 @dataclass(frozen=True, eq=False)

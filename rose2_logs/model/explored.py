@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from rose2_logs.config.parameters import OccupancyParameters
+from rose2_logs.model.far_cells import find_far_cells
 from rose2_logs.model.labels import known_window
 from rose2_logs.model.occupancy import BoolArray, CellValues, FloatArray, GridGeometry, Scalar, classify
 
@@ -20,6 +21,8 @@ NEIGHBORS = ((0, -1), (0, 1), (-1, 0), (1, 0), (-1, -1), (-1, 1), (1, -1), (1, 1
 @dataclass(frozen=True, eq=False)
 class ExploredPart:
     """The smallest window of a canvas that holds its known cells, with blocks of cells taken as one.
+
+    Stray cells far away are not in it, see `find_far_cells`.
 
     Attributes
     ----------
@@ -49,7 +52,8 @@ class ExploredPart:
     ) -> ExploredPart:
         """Take the explored part of a canvas (H, W) of occupancy in percent, -1 for unknown."""
         # Cells of neither kind may surround the others; masks of a large canvas are not held for them.
-        known = known_window(cells >= 0)
+        far = find_far_cells(cells, geometry.resolution_m, parameters)
+        known = known_window(cells >= 0) if far is None else far.window
         free, occupied = classify(cells[known], parameters)
         window = known_window(free | occupied)
         free, occupied = free[window].copy(), occupied[window].copy()
@@ -72,7 +76,7 @@ class ExploredPart:
 
     @property
     def free_area_m2(self) -> float:
-        """Area of the canvas's free cells in square meters."""
+        """Area of the free cells in square meters."""
         return float(np.count_nonzero(self.known_free)) * self.geometry.cell_area_m2
 
     def points(self, xy_m: FloatArray) -> FloatArray:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rose2_logs.model.occupancy import BoolArray
+from rose2_logs.model.occupancy import BoolArray, Scalar
 
 COUNTED_AT_ONCE = 2**16
 """Cells whose labels are counted at once."""
@@ -19,6 +20,22 @@ def known_window(known: BoolArray) -> tuple[slice, slice]:
     if len(rows) == 0:
         return slice(0, 1), slice(0, 1)
     return slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)
+
+
+def cells_where(values: NDArray[Scalar], which: Callable[[NDArray[Scalar]], BoolArray]) -> NDArray[np.intp]:
+    """Index of the chosen cells into a flattened image, in reading order, without a mask of a large image.
+
+    Parameters
+    ----------
+    values : array
+        Contiguous; of any shape.
+    which : callable
+        Makes the mask of some of the cells.
+    """
+    flat = values.reshape(-1)
+    begins = range(0, flat.size, COUNTED_AT_ONCE)
+    found = [np.flatnonzero(which(flat[begin : begin + COUNTED_AT_ONCE])) + begin for begin in begins]
+    return np.concatenate([np.zeros(0, np.intp), *found])
 
 
 def distinct_labels(labels: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDArray[np.intp]]:

@@ -165,6 +165,9 @@ class OccupancySnapshot:
         Position of the grid in the world.
     repeats_before : int
         Identical maps that were received, and dropped, since the snapshot before.
+    is_percent : bool
+        Whether the cells are known to be percent, as those of a reader are. Of others it is decided from
+        their values what they mean.
 
     Raises
     ------
@@ -187,6 +190,7 @@ class OccupancySnapshot:
     cells: NDArray[np.int8]
     geometry: GridGeometry
     repeats_before: int = 0
+    is_percent: bool = False
 
     def __repr__(self) -> str:
         return f"OccupancySnapshot(index={self.index}, topic={self.topic!r}, {self.geometry.size_text})"

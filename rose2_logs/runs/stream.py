@@ -17,6 +17,7 @@ from rose2_logs.io.log import LogReader
 from rose2_logs.io.poses import RobotPath
 from rose2_logs.model.analysis import SnapshotAnalysis
 from rose2_logs.model.explored import coarser_for_its_size
+from rose2_logs.model.far_cells import find_far_cells
 from rose2_logs.model.occupancy import OccupancySnapshot, free_area_m2, is_same_to_analysis
 from rose2_logs.runs.journal import Found, JournaledWorkers
 from rose2_logs.segmentation.pipeline import analyze
@@ -97,7 +98,7 @@ class TrackedStream:
         self._path = path
         self._tracker = RoomTracker(parameters.tracking, parameters.occupancy)
         self._layout = LayoutFollower()
-        self._has_told_coarser = False
+        self._has_told_coarser = self._has_told_far = False
 
     @classmethod
     def of_log(
@@ -141,6 +142,7 @@ class TrackedStream:
             path=reader.robot_path(last.geometry.frame_id, base_frame) if with_path else None,
         )
         stream.last_log_time_ns = last.log_time_ns
+        stream._has_told_far = True  # the reader leaves them out, and tells it
         return stream
 
     def __iter__(self) -> Iterator[TrackedSnapshot]:
@@ -161,6 +163,12 @@ class TrackedStream:
         if note is not None and not self._has_told_coarser:
             logger.warning("snapshot %d and those of its size: %s", snapshot.index, note)
             self._has_told_coarser = True
+        if not self._has_told_far:
+            far = find_far_cells(snapshot.cells, snapshot.geometry.resolution_m, self._occupancy)
+            if far is not None:
+                text = f"{self._source}: map {snapshot.index}: {far.note}; so are those of later maps"
+                log_warning(logger, "far_cells", text, topic=self._topic)
+                self._has_told_far = True
         if analysis.index != snapshot.index:
             analysis = analysis.again_for(snapshot)
             self.unchanged += 1

@@ -26,6 +26,7 @@ from rose2_logs.io.saved_maps import MapFilesSource
 from rose2_logs.model.analysis import SnapshotAnalysis, left_out_note
 from rose2_logs.model.borders import Border
 from rose2_logs.model.explored import coarser_for_its_size
+from rose2_logs.model.far_cells import find_far_cells
 from rose2_logs.model.occupancy import OccupancySnapshot
 from rose2_logs.model.room_plan import RoomPlan, plan_of_analysis
 from rose2_logs.model.rooms import RoomMap
@@ -152,7 +153,13 @@ def segment_snapshot(
     name: str = "map",
     voronoi: bool = False,
 ) -> Segmentation:
-    """Segment a single map; warn if it has hardly any walls, or is so large that it took coarser cells."""
+    """Segment a single map.
+
+    It is warned of what was left out, of hardly any walls, and of coarser cells that a large map took.
+    """
+    far = find_far_cells(snapshot.cells, snapshot.geometry.resolution_m, parameters.occupancy)
+    if far is not None:
+        log_warning(logger, "far_cells", f"{name}: {far.note}")
     if (text := few_walls(snapshot, parameters.occupancy)) is not None:
         log_warning(logger, "few_walls", f"{name}: {text}")
     found, tree = analyze_with_tree(snapshot, parameters, method, voronoi=voronoi)
@@ -241,7 +248,8 @@ def read_static_map(
         raise ParameterError(
             f"{map_file}: its .yaml gives the resolution; leave out resolution_m={resolution_m:g}"
         )
-    limits, occupancy = parameters.reading, parameters.occupancy
+    # The labels are to be as large as the image, whatever is analyzed of it.
+    limits, occupancy = parameters.reading, replace(parameters.occupancy, far_cells="keep")
     with (
         _described(map_file, resolution_m) as log,
         open_log(log, limits=limits, occupancy=occupancy) as reader,

@@ -24,7 +24,7 @@ from faulty_logs import (
 )
 from faulty_maps import SAVED_FAULTS, write_maps
 
-from rose2_logs.config.parameters import ReadingParameters
+from rose2_logs.config.reading import ReadingParameters
 from rose2_logs.errors import LogError
 from rose2_logs.io import open_log
 from rose2_logs.system.warnings import collect_warnings

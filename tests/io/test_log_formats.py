@@ -31,7 +31,7 @@ from reader_logs import (
 )
 from scipy.ndimage import binary_dilation
 
-from rose2_logs.config.parameters import ReadingParameters
+from rose2_logs.config.reading import ReadingParameters
 from rose2_logs.config.selection import Selection
 from rose2_logs.errors import InvalidMapError, LogError, NoMapTopicError
 from rose2_logs.io import inspect_log, open_log
@@ -164,6 +164,29 @@ def test_maps_behind_a_clock_that_was_set_back_come_in_the_order_of_the_file(nam
     assert "goes back by 120.0 s at message 4 of the file" in caplog.text
 
 
+@pytest.mark.parametrize("kind", ["bags", "ROS 2 bag", "databases"])
+def test_files_behind_a_clock_that_was_set_back_come_in_their_order(kind, tmp_path, caplog):
+    maps = growing_maps()
+    times = [START_NS + seconds * 10**9 for seconds in (0, 10, -100, -90, -80, -300)]
+    log = [("/map", time, each) for time, each in zip(times, maps, strict=True)]
+    folder = tmp_path / "run"
+    folder.mkdir()
+    paths = []
+    for number, part in enumerate((log[:2], log[2:5], log[5:])):
+        match kind:
+            case "bags":
+                paths.append(write_bag(folder / f"run_{number}.bag", part))
+            case "ROS 2 bag":
+                paths.append(write_mcap(folder / f"run_{number}.mcap", part))
+            case _:
+                written = write_rosbag2(tmp_path / f"bag{number}", part)
+                paths.append(next(written.glob("*.db3")).rename(folder / f"run_{number}.db3"))
+    goes_on = [START_NS + k * 10**10 for k in range(6)]
+    assert_are(read(folder if kind == "ROS 2 bag" else paths), maps, goes_on)
+    assert f"goes back by 110.0 s from {paths[0].name} to this file" in caplog.text
+    assert f"goes back by 220.0 s from {paths[1].name} to this file" in caplog.text
+
+
 @pytest.mark.parametrize("name", IN_ANY_ORDER)
 def test_maps_before_a_clock_was_set_to_the_right_year_are_moved_up_to_it(name, tmp_path, caplog):
     maps = growing_maps()
@@ -174,6 +197,25 @@ def test_maps_before_a_clock_was_set_to_the_right_year_are_moved_up_to_it(name, 
     assert "goes forward by 53.9 years at message 3" in caplog.text
     assert "are 53.9 years apart" in caplog.text
     assert inspect_log(path).duration_s == 50.0
+
+
+@pytest.mark.parametrize(
+    ("name", "language", "encoding"),
+    [
+        ("nav_msgs/msg/OccupancyGrid", "ros2msg", "cbor"),
+        ("nav_msgs.OccupancyGrid", "protobuf", "protobuf"),
+        ("foxglove.Grid", "flatbuffer", "msgpack"),
+    ],
+)
+def test_maps_that_cannot_be_read_are_named_with_their_encoding(name, language, encoding, tmp_path):
+    log = McapLog(tmp_path / "run.mcap")
+    log.raw("/grid", START_NS, (name, language, b""), encoding, b"\x00")
+    with pytest.raises(NoMapTopicError) as refused:
+        open_log(log.close())
+    text = str(refused.value)
+    assert f"/grid holds {name} in the encoding {encoding}, defined in {language}, which is not read" in text
+    assert "convert" in text
+    assert "\n" not in text
 
 
 def test_channels_of_other_encodings_beside_the_map_do_no_harm(tmp_path):

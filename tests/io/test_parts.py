@@ -6,7 +6,7 @@ from PIL import Image
 from reader_logs import SHARED, START_NS, Map, McapLog, serialized
 
 import rose2_logs as rl
-from rose2_logs.config.parameters import ReadingParameters
+from rose2_logs.config.reading import ReadingParameters
 from rose2_logs.errors import LogError, NoMapTopicError, ParameterError
 from rose2_logs.io import open_log
 from rose2_logs.system.warnings import StrictError, collect_warnings

@@ -211,6 +211,16 @@ def test_clocks_that_differ_are_told(tmp_path):
         final_map(write_scans(tmp_path / "run.mcap", logged))
 
 
+def test_a_damaged_scan_at_the_start_is_left_out(tmp_path):
+    logged = drive()
+    first = next(k for k, (topic, _) in enumerate(logged) if topic == "/scan")
+    whole = final_map(write_scans(tmp_path / "whole.mcap", logged[:first] + logged[first + 1 :]))
+    scan = logged[first][1]
+    logged[first] = ("/scan", replace(scan, bearings=np.full(len(scan.bearings), np.nan)))
+    damaged = final_map(write_scans(tmp_path / "damaged.mcap", logged))
+    assert np.array_equal(damaged.cells, whole.cells)
+
+
 def test_a_tilted_lidar_maps_nothing(tmp_path):
     tilted = [
         (topic, Move(0.0, "base_link", "laser", (0, 0, 1), (0.0, math.sin(0.2), 0.0, math.cos(0.2))))

@@ -106,6 +106,21 @@ def test_all_frames_above_are_found_also_where_a_frame_has_two_parents_or_is_its
     assert above["map"] == (("map", "odom"), ("odom", "base"), ("base", "laser"))
 
 
+@pytest.mark.parametrize(
+    "pose",
+    [
+        (1e300, 0, 0, 0, 0, 0, 1),
+        (0, 0, 0, 0, 0, 0, 1e-200),
+        (0, 0, 0, 0, 0, 1e200, 1),
+        (0, 0, 0, math.nan, 0, 0, 1),
+        (math.inf, 0, 0, 0, 0, 0, 1),
+    ],
+)
+def test_absurd_transforms_are_ignored(pose):
+    tree = tree_of(Transform(0, "map", "laser", pose))
+    assert tree.above("laser") == {"laser": ()}
+
+
 def test_unusable_transforms_are_ignored():
     tree = tree_of(
         Transform(0, "map", "laser", (0.0,) * 7),

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import bz2
+import gzip
+import lzma
 import shutil
 import sqlite3
 import tempfile
@@ -11,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import zstandard
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 from log_writing import MAP, robot_log
 from mcap.reader import make_reader
@@ -20,7 +24,7 @@ from rosbags.rosbag1 import Reader as BagReader
 from rosbags.rosbag1 import Writer as BagWriter
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from fuzzing.targets import FRAME_BYTES, SPLIT
+from fuzzing.targets import FRAME_BYTES, SCAN_KINDS, SPLIT
 from rose2_logs.io import open_log
 from rose2_logs.model.occupancy import GridGeometry, OccupancySnapshot
 
@@ -227,6 +231,69 @@ def _saved_maps(snapshots: list[OccupancySnapshot], scratch: Path) -> Seeds:
         yield ending, about.encode() + SPLIT + path.read_bytes()
 
 
+def _scan_messages(times: int = 12) -> Iterator[tuple[str, int, str, Any]]:
+    """Topic, log time, type and message of transforms and scans of a lidar that moves in the open."""
+    types = get_typestore(Stores.ROS2_HUMBLE).types
+    for second in range(times):
+        stamp = types["builtin_interfaces/msg/Time"](sec=second, nanosec=0)
+        turn = types["geometry_msgs/msg/Quaternion"](x=0.0, y=0.0, z=0.0, w=1.0)
+        place = types["geometry_msgs/msg/Vector3"](x=0.1 * second, y=0.0, z=0.0)
+        move = types["geometry_msgs/msg/TransformStamped"](
+            types["std_msgs/msg/Header"](stamp=stamp, frame_id="map"),
+            "laser",
+            types["geometry_msgs/msg/Transform"](place, turn),
+        )
+        yield "/tf", second, "tf2_msgs/msg/TFMessage", types["tf2_msgs/msg/TFMessage"]([move])
+        header = types["std_msgs/msg/Header"](stamp=stamp, frame_id="laser")
+        ranges, none = np.full(24, 2.0, np.float32), np.zeros(0, np.float32)
+        numbers = (-3.0, 3.0, 0.25, 0.0, 0.1, 0.1, 30.0)
+        yield (
+            "/scan",
+            second,
+            "sensor_msgs/msg/LaserScan",
+            types["sensor_msgs/msg/LaserScan"](header, *numbers, ranges, none),
+        )
+        if second == 0:
+            echoes = [types["sensor_msgs/msg/LaserEcho"](ranges[:1])] * 24
+            kind = "sensor_msgs/msg/MultiEchoLaserScan"
+            yield "/echoes", second, kind, types[kind](header, *numbers, echoes, [])
+
+
+def _scans(snapshots: list[OccupancySnapshot], scratch: Path) -> Seeds:
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    for topic, _, kind, message in _scan_messages(1):
+        number = [name for name, _ in SCAN_KINDS].index(kind)
+        yield topic[1:], bytes([number]) + bytes(store.serialize_cdr(message, kind))
+
+
+def _scan_logs(snapshots: list[OccupancySnapshot], scratch: Path) -> Seeds:
+    store, path = get_typestore(Stores.ROS2_HUMBLE), scratch / "scans.mcap"
+    with path.open("wb") as stream:
+        writer = Writer(stream, compression=CompressionType.NONE, enable_crcs=False)
+        writer.start(profile="ros2")
+        ids: dict[str, int] = {}
+        for topic, second, kind, message in _scan_messages():
+            if topic not in ids:
+                ids[topic] = writer.register_channel(
+                    topic, "cdr", writer.register_schema(kind, "ros2msg", b"")
+                )
+            data = bytes(store.serialize_cdr(message, kind))
+            writer.add_message(ids[topic], second * 10**9, data, second * 10**9)
+        writer.finish()  # type: ignore[no-untyped-call]
+    yield "mcap", path.read_bytes()
+
+
+def _flatbuffers(snapshots: list[OccupancySnapshot], scratch: Path) -> Seeds:
+    """A Grid of nothing but its root and an empty table of fields: the rest is for the fuzzer to find."""
+    yield "empty", (0).to_bytes(2, "little") + bytes([8, 0, 0, 0, 4, 0, 4, 0, 4, 0, 0, 0])
+
+
+def _packed_logs(snapshots: list[OccupancySnapshot], scratch: Path) -> Seeds:
+    plain = _written(scratch / "plain_run.bag", snapshots).read_bytes()
+    for compress in (gzip.compress, bz2.compress, lzma.compress, zstandard.compress):
+        yield compress.__module__, compress(plain)
+
+
 _WRITERS: dict[str, Callable[[list[OccupancySnapshot], Path], Seeds]] = {
     "mcap": _mcaps,
     "bag": _bags,
@@ -234,4 +301,8 @@ _WRITERS: dict[str, Callable[[list[OccupancySnapshot], Path], Seeds]] = {
     "updates": _messages,
     "schema": _schemas,
     "saved_map": _saved_maps,
+    "scans": _scans,
+    "scan_log": _scan_logs,
+    "flatbuffer": _flatbuffers,
+    "packed": _packed_logs,
 }

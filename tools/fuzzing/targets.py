@@ -8,24 +8,29 @@ import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from rose2_logs.config.parameters import ReadingParameters
+from rose2_logs.config.reading import ReadingParameters
 from rose2_logs.config.selection import Selection
 from rose2_logs.errors import LogError
+from rose2_logs.io import open_log
 from rose2_logs.io.file_log import FileLog, OpenFile
+from rose2_logs.io.flatbuffer_maps import flatbuffer_decoder
 from rose2_logs.io.foxglove_grid import grid_decoder
 from rose2_logs.io.grids import Decoder, Grid
 from rose2_logs.io.log import LogReader
 from rose2_logs.io.map_stream import MapStream, ReadCounts
 from rose2_logs.io.mcap.index import DAMAGE, McapFile
-from rose2_logs.io.messages import decoder
+from rose2_logs.io.messages import CdrFields, Ros1Fields, decoder
 from rose2_logs.io.rosbag1.index import BagFile
 from rose2_logs.io.rosbag2.index import SqliteFile
 from rose2_logs.io.saved_maps import read_map
+from rose2_logs.io.scans import scan_of, transforms_of
 from rose2_logs.model.occupancy import OccupancySnapshot
 from rose2_logs.outputs.mcap.input import CopiedChunk, copied_log
 from rose2_logs.system.warnings import PACKAGE
 
-LIMITS = ReadingParameters(map_max_cells=1 << 16, chunk_max_bytes=1 << 22, map_max_messages=2000)
+LIMITS = ReadingParameters(
+    map_max_cells=1 << 16, chunk_max_bytes=1 << 22, unpacked_max_bytes=1 << 22, map_max_messages=2000
+)
 """Low, so that what is read in spite of them shows in the memory of the process."""
 MOST_MAPS = 50
 """Maps that are read of a log: more would only cost time."""
@@ -168,4 +173,56 @@ def saved_map(data: bytes) -> None:
             read_map(path, 0, LIMITS.map_max_cells)
 
 
-TARGETS: dict[str, Target] = {each.__name__: each for each in (mcap, bag, sqlite, updates, schema, saved_map)}
+SCAN_KINDS = (
+    ("sensor_msgs/msg/LaserScan", "cdr"),
+    ("sensor_msgs/LaserScan", "ros1"),
+    ("sensor_msgs/msg/MultiEchoLaserScan", "cdr"),
+    ("tf2_msgs/msg/TFMessage", "cdr"),
+    ("tf2_msgs/TFMessage", "ros1"),
+)
+"""Kinds of messages of the target `scans`, which are told by its first byte."""
+
+
+def scans(data: bytes) -> None:
+    """Decode a scan or transforms."""
+    if not data:
+        return
+    name, encoding = SCAN_KINDS[data[0] % len(SCAN_KINDS)]
+    with contextlib.suppress(LogError):
+        fields = (CdrFields if encoding == "cdr" else Ros1Fields)(memoryview(data[1:]))
+        if name.endswith("TFMessage"):
+            list(transforms_of(fields))
+        else:
+            scan = scan_of(fields, name)
+            assert scan.ranges_m.shape == scan.bearings_rad.shape == scan.times_ns.shape
+
+
+def scan_log(data: bytes) -> None:
+    """Build maps from the scans of an MCAP file."""
+    with stored(data, "run.mcap") as path, contextlib.suppress(LogError):
+        reader = open_log(path, limits=LIMITS, map_from="/scan", selection=Selection(max_snapshots=MOST_MAPS))
+        with reader:
+            _check_maps(reader)
+
+
+def flatbuffer(data: bytes) -> None:
+    """Take bytes as a schema of FlatBuffers and the rest as a foxglove.Grid."""
+    length = int.from_bytes(data[:2], "little")
+    with contextlib.suppress(LogError):
+        flatbuffer_decoder(data[2 : 2 + length], LIMITS.map_max_cells)(memoryview(data[2 + length :]))
+
+
+def packed(data: bytes) -> None:
+    """Read a log that is compressed as a whole."""
+    with (
+        stored(data, "run.bag.gz") as path,
+        contextlib.suppress(LogError),
+        open_log(path, limits=LIMITS) as log,
+    ):
+        _check_maps(log)
+
+
+TARGETS: dict[str, Target] = {
+    each.__name__: each
+    for each in (mcap, bag, sqlite, updates, schema, saved_map, scans, scan_log, flatbuffer, packed)
+}

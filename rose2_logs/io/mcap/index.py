@@ -20,7 +20,7 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, ChunkIndex, Header, Metadata, Schema
 from mcap.records import Channel as McapChannel
 
-from rose2_logs.config.parameters import NO_TYPE, ReadingParameters
+from rose2_logs.config.reading import NO_TYPE, ReadingParameters
 from rose2_logs.errors import LogError
 from rose2_logs.io.checked_file import CheckedFile
 from rose2_logs.io.decompression import REMEDY
@@ -46,6 +46,8 @@ logger = logging.getLogger(__name__)
 
 # Reading alternates between chunks that overlap in time; two are cached so that each is decompressed once.
 _CHUNKS_KEPT = 2
+_KEPT_BYTES = 1 << 24
+"""Large chunks, each with a single large map, are not kept together."""
 # What parsing damaged data raises; ValueError includes TooLargeError.
 DAMAGE = (McapError, ValueError, KeyError, EOFError, struct.error)
 
@@ -347,6 +349,8 @@ class McapFile(LogFile):
         if begin in self._chunks:
             self._chunks.move_to_end(begin)
             return self._chunks[begin]
+        while sum(map(len, self._chunks.values())) > _KEPT_BYTES:
+            self._chunks.popitem(last=False)
         self._chunks[begin] = records = chunk_records(self._record(begin), self.limits.chunk_max_bytes)
         if len(self._chunks) > _CHUNKS_KEPT:
             self._chunks.popitem(last=False)

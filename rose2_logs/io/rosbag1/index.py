@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from rose2_logs.config.parameters import ReadingParameters
+from rose2_logs.config.reading import ReadingParameters
 from rose2_logs.errors import LogError
 from rose2_logs.io.checked_file import CheckedFile
 from rose2_logs.io.log_file import Channel, LogFile, Place, StoredMessage, check_count

@@ -16,7 +16,7 @@ from urllib.parse import quote
 
 import numpy as np
 
-from rose2_logs.config.parameters import ReadingParameters
+from rose2_logs.config.reading import ReadingParameters
 from rose2_logs.errors import LogError
 from rose2_logs.io.log_file import LATEST_NS, Channel, LogFile, Place, StoredMessage, check_count
 from rose2_logs.io.source import DamagedMessageError

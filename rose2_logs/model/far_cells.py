@@ -1,0 +1,122 @@
+"""Cells far from everything else: a stray speck, or rays through a window, must not cost as a building.
+
+The explored part of a map is a rectangle, so one cell 300 m away makes it as large as a town. What was
+explored shows as blocks of cells that are mostly known; rays and specks do not fill theirs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rose2_logs.config.parameters import OccupancyParameters
+from rose2_logs.model.labels import cells_where
+
+BLOCK_CELLS = 16
+"""Side of the blocks in cells: a ray through one leaves it nearly empty."""
+FILLED_SHARE = 0.5
+"""Cells of a block that are known where it was explored: with rays two cells apart, half of them."""
+
+
+@dataclass(frozen=True)
+class FarCells:
+    """What is left out of a map because it is far from the rest.
+
+    Attributes
+    ----------
+    window : (slice, slice)
+        Rows and columns of what stays.
+    count : int
+        Known cells that are left out.
+    farthest_m : float
+        Distance of the farthest of them from what stays, in meters.
+    """
+
+    window: tuple[slice, slice]
+    count: int
+    farthest_m: float
+
+    @property
+    def note(self) -> str:
+        """One line that tells of it."""
+        cells = "1 known cell" if self.count == 1 else f"{self.count} known cells"
+        return (
+            f"{cells} up to {self.farthest_m:.0f} m from the rest of the map, where nothing else is known "
+            "but rays and specks, are left out; occupancy.far_cells=keep takes them with it"
+        )
+
+
+def find_far_cells(
+    cells: NDArray[np.int8], resolution_m: float, parameters: OccupancyParameters
+) -> FarCells | None:
+    """Find what is far from the rest of a map and would make its explored part much larger.
+
+    Parameters
+    ----------
+    cells : (H, W) int8
+        Occupancy in percent, -1 for unknown.
+    resolution_m : float
+        Side of a cell.
+    parameters : OccupancyParameters
+        Whether and from when on something is left out.
+
+    Returns
+    -------
+    FarCells or None
+        None where nothing is left out, as in nearly all maps.
+    """
+    if parameters.far_cells == "keep" or cells.shape[0] * cells.shape[1] == 0:
+        return None
+    known = cells_where(cells, lambda part: part >= 0)
+    if len(known) == 0:
+        return None
+    row, column = np.divmod(known, cells.shape[1])
+    spans = (int(row[-1]) - int(row[0]) + 1) * (int(column.max()) - int(column.min()) + 1)
+    most = spans / parameters.far_min_gain
+    # A window that is full enough cannot shrink so much.
+    if len(known) > most:
+        return None
+    window = _explored_window(row, column, cells.shape, resolution_m, parameters)
+    if window is None or np.prod([along.stop - along.start for along in window]) > most:
+        return None
+    down, right = (
+        np.maximum(np.maximum(along.start - place, place - along.stop + 1), 0)
+        for along, place in zip(window, (row, column), strict=True)
+    )
+    away = np.hypot(down, right)
+    return FarCells(window, int(np.count_nonzero(away)), float(away.max()) * resolution_m)
+
+
+def _explored_window(
+    row: NDArray[np.intp],
+    column: NDArray[np.intp],
+    shape: tuple[int, ...],
+    resolution_m: float,
+    parameters: OccupancyParameters,
+) -> tuple[slice, slice] | None:
+    """Rows and columns of a canvas around all filled blocks that could hold a room; None without any.
+
+    They begin and end with blocks of the canvas, so that the part of a map that stays is left as it is.
+    """
+    import cv2
+
+    height, width = (-(-side // BLOCK_CELLS) for side in shape)
+    of_cell = (row // BLOCK_CELLS) * width + column // BLOCK_CELLS
+    known = np.bincount(of_cell, minlength=height * width)
+    filled = (known >= FILLED_SHARE * BLOCK_CELLS**2).astype(np.uint8).reshape(height, width)
+    count, piece, boxes, _ = cv2.connectedComponentsWithStats(filled, connectivity=8)
+    cells = np.bincount(piece.reshape(-1), known, count)
+    boxes = boxes[1:][cells[1:] * resolution_m**2 >= parameters.far_min_area_m2]
+    if not len(boxes):
+        return None
+    # A block more, for those at the border of a floor are not filled.
+    margin = int(np.ceil(parameters.far_margin_m / (resolution_m * BLOCK_CELLS))) + 1
+    low = (boxes[:, :2].min(axis=0) - margin) * BLOCK_CELLS
+    high = ((boxes[:, :2] + boxes[:, 2:4]).max(axis=0) + margin) * BLOCK_CELLS
+    columns, rows = (
+        slice(max(int(begin), 0), min(int(end), side))
+        for begin, end, side in zip(low, high, shape[::-1], strict=True)
+    )
+    return rows, columns
