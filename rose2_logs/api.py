@@ -298,7 +298,8 @@ def open_log(
     message_type : str, optional
         Type of the maps on channels without a schema.
     part : int, optional
-        Which part of the maps, from 1, where they are not of one run; by default the one that tells most.
+        Which part of the maps to take alone, from 1; by default all where the map was begun anew, and where
+        several nodes publish the one that tells most.
     map_from : str, optional
         Topic of laser scans to build the maps from, instead of reading recorded ones.
     map_frame : str, optional

@@ -86,7 +86,8 @@ def open_log(
     occupancy : OccupancyParameters
         What the numbers in the cells mean.
     part : int, optional
-        Which part of a topic, from 1, whose maps are not of one run; by default the one that tells most.
+        Which part of the maps to take alone, from 1; by default all where the map was begun anew, and where
+        several nodes publish the one that tells most.
     map_from : str, optional
         Topic of laser scans to build the maps from, instead of reading recorded ones.
     map_frame : str, optional

@@ -1,6 +1,8 @@
-"""Maps on one topic that are not of one run: of two publishers in turn, or of a map that was begun anew.
+"""Maps on one topic that do not grow from each other: of publishers in turn, or of a map that was begun anew.
 
-Rooms can only be followed through maps that grow from each other, so that one part is analyzed at a time.
+Rooms can only be followed through maps that grow from each other. Parts that follow one another in a log are
+parts of one run, each with its own coverage and tracks; of publishers in turn, and of saved maps that are of
+several runs, one part is read.
 """
 
 from __future__ import annotations
@@ -81,10 +83,20 @@ Facts = Callable[[int], MapFacts | None]
 
 @dataclass(frozen=True)
 class Parts:
-    """The parts of a topic in the order of their first maps, and why there are several."""
+    """The parts of a topic in the order of their first maps, and why there are several.
+
+    Attributes
+    ----------
+    parts : tuple of Part
+    why : str
+        What shows that there are several.
+    is_one_run : bool
+        Whether they follow one another in one log, so that they are parts of one run.
+    """
 
     parts: tuple[Part, ...]
     why: str = ""
+    is_one_run: bool = False
 
     def likeliest(self) -> int:
         """Return the number, from 1, of the part with most maps that differ, then most free area."""
@@ -92,13 +104,14 @@ class Parts:
         key = [(each.maps, each.free_m2) for each in self.parts]
         return max(places, key=lambda place: (*key[place], place)) + 1
 
-    def text(self, number: int) -> str:
-        """Return what is told of the choice of one part."""
+    def text(self, number: int | None) -> str:
+        """Return what is told of the choice of one part, or of all."""
         sizes = ", ".join(
             f"{place} of {counted(len(each.times), 'map')} ({each.free_m2:.0f} m2 free at its end)"
             for place, each in enumerate(self.parts, start=1)
         )
-        return f"{self.why}, so that there are {len(self.parts)} parts: {sizes}; part {number} is analyzed"
+        done = "each has its own coverage and tracks" if number is None else f"part {number} is analyzed"
+        return f"{self.why}, so that there are {len(self.parts)} parts: {sizes}; {done}"
 
 
 def find_parts(times: Times, look: Facts) -> Parts:
@@ -130,7 +143,7 @@ def find_parts(times: Times, look: Facts) -> Parts:
     spread = np.unique(np.linspace(0, len(times) - 1, LOOKED_AT).round().astype(int)).tolist()
     begins = [0, *_begins(spread, facts), len(times)]
     parts = [_part(times, range(low, high), facts, spread) for low, high in pairwise(begins)]
-    return Parts(tuple(parts), "the map is begun anew" if len(parts) > 1 else "")
+    return Parts(tuple(parts), "the map is begun anew" if len(parts) > 1 else "", is_one_run=True)
 
 
 def facts_of(grid: Grid, occupancy: OccupancyParameters) -> MapFacts:

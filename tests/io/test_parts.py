@@ -30,7 +30,7 @@ def log_of(path, maps):
 def read(path, **options):
     with collect_warnings() as found, open_log(path, **options) as reader:
         free = [int((each.cells == 0).sum()) // 80 for each in reader.snapshots()]
-        return free, reader.decided.get("part"), found.kinds
+        return free, reader.decided.get("parts"), found.kinds
 
 
 GROWING = [50, 80, 110, 140, 170]
@@ -41,11 +41,11 @@ def test_two_publishers_are_kept_apart_and_the_one_that_grows_is_read(tmp_path):
     path = log_of(tmp_path / "run.mcap", [each for pair in pairs for each in pair])
     free, part, kinds = read(path)
     assert free == [columns - 5 for columns in GROWING]
-    assert part == {"number": 1, "count": 2}
+    assert part == {"analyzed": [1], "count": 2}
     (told,) = kinds["parts"].first
     assert "as of several publishers" in told["message"]
     assert "part=2 takes another" in told["message"]
-    assert read(path, part=2) == ([135], {"number": 2, "count": 2}, {})
+    assert read(path, part=2) == ([135], {"analyzed": [2], "count": 2}, {})
     with pytest.raises(LogError, match="has no part 3; it has 2"):
         read(path, part=3)
     with pytest.raises(StrictError), collect_warnings(strict=True), open_log(path) as reader:
@@ -53,18 +53,37 @@ def test_two_publishers_are_kept_apart_and_the_one_that_grows_is_read(tmp_path):
 
 
 def test_a_map_that_is_begun_anew_is_a_part_of_its_own(tmp_path):
-    path = log_of(tmp_path / "run.mcap", [seen(columns) for columns in (*GROWING, *GROWING[:4])])
+    first, second = GROWING, GROWING[:4]
+    path = log_of(tmp_path / "run.mcap", [seen(columns) for columns in (*first, *second)])
     free, part, kinds = read(path)
-    assert free == [columns - 5 for columns in GROWING]
-    assert part == {"number": 1, "count": 2}
-    assert "the map is begun anew" in kinds["parts"].first[0]["message"]
-    assert read(path, part=2)[0] == [columns - 5 for columns in GROWING[:4]]
+    assert free == [columns - 5 for columns in (*first, *second)]
+    assert part == {"analyzed": [1, 2], "count": 2}
+    (told,) = kinds["parts"].first
+    assert "the map is begun anew" in told["message"]
+    assert "each has its own coverage and tracks; part=1 takes one alone" in told["message"]
+    for number, columns in ((1, first), (2, second)):
+        assert read(path, part=number)[0] == [each - 5 for each in columns]
+
+
+def test_parts_without_a_map_in_the_time_range_are_left_out(tmp_path):
+    path = log_of(tmp_path / "run.mcap", [seen(columns) for columns in (*GROWING, *GROWING)])
+    for selected, numbers in (
+        ({}, [1, 2]),
+        ({"end_s": 3.0}, [1]),
+        ({"start_s": 6.0}, [2]),
+        ({"max_snapshots": 2}, [1, 2]),
+    ):
+        with open_log(path, selection=rl.Selection(**selected)) as reader:
+            lasts = reader.lasts()
+            assert list(lasts) == numbers
+            assert lasts[numbers[-1]].log_time_ns == reader.last().log_time_ns
+            assert {reader.part_at(each.log_time_ns) for each in reader.snapshots()} <= set(numbers)
 
 
 def test_the_place_where_a_map_is_begun_anew_is_found_in_a_long_log(tmp_path):
     columns = [*range(30, 190), *range(20, 150)]
     path = log_of(tmp_path / "run.mcap", [seen(each) for each in columns])
-    assert read(path)[0] == [each - 5 for each in columns[:160]]
+    assert read(path, part=1)[0] == [each - 5 for each in columns[:160]]
     assert read(path, part=2)[0] == [each - 5 for each in columns[160:]]
 
 
@@ -96,12 +115,14 @@ def test_maps_of_one_run_are_one_part(maps, tmp_path):
 
 
 @pytest.mark.skipif(not (SHARED / "faults").is_dir(), reason="needs ../shared/faults")
-@pytest.mark.parametrize(("name", "number"), [("two_publishers", 1), ("reset_moved", 2), ("gazebo_reset", 2)])
-def test_parts_of_logs_as_users_have_them(name, number):
+@pytest.mark.parametrize(
+    ("name", "analyzed"), [("two_publishers", [1]), ("reset_moved", [1, 2]), ("gazebo_reset", [1, 2])]
+)
+def test_parts_of_logs_as_users_have_them(name, analyzed):
     with collect_warnings() as found, open_log(SHARED / "faults" / f"{name}.mcap") as reader:
         free = [int((each.cells == 0).sum()) for each in reader.snapshots()]
-    assert free == [4862, 13862, 22448, 31130, 40130, 44896]
-    assert reader.decided["part"] == {"number": number, "count": 2}
+    assert free[-6:] == [4862, 13862, 22448, 31130, 40130, 44896]
+    assert reader.decided["parts"] == {"analyzed": analyzed, "count": 2}
     assert found.kinds["parts"].count == 1
 
 

@@ -22,9 +22,10 @@ from rose2_logs.cli.printing import (
 )
 from rose2_logs.config.run_options import RunOptions
 from rose2_logs.errors import AlreadyWholeError, ParameterError, Rose2LogsError
+from rose2_logs.system.text import counted
 
 if TYPE_CHECKING:
-    from rose2_logs.runs.history import RunTotals
+    from rose2_logs.runs.history import RunSummary, RunTotals
     from rose2_logs.tracking.track_history import SnapshotRef
     from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot
     from rose2_logs.workflows.analyze import OnSnapshot, RunResult
@@ -101,7 +102,11 @@ def print_run(result: RunResult) -> None:
     table = Table(box=None, show_header=False, pad_edge=False)
     left_out = f" ({totals.invalid} could not be analyzed)" if totals.invalid else ""
     table.add_row("maps", f"{totals.snapshots}{left_out}")
-    table.add_row("coverage", f"{totals.coverage_first:.1%} to {totals.coverage_last:.1%}")
+    parts = result.summary.parts
+    if len(parts) < 2:
+        table.add_row("coverage", f"{totals.coverage_first:.1%} to {totals.coverage_last:.1%}")
+    for number, part in parts.items() if len(parts) > 1 else ():
+        table.add_row(f"part {number}", _part(part))
     brief = len(result.summary.convergence.brief)
     over_the_run = f"{totals.tracks} over the run" + (f", {brief} only briefly" if brief else "")
     table.add_row("rooms at the end", f"{totals.rooms_last} ({over_the_run})")
@@ -123,6 +128,13 @@ def print_run(result: RunResult) -> None:
     print_line(f"results in [bold]{escape(str(result.folder))}[/]")
     for file in result.files:
         print_line(f"  {escape(file.name)}  {megabytes(file.stat().st_size)}")
+
+
+def _part(part: RunSummary) -> str:
+    """Say what a part of a run came to."""
+    totals = part.totals
+    coverage = f"coverage {totals.coverage_first:.1%} to {totals.coverage_last:.1%}"
+    return f"{counted(totals.snapshots, 'map')}, {coverage}, {counted(totals.rooms_last, 'room')} at its end"
 
 
 def _since(since: SnapshotRef, totals: RunTotals) -> str:

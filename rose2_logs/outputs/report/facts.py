@@ -55,7 +55,19 @@ def subtitle(results: Run) -> list[tuple[str, str]]:
         ("Recorded", f"{began}{duration(span)} from the first to the last map"),
         ("Map topic", f"{summary['topic']} in frame {results.columns['frame_id'][-1]}"),
         ("Method", f"{summary['method']}, rose2-logs {summary['versions'].get('rose2-logs', '')}".strip()),
+        *_part(results),
     ]
+
+
+def _part(results: Run) -> list[tuple[str, str]]:
+    """Say which part of the log the page is about, where the log has several."""
+    if results.part is None:
+        return []
+    numbers = results.columns["snapshot"]
+    others = [number for number in results.parts if number != results.part]
+    more = f"; rose2-logs report --part {others[0]} tells of another" if others else ""
+    count = results.summary.get("decided", {}).get("parts", {}).get("count", len(results.parts))
+    return [("Part of the log", f"{results.part} of {count}, maps {numbers[0]} to {numbers[-1]}{more}")]
 
 
 def tiles(results: Run, plan: RoomPlan) -> list[Tile]:
