@@ -21,7 +21,7 @@ from rose2_logs.io.cell_values import MAPS_LOOKED_AT, OVERRULED, CellReading, co
 from rose2_logs.io.grids import Grid, MapWarning, Patch
 from rose2_logs.io.map_stream import MapChecks, MapStream, ReadCounts
 from rose2_logs.io.messages import is_patch_type
-from rose2_logs.io.parts import MapFacts, Part, Parts, facts_of, find_parts, find_saved_parts
+from rose2_logs.io.parts import Part, Parts, find_parts, find_saved_parts
 from rose2_logs.io.poses import RobotPath
 from rose2_logs.io.saved_maps import MapFilesSource
 from rose2_logs.io.scan_topics import mappable_topics
@@ -329,7 +329,8 @@ class LogReader:
         # Patches have no map of their own, and maps of one time cannot be told apart.
         if len(self._topics) > 1 or len(np.unique(times)) < len(times):
             return self._chosen(Parts((Part(times, 0.0, len(times)),)))
-        return self._chosen(find_parts(times, self._facts))
+        publishers = self.source.publishers(self.topic)
+        return self._chosen(find_parts(times, self._grid, self._occupancy, publishers))
 
     def _chosen(self, found: Parts) -> tuple[dict[int, Part], int]:
         """The parts that were asked for, else all if they are of one run, else the likeliest."""
@@ -339,14 +340,11 @@ class LogReader:
         if number is None and count > 1:
             number = None if found.is_one_run else found.likeliest()
             other = "takes one alone" if number is None else "takes another"
-            text = f"{self.info.path}: {self.topic}: {found.text(number)}; part={2 if number == 1 else 1} {other}"
+            other = f"part={2 if number == 1 else 1} {other}"
+            text = f"{self.info.path}: {self.topic}: {found.text(number)}; {other}"
             log_warning(logger, "parts", text, file=self.info.path, topic=self.topic)
         taken = {place: part for place, part in enumerate(found.parts, start=1) if number in (None, place)}
         return taken, count
-
-    def _facts(self, time_ns: int) -> MapFacts | None:
-        """Look at the map of one log time."""
-        return None if (grid := self._grid(time_ns)) is None else facts_of(grid, self._occupancy)
 
     def _grid(self, time_ns: int) -> Grid | None:
         """Read the map of one log time; None if there is none."""

@@ -27,7 +27,7 @@ from rose2_logs.io.discovery import (
     is_storage,
     load_yaml,
 )
-from rose2_logs.io.log import LogReader
+from rose2_logs.io.log import LogReader, choose_topic
 from rose2_logs.io.source import LogInfo, MessageSource
 from rose2_logs.system.text import counted
 from rose2_logs.system.warnings import log_warning
@@ -155,6 +155,28 @@ def inspect_log(path: LogPath, limits: ReadingParameters = DEFAULT_LIMITS) -> Lo
     source = open_source(path, limits)
     source.close()
     return source.info
+
+
+def map_topics(path: LogPath, limits: ReadingParameters = DEFAULT_LIMITS) -> list[str]:
+    """Names of the topics of a log that hold maps, ascending.
+
+    Parameters
+    ----------
+    path : str, Path or a sequence of them
+        As for `open_log`.
+    limits : ReadingParameters
+        The largest sizes that are accepted.
+
+    Raises
+    ------
+    NoMapTopicError
+        If there are none; the message says what could be done.
+    LogError
+        If the log cannot be opened.
+    """
+    info = inspect_log(path, limits)
+    found = [topic.name for topic in info.topics if topic.is_map and topic.message_count != 0]
+    return sorted(set(found)) or [choose_topic(info)]
 
 
 def open_source(

@@ -1,4 +1,4 @@
-"""Maps on one topic that do not grow from each other: of publishers in turn, or of a map that was begun anew.
+"""Maps on one topic that do not grow from each other: of publishers in turn, or of a map begun anew.
 
 Rooms can only be followed through maps that grow from each other. Parts that follow one another in a log are
 parts of one run, each with its own coverage and tracks; of publishers in turn, and of saved maps that are of
@@ -13,25 +13,30 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rose2_logs.config.parameters import OccupancyParameters
 from rose2_logs.config.selection import Times
+from rose2_logs.config.tracking import TrackingParameters
 from rose2_logs.io.grids import Grid
-from rose2_logs.model.occupancy import GridGeometry, classify
+from rose2_logs.model.occupancy import UNKNOWN, BoolArray, GridGeometry, classify
 from rose2_logs.system.text import counted
+from rose2_logs.tracking.registration import WallFit, wall_faces
 
 LOOKED_AT = 64
 """Maps, evenly spread, that are looked at: where a map is begun anew, all maps around are looked at, too."""
 LEAST_RETURNS = 2
-"""Times that the maps come back to a grid they had left, from which on they are of several publishers."""
+"""Times that the maps come back to a publisher, or to a grid, that they had left, from which on they are of
+several publishers."""
 ANOTHER_SHARE = 0.1
 """Maps of two publishers differ by more than this share of their free area, most times. A mapping node that
 crops its map to what is known goes back and forth between two grids, too, but not between two areas."""
 FALLEN_SHARE = 0.5
-"""A map is begun anew if it has less than this share of the free area of the one before. Loop closures and
-corrections of a map change a few percent."""
+"""A map is begun anew if it has less than this share of the free area of the one before, or knows less of its
+floor. Loop closures and corrections of a map change a few percent."""
 BACK_SHARE = 0.8
-"""A map that has this share again one map later was a bad map, and none that was begun anew."""
+"""A map that has this share again one map later was a bad map, and none that was begun anew. The map of a
+publisher has this share of its free area again when its turn comes; a map begun anew on its grid has not."""
 LEAST_AREA_M2 = 5.0
 """Smaller maps are no loss."""
 
@@ -48,6 +53,8 @@ FLOOR = re.compile(
 """What names of maps tell of floors."""
 LEAST_WALL_CELLS = 100
 """Walls that two maps show, 5 m of 5 cm, below which they are not compared."""
+MOST_COMPARED = 5000
+"""Cells of walls and of the floor, evenly taken, that are enough to compare."""
 
 
 @dataclass(frozen=True)
@@ -75,10 +82,6 @@ class Part:
     times: Times
     free_m2: float
     maps: int
-
-
-Facts = Callable[[int], MapFacts | None]
-"""What is known of a map, by its log time or by its place among the maps; None if it cannot be read."""
 
 
 @dataclass(frozen=True)
@@ -114,36 +117,117 @@ class Parts:
         return f"{self.why}, so that there are {len(self.parts)} parts: {sizes}; {done}"
 
 
-def find_parts(times: Times, look: Facts) -> Parts:
+class _Maps:
+    """What is known of the maps of a topic, by their places; each is read as often as another one is between.
+
+    Parameters
+    ----------
+    times : (N,) int64
+        Their log times.
+    read : callable
+        Returns the map of a time, in percent; None if it cannot be read.
+    occupancy : OccupancyParameters
+        Which cells are free and occupied.
+    """
+
+    def __init__(
+        self, times: Times, read: Callable[[int], Grid | None], occupancy: OccupancyParameters
+    ) -> None:
+        self._times, self._read, self._occupancy = times, read, occupancy
+        self._facts: dict[int, MapFacts | None] = {}
+        self._has_walls_of: dict[tuple[int, int], bool] = {}
+        self._held: tuple[int, Grid | None] = (-1, None)
+
+    def facts(self, place: int) -> MapFacts | None:
+        """Return what is known of a map; None if it cannot be read."""
+        if place not in self._facts:
+            self._look(place)
+        return self._facts[place]
+
+    def is_other(self, before: int, now: int, least_share: float) -> bool:
+        """Whether a map has lost the floor of an earlier one, down to a share, or shows other walls."""
+        then, there = self.facts(before), self.facts(now)
+        if then is None or there is None or then.free_m2 < LEAST_AREA_M2:
+            return False
+        return there.free_m2 < least_share * then.free_m2 or not self._has_walls(before, now)
+
+    def _has_walls(self, before: int, now: int) -> bool:
+        """Whether a map shows the walls of an earlier one, maybe moved as a whole."""
+        if (before, now) not in self._has_walls_of:
+            self._look(before)
+            self._look(now)
+        if not self._has_walls_of[before, now]:
+            then, there = (self._read(int(self._times[place])) for place in (before, now))
+            if then is not None and there is not None:
+                self._has_walls_of[before, now] = _has_moved(then, there, self._occupancy)
+        return self._has_walls_of[before, now]
+
+    def _look(self, place: int) -> None:
+        """Read a map, and compare it with the one that was read before."""
+        before, held = self._held
+        if place == before:
+            return
+        now = self._read(int(self._times[place]))
+        self._facts[place] = None if now is None else facts_of(now, self._occupancy)
+        self._has_walls_of.setdefault(
+            (before, place), held is None or now is None or _is_continued(held, now, self._occupancy)
+        )
+        self._held = place, now
+
+
+def find_parts(
+    times: Times,
+    read: Callable[[int], Grid | None],
+    occupancy: OccupancyParameters,
+    publishers: Sequence[str] | None = None,
+) -> Parts:
     """Find which maps of a topic belong together.
 
     Parameters
     ----------
     times : (N,) int64
         Log times of the maps, ascending, each once.
-    look : callable
-        Returns what is known of the map of a time.
+    read : callable
+        Returns the map of a time, in percent; None if it cannot be read.
+    occupancy : OccupancyParameters
+        Which cells are free and occupied.
+    publishers : sequence of N str, optional
+        Who published each of them; without, their grids tell.
     """
     if len(times) < 2:
         return Parts((Part(times, 0.0, len(times)),))
-    seen: dict[int, MapFacts | None] = {}
-
-    def facts(place: int) -> MapFacts | None:
-        if place not in seen:
-            seen[place] = look(int(times[place]))
-        return seen[place]
-
-    if publishers := _publishers(min(len(times), LOOKED_AT), facts):
-        grids = [(found := facts(place)) and _grid(found.geometry) for place in range(len(times))]
+    maps = _Maps(times, read, occupancy)
+    if publishers is not None and _returns(publishers) >= LEAST_RETURNS:
+        names = list(dict.fromkeys(publishers))
+        of_each = [[place for place, one in enumerate(publishers) if one == name] for name in names]
+        parts = [_part(times, places, maps.facts, _spread(places)) for places in of_each]
+        return Parts(tuple(parts), f"{', '.join(names)} publish in turn")
+    if publishers is None and (grids_in_turn := _grids_in_turn(min(len(times), LOOKED_AT), maps.facts)):
+        grids = [(found := maps.facts(place)) and _grid(found.geometry) for place in range(len(times))]
         parts = [
-            _part(times, [place for place, grid in enumerate(grids) if grid == publisher], facts)
-            for publisher in publishers
+            _part(times, [place for place, grid in enumerate(grids) if grid == publisher], maps.facts)
+            for publisher in grids_in_turn
         ]
         return Parts(tuple(parts), "maps of several grids come in turn, as of several publishers")
-    spread = np.unique(np.linspace(0, len(times) - 1, LOOKED_AT).round().astype(int)).tolist()
-    begins = [0, *_begins(spread, facts), len(times)]
-    parts = [_part(times, range(low, high), facts, spread) for low, high in pairwise(begins)]
+    spread = _spread(range(len(times)))
+    begins = [0, *_begins(spread, maps), len(times)]
+    parts = [_part(times, range(low, high), maps.facts, spread) for low, high in pairwise(begins)]
     return Parts(tuple(parts), "the map is begun anew" if len(parts) > 1 else "", is_one_run=True)
+
+
+def _spread(places: Sequence[int]) -> list[int]:
+    """At most `LOOKED_AT` of the places, evenly, the first and the last among them."""
+    chosen = np.unique(np.linspace(0, len(places) - 1, LOOKED_AT).round().astype(int))
+    return [places[at] for at in chosen.tolist()]
+
+
+def _returns(publishers: Sequence[str]) -> int:
+    """How often another publisher follows that has published before."""
+    seen, returns = set(publishers[:1]), 0
+    for before, now in pairwise(publishers):
+        returns += now != before and now in seen
+        seen.add(now)
+    return returns
 
 
 def facts_of(grid: Grid, occupancy: OccupancyParameters) -> MapFacts:
@@ -204,16 +288,17 @@ def _floor(name: str) -> str:
 
 
 def _is_continued(before: Grid, now: Grid, occupancy: OccupancyParameters) -> bool:
-    """Whether most walls of a map that another one shows are walls there, too; also if few are shown."""
+    """Whether a map knows most of the floor of another one, and most walls of that one are walls in it, too."""
     import cv2
 
-    _, walls = classify(before.cells, occupancy)
+    floor, walls = classify(before.cells, occupancy)
+    row, column = _places(floor, before.geometry, now.geometry)
+    if np.count_nonzero(now.cells[row, column] != UNKNOWN) < FALLEN_SHARE * min(
+        np.count_nonzero(floor), MOST_COMPARED
+    ):
+        return False
     free, occupied = classify(now.cells, occupancy)
-    row, column = np.moveaxis(
-        now.geometry.world_to_cell(before.geometry.cell_centers(*np.nonzero(walls))), -1, 0
-    )
-    inside = (row >= 0) & (row < free.shape[0]) & (column >= 0) & (column < free.shape[1])
-    row, column = row[inside], column[inside]
+    row, column = _places(walls, before.geometry, now.geometry)
     reach = 2 * round(WALL_REACH_M / now.geometry.resolution_m) + 1
     near = cv2.dilate(occupied.astype(np.uint8), np.ones((reach, reach), np.uint8)).astype(bool)
     shown = near[row, column] | free[row, column]
@@ -222,60 +307,75 @@ def _is_continued(before: Grid, now: Grid, occupancy: OccupancyParameters) -> bo
     return bool(np.count_nonzero(near[row, column]) >= SAME_WALLS_SHARE * np.count_nonzero(shown))
 
 
+def _places(
+    cells: BoolArray, geometry: GridGeometry, other: GridGeometry
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Rows and columns (N,) on another grid of at most `MOST_COMPARED` cells (H, W) that lie on it."""
+    places = np.flatnonzero(cells)
+    if len(places) > MOST_COMPARED:
+        places = places[np.linspace(0, len(places) - 1, MOST_COMPARED).astype(np.intp)]
+    row, column = np.moveaxis(
+        other.world_to_cell(geometry.cell_centers(*np.unravel_index(places, cells.shape))), -1, 0
+    )
+    inside = (row >= 0) & (row < other.shape[0]) & (column >= 0) & (column < other.shape[1])
+    return row[inside], column[inside]
+
+
+def _has_moved(before: Grid, now: Grid, occupancy: OccupancyParameters) -> bool:
+    """Whether a map shows the walls of another one elsewhere, as after a loop closure."""
+    tracking = TrackingParameters()
+    then, there = (wall_faces(*classify(each.cells, occupancy), each.geometry) for each in (before, now))
+    if min(len(then), len(there)) < tracking.fit_min_points:
+        return True
+    walls = WallFit(then, before.geometry.resolution_m, tracking).sample()
+    fit = WallFit(there, now.geometry.resolution_m, tracking)
+    return fit.share(walls.points, fit.best(walls)) >= SAME_WALLS_SHARE
+
+
 def _grid(geometry: GridGeometry) -> GridGeometry:
     return replace(geometry, yaw_rad=round(geometry.yaw_rad, 6))
 
 
-def _publishers(count: int, facts: Facts) -> list[GridGeometry]:
-    """Grids between which the maps go back and forth; none if they do not."""
-    order: list[GridGeometry] = []
-    returns = switches = 0
+def _grids_in_turn(count: int, facts: Callable[[int], MapFacts | None]) -> list[GridGeometry]:
+    """Grids between which the maps go back and forth, and find again what they had left; else none."""
+    left: dict[GridGeometry, float] = {}
+    returns = found_again = switches = 0
     latest: MapFacts | None = None
     for place in range(count):
         if (found := facts(place)) is None:
             continue
         grid = _grid(found.geometry)
         if latest is not None and grid != _grid(latest.geometry):
-            returns += grid in order
+            if grid in left:
+                returns += 1
+                found_again += found.free_m2 >= BACK_SHARE * left[grid]
             low, high = sorted((latest.free_m2, found.free_m2))
             switches += 1 if high - low > ANOTHER_SHARE * high else -1
-        if grid not in order:
-            order.append(grid)
+        left[grid] = found.free_m2
         latest = found
-    return order if returns >= LEAST_RETURNS and 1 < len(order) <= returns + 1 and switches > 0 else []
+    is_in_turn = found_again >= max(LEAST_RETURNS, len(left) - 1) and 2 * found_again > returns
+    return list(left) if is_in_turn and len(left) > 1 and switches > 0 else []
 
 
-def _begins(spread: Sequence[int], facts: Facts) -> list[int]:
+def _begins(spread: Sequence[int], maps: _Maps) -> list[int]:
     """Places of the maps that are begun anew."""
     begins = []
     for low, high in pairwise(spread):
-        if not _has_fallen(facts(low), facts(high)):
+        if not maps.is_other(low, high, FALLEN_SHARE):
             continue
         for place in range(low + 1, high + 1):
-            if _has_fallen(facts(place - 1), facts(place)) and not _is_back(
-                facts(place - 1), facts(place + 1) if place + 1 <= spread[-1] else None
-            ):
+            if not maps.is_other(place - 1, place, FALLEN_SHARE):
+                continue
+            then = place + 1
+            if then > spread[-1] or maps.facts(then) is None or maps.is_other(place - 1, then, BACK_SHARE):
                 begins.append(place)
     return begins
-
-
-def _has_fallen(before: MapFacts | None, now: MapFacts | None) -> bool:
-    return (
-        before is not None
-        and now is not None
-        and before.free_m2 >= LEAST_AREA_M2
-        and now.free_m2 < FALLEN_SHARE * before.free_m2
-    )
-
-
-def _is_back(before: MapFacts | None, then: MapFacts | None) -> bool:
-    return before is not None and then is not None and then.free_m2 >= BACK_SHARE * before.free_m2
 
 
 def _part(
     times: Times,
     places: Sequence[int],
-    facts: Facts,
+    facts: Callable[[int], MapFacts | None],
     looked_at: Sequence[int] | None = None,
 ) -> Part:
     known = places if looked_at is None else sorted({*set(places).intersection(looked_at), places[-1]})

@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from mcap.writer import Writer
 from PIL import Image
-from reader_logs import SHARED, START_NS, Map, McapLog, serialized
+from reader_logs import SHARED, START_NS, Map, McapLog, message_type, serialized, typestore
+from rosbags import rosbag1
 
 import rose2_logs as rl
 from rose2_logs.config.parameters import ReadingParameters
@@ -85,6 +87,94 @@ def test_the_place_where_a_map_is_begun_anew_is_found_in_a_long_log(tmp_path):
     path = log_of(tmp_path / "run.mcap", [seen(each) for each in columns])
     assert read(path, part=1)[0] == [each - 5 for each in columns[:160]]
     assert read(path, part=2)[0] == [each - 5 for each in columns[160:]]
+
+
+def bag_of(path, maps, nodes):
+    """A ROS 1 bag whose maps come from nodes that it names."""
+    writer = rosbag1.Writer(path)
+    with writer:
+        name = message_type(maps[0])
+        connections = {
+            node: writer.add_connection("/map", name, typestore=typestore(1), callerid=node)
+            for node in dict.fromkeys(nodes)
+        }
+        for k, (each, node) in enumerate(zip(maps, nodes, strict=True)):
+            writer.write(connections[node], START_NS + k * 10**9, serialized(each, 1))
+    return path
+
+
+def mcap_of(path, maps, channels):
+    """An MCAP with several channels of one topic."""
+    definition = typestore(2).generate_msgdef("nav_msgs/msg/OccupancyGrid", ros_version=2)[0].encode()
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start(profile="ros2")
+        schema = writer.register_schema("nav_msgs/msg/OccupancyGrid", "ros2msg", definition)
+        ids = {name: writer.register_channel("/map", "cdr", schema) for name in dict.fromkeys(channels)}
+        for k, (each, name) in enumerate(zip(maps, channels, strict=True)):
+            writer.add_message(ids[name], START_NS + k * 10**9, serialized(each, 2), START_NS + k * 10**9)
+        writer.finish()
+    return path
+
+
+@pytest.mark.parametrize("write", [bag_of, mcap_of])
+def test_publishers_are_told_apart_by_their_connections_also_on_one_grid(write, tmp_path):
+    pairs = [(Map(seen(columns)), Map(seen(140))) for columns in GROWING]
+    maps, nodes = [each for pair in pairs for each in pair], ["/slam", "/map_server"] * len(pairs)
+    path = write(tmp_path / ("run.bag" if write is bag_of else "run.mcap"), maps, nodes)
+    free, part, kinds = read(path)
+    assert free == [columns - 5 for columns in GROWING]
+    assert part == {"analyzed": [1], "count": 2}
+    named = (
+        "/slam, /map_server publish in turn" if write is bag_of else "channel 1, channel 2 publish in turn"
+    )
+    assert named in kinds["parts"].first[0]["message"]
+    assert read(path, part=2)[0] == [135]
+
+
+@pytest.mark.parametrize("nodes", [["/slam"] * 20, ["/slam"] * 5 + ["/slam_again"] * 15, None])
+def test_a_map_that_is_begun_anew_on_grids_that_repeat_is_of_one_publisher(nodes, tmp_path):
+    left = [
+        np.pad(seen(columns, 180), ((0, 0), (20 * (k % 2), 20 * (1 - k % 2))), constant_values=-1)
+        for k in range(4)
+        for columns in GROWING
+    ]
+    maps = [Map(cells, origin=(-1.0 - 5 * (k // 5 % 2), 2.0)) for k, cells in enumerate(left)]
+    path = tmp_path / "run.bag"
+    path = log_of(tmp_path / "run.mcap", maps) if nodes is None else bag_of(path, maps, nodes)
+    free, part, kinds = read(path)
+    assert part == {"analyzed": [1, 2, 3, 4], "count": 4}
+    assert len(free) == 20
+    assert "the map is begun anew" in kinds["parts"].first[0]["message"]
+
+
+def building(rows, columns):
+    """Walls at some rows and columns, and floor between them."""
+    cells = np.full((100, 200), -1, np.int8)
+    cells[rows[0] : rows[-1], columns[0] : columns[-1]] = 0
+    cells[rows[0] : rows[-1], columns] = cells[np.array(rows)[:, None], columns[0] : columns[-1]] = 100
+    return cells
+
+
+HOUSE = building([5, 25, 40, 90], [5, 30, 60, 110, 140, 170])
+OTHER = building([8, 17, 60, 70, 97], [20, 43, 55, 85, 101, 155, 194])
+
+
+@pytest.mark.parametrize("far_m", [0.0, 50.0])
+def test_another_building_of_the_same_size_is_a_part_of_its_own(far_m, tmp_path):
+    growing = [np.where(np.arange(200) < columns, HOUSE, -1) for columns in GROWING]
+    other = Map(OTHER, origin=(far_m - 1, 2.0))
+    path = log_of(tmp_path / "run.mcap", [*growing, other, other])
+    assert read(path)[1] == {"analyzed": [1, 2], "count": 2}
+    assert len(read(path, part=1)[0]) == 5
+    # One bad map between others is none.
+    assert read(log_of(tmp_path / "bad.mcap", [*growing, other, HOUSE]))[1] is None
+
+
+def test_a_map_that_is_moved_as_a_whole_stays_of_one_part(tmp_path):
+    growing = [np.where(np.arange(200) < columns, HOUSE, -1) for columns in GROWING]
+    moved = [Map(HOUSE, origin=(0.5, 2.5)), Map(HOUSE, origin=(0.5, 2.5), stamp_ns=START_NS + 1)]
+    assert read(log_of(tmp_path / "run.mcap", [*growing, *moved]))[1] is None
 
 
 def grown(columns, left):
