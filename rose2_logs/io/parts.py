@@ -288,7 +288,7 @@ def _floor(name: str) -> str:
 
 
 def _is_continued(before: Grid, now: Grid, occupancy: OccupancyParameters) -> bool:
-    """Whether a map knows most of the floor of another one, and most walls of that one are walls in it, too."""
+    """Whether a map knows most of the floor of another one, and has most of its walls."""
     import cv2
 
     floor, walls = classify(before.cells, occupancy)
@@ -360,15 +360,18 @@ def _grids_in_turn(count: int, facts: Callable[[int], MapFacts | None]) -> list[
 def _begins(spread: Sequence[int], maps: _Maps) -> list[int]:
     """Places of the maps that are begun anew."""
     begins = []
+    before = spread[0]
     for low, high in pairwise(spread):
-        if not maps.is_other(low, high, FALLEN_SHARE):
+        if not maps.is_other(before, high, FALLEN_SHARE):
+            before = high
             continue
         for place in range(low + 1, high + 1):
-            if not maps.is_other(place - 1, place, FALLEN_SHARE):
-                continue
-            then = place + 1
-            if then > spread[-1] or maps.facts(then) is None or maps.is_other(place - 1, then, BACK_SHARE):
+            if maps.is_other(before, place, FALLEN_SHARE):
+                then = place + 1
+                if then <= spread[-1] and maps.facts(then) and not maps.is_other(before, then, BACK_SHARE):
+                    continue  # a bad map: the next one goes on from those before
                 begins.append(place)
+            before = place
     return begins
 
 
