@@ -20,6 +20,7 @@ from rose2_logs.config.parameters import Parameters
 from rose2_logs.config.run_options import RunOptions, check_option, options_of, with_detail
 from rose2_logs.config.selection import Selection
 from rose2_logs.errors import InvalidMapError, ParameterError
+from rose2_logs.io import map_topics as map_topics_of_log
 from rose2_logs.io import open_log as open_log_reader
 from rose2_logs.io.log import LogReader
 from rose2_logs.model.occupancy import GridGeometry, OccupancySnapshot, free_area_m2
@@ -32,7 +33,7 @@ from rose2_logs.workflows.compare import compare_runs, compare_stored
 from rose2_logs.workflows.evaluate import Evaluation, evaluate_method
 from rose2_logs.workflows.segment import Segmentation, read_static_map, segment_snapshot
 
-__all__ = ["analyze", "compare", "evaluate", "load", "open_log", "read_map", "segment", "track"]
+__all__ = ["analyze", "compare", "evaluate", "load", "map_topics", "open_log", "read_map", "segment", "track"]
 
 GivenParameters = Parameters | Mapping[str, Any] | None
 """Parameters, or a mapping of dotted names (``{"walls.extension_m": 6}``); None for the defaults."""
@@ -347,6 +348,33 @@ def open_log(
     )
 
 
+def map_topics(log: str | Path | Sequence[str | Path], *, message_type: str | None = None) -> list[str]:
+    """List the topics of a log that hold maps, to analyze one after the other.
+
+    Parameters
+    ----------
+    log : str, path, or a sequence of them
+        As for `open_log`.
+    message_type : str, optional
+        Type of the maps on channels without a schema.
+
+    Raises
+    ------
+    LogError, NoMapTopicError, ParameterError
+        As for `open_log`.
+
+    Examples
+    --------
+    >>> import rose2_logs as rl
+    >>> log = "sample_logs/office.mcap"
+    >>> {topic: rl.analyze(log, topic=topic, max_snapshots=2) for topic in rl.map_topics(log)}
+    {'/map': <Run office: 2 maps, 18 rooms at the end>}
+    """
+    check_option(RunOptions, "message_type", message_type)
+    path = [_path(each, "log") for each in log] if isinstance(log, list | tuple) else _path(log, "log")
+    return map_topics_of_log(path, Parameters().reading.with_type(message_type))
+
+
 def read_map(map_file: str | Path, resolution_m: float | None = None) -> OccupancySnapshot:
     """Read a saved map.
 
@@ -381,18 +409,22 @@ def _read_map(map_file: str | Path, resolution_m: float | None, parameters: Para
     return read_static_map(_path(map_file, "map_file"), resolution_m, parameters)
 
 
-def load(folder: str | Path) -> Run:
+def load(folder: str | Path, *, part: int | None = None) -> Run:
     """Open the results of a run.
 
     Parameters
     ----------
     folder : str or path
         The folder that `analyze` or the command line wrote for one log.
+    part : int, optional
+        Take one part alone, of a log in which the map was begun anew; `Run.parts` lists them.
 
     Raises
     ------
     ResultsError
         If the folder holds no results, or those of another version.
+    ParameterError
+        If there is no such part.
 
     Examples
     --------
@@ -403,7 +435,7 @@ def load(folder: str | Path) -> Run:
     ...     rl.load(f"{folder}/office")
     <Run office: 3 maps, 18 rooms at the end>
     """
-    return Run(_path(folder, "folder"))
+    return Run(_path(folder, "folder"), part=part)
 
 
 def compare(

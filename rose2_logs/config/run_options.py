@@ -223,7 +223,7 @@ class RunOptions:
         None,
         "Topic of the maps. By default /map, or the only topic that holds maps.",
         panel=MAPS,
-        commands=BOTH,
+        commands=("batch",),
         metavar="NAME",
         decides=True,
     )

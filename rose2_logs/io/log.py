@@ -326,11 +326,15 @@ class LogReader:
         times = self.source.log_times(self.topic)
         if len(times) > 1 and isinstance(self.source, MapFilesSource):
             return self._chosen(find_saved_parts(self.source.names, times, self._grid, self._occupancy))
-        # Patches have no map of their own, and maps of one time cannot be told apart.
-        if len(self._topics) > 1 or len(np.unique(times)) < len(times):
-            return self._chosen(Parts((Part(times, 0.0, len(times)),)))
+        whole = Parts((Part(times, 0.0, len(times)),))
+        if len(np.unique(times)) < len(times):
+            return self._chosen(whole)  # maps of one time cannot be told apart
         publishers = self.source.publishers(self.topic)
-        return self._chosen(find_parts(times, self._grid, self._occupancy, publishers))
+        found = find_parts(times, self._grid, self._occupancy, publishers)
+        if len(self._topics) > 1 and len(found.parts) > 1:
+            # Patches are of the full map before them, which does not say who published them.
+            found = found.with_patches(self._all_times()) if found.is_one_run else whole
+        return self._chosen(found)
 
     def _chosen(self, found: Parts) -> tuple[dict[int, Part], int]:
         """The parts that were asked for, else all if they are of one run, else the likeliest."""
@@ -355,8 +359,12 @@ class LogReader:
                     return self.cell_reading.of(decoded)
         return None
 
+    def _all_times(self) -> Times:
+        """Log times (N,) of all maps and patches, ascending."""
+        return np.sort(np.concatenate([self.source.log_times(topic) for topic in self._topics]))
+
     def _times_in_range(self) -> Times:
-        times = np.sort(np.concatenate([self.source.log_times(topic) for topic in self._topics]))
+        times = self._all_times()
         if len(times) and self.part_count > 1:
             times = np.concatenate([part.times for part in self._parts.values()])
         if not len(times):

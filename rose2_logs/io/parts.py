@@ -107,6 +107,15 @@ class Parts:
         key = [(each.maps, each.free_m2) for each in self.parts]
         return max(places, key=lambda place: (*key[place], place)) + 1
 
+    def with_patches(self, times: Times) -> Parts:
+        """Give each of several parts that follow one another all times (N,) from its first map on."""
+        begins = [0, *(int(np.searchsorted(times, part.times[0])) for part in self.parts[1:]), len(times)]
+        parts = (
+            replace(part, times=times[low:high])
+            for part, (low, high) in zip(self.parts, pairwise(begins), strict=True)
+        )
+        return replace(self, parts=tuple(parts))
+
     def text(self, number: int | None) -> str:
         """Return what is told of the choice of one part, or of all."""
         sizes = ", ".join(

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from mcap.writer import Writer
 from PIL import Image
-from reader_logs import SHARED, START_NS, Map, McapLog, message_type, serialized, typestore
+from reader_logs import SHARED, START_NS, Map, McapLog, Update, message_type, serialized, typestore
 from rosbags import rosbag1
 
 import rose2_logs as rl
@@ -158,6 +158,19 @@ def building(rows, columns):
 
 HOUSE = building([5, 25, 40, 90], [5, 30, 60, 110, 140, 170])
 OTHER = building([8, 17, 60, 70, 97], [20, 43, 55, 85, 101, 155, 194])
+
+
+def test_patches_are_of_the_part_of_the_map_before_them(tmp_path):
+    log = McapLog(tmp_path / "run.mcap")
+    for k, columns in enumerate((GROWING[0], *GROWING[1:], GROWING[0], *GROWING[1:])):
+        time_ns = START_NS + k * 10**9
+        if k in (0, 4, 5):
+            log.add("/map", time_ns, Map(seen(columns)))
+        else:
+            log.add("/map_updates", time_ns, Update(0, 0, seen(columns)))
+    path = log.close()
+    assert read(path)[:2] == ([columns - 5 for columns in GROWING * 2], {"analyzed": [1, 2], "count": 2})
+    assert read(path, part=2)[0] == [columns - 5 for columns in GROWING]
 
 
 @pytest.mark.parametrize("far_m", [0.0, 50.0])

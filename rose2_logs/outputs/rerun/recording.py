@@ -48,8 +48,8 @@ class RerunRecording(Sink):
     """Sink that writes a ``.rrd`` with its layout, or shows the run in an open viewer, or both.
 
     Timelines are ``message_log_time`` and ``ros2_timestamp`` (as in Rerun's own MCAP importer), ``snapshot``,
-    and ``coverage``, the greatest so far, in steps of 1e-4; a part of the run that begins anew goes on from the
-    next whole number, so that its 50 % stand at 150 %. Rooms stand under ``/world/rooms/TRACK``, their
+    and ``coverage``, the greatest so far, in steps of 1e-4; a part of the run that begins anew goes on where
+    the one before ends, so that its 50 % stand at 150 %. Rooms stand under ``/world/rooms/TRACK``, their
     areas under ``/run/area/TRACK``; they are cleared when their track is lost. What has not changed since the
     snapshot before is not logged again. The lanes of the tracks and the convergence, which only the last map
     tells, follow at the end; before them the back-projected rooms, in a second pass, if there is one.

@@ -98,8 +98,8 @@ def _parts_text(parts: Mapping[int, RunSummary]) -> str:
         for number, part in parts.items()
     )
     return (
-        f"**The map was begun anew**: {', '.join(named)}. Coverage is that of the part; what follows is of the "
-        "last one."
+        f"**The map was begun anew**: {', '.join(named)}. Coverage is that of the part; what follows is of "
+        "the last one."
     )
 
 
