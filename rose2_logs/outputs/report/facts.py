@@ -44,7 +44,8 @@ class Note:
 def subtitle(results: Run) -> list[tuple[str, str]]:
     """Log, time, topic and method, by name."""
     summary, found = results.summary, results.summary["results"]
-    span = results.columns["time_s"][-1]
+    time_s = results.columns["time_s"]
+    span = time_s[-1] - time_s[0]
     date = date_of(found.get("first_log_time_ns"))
     began = f"{date}, " if date else ""
     source = summary.get("input", {})
