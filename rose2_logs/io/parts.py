@@ -19,7 +19,7 @@ from rose2_logs.config.parameters import OccupancyParameters
 from rose2_logs.config.selection import Times
 from rose2_logs.config.tracking import TrackingParameters
 from rose2_logs.io.grids import Grid
-from rose2_logs.model.occupancy import UNKNOWN, BoolArray, GridGeometry, classify
+from rose2_logs.model.occupancy import UNKNOWN, BoolArray, FloatArray, GridGeometry, classify
 from rose2_logs.system.text import counted
 from rose2_logs.tracking.registration import WallFit, wall_faces
 
@@ -53,8 +53,10 @@ FLOOR = re.compile(
 """What names of maps tell of floors."""
 LEAST_WALL_CELLS = 100
 """Walls that two maps show, 5 m of 5 cm, below which they are not compared."""
-MOST_COMPARED = 5000
+MOST_COMPARED = 2000
 """Cells of walls and of the floor, evenly taken, that are enough to compare."""
+MOST_STEPS = 4
+"""Cells between a wall and the end of `WALL_REACH_M`, of 5 cm, of which each is looked at."""
 
 
 @dataclass(frozen=True)
@@ -144,8 +146,9 @@ class _Maps:
     ) -> None:
         self._times, self._read, self._occupancy = times, read, occupancy
         self._facts: dict[int, MapFacts | None] = {}
-        self._has_walls_of: dict[tuple[int, int], bool] = {}
-        self._held: tuple[int, Grid | None] = (-1, None)
+        self._is_continued: dict[tuple[int, int], bool] = {}
+        self._has_moved: dict[tuple[int, int], bool] = {}
+        self._held: tuple[int, _Seen | None] = (-1, None)
 
     def facts(self, place: int) -> MapFacts | None:
         """Return what is known of a map; None if it cannot be read."""
@@ -162,14 +165,14 @@ class _Maps:
 
     def _has_walls(self, before: int, now: int) -> bool:
         """Whether a map shows the walls of an earlier one, maybe moved as a whole."""
-        if (before, now) not in self._has_walls_of:
+        if (before, now) not in self._is_continued:
             self._look(before)
             self._look(now)
-        if not self._has_walls_of[before, now]:
+        if not self._is_continued[before, now] and (before, now) not in self._has_moved:
             then, there = (self._read(int(self._times[place])) for place in (before, now))
-            if then is not None and there is not None:
-                self._has_walls_of[before, now] = _has_moved(then, there, self._occupancy)
-        return self._has_walls_of[before, now]
+            is_known = then is not None and there is not None
+            self._has_moved[before, now] = is_known and _has_moved(then, there, self._occupancy)
+        return self._is_continued[before, now] or self._has_moved[before, now]
 
     def _look(self, place: int) -> None:
         """Read a map, and compare it with the one that was read before."""
@@ -177,11 +180,10 @@ class _Maps:
         if place == before:
             return
         now = self._read(int(self._times[place]))
-        self._facts[place] = None if now is None else facts_of(now, self._occupancy)
-        self._has_walls_of.setdefault(
-            (before, place), held is None or now is None or _is_continued(held, now, self._occupancy)
-        )
-        self._held = place, now
+        if held is not None and now is not None:
+            self._is_continued[before, place] = _is_continued(held, now, self._occupancy)
+        self._held = place, None if now is None else _Seen.of(now, self._occupancy)
+        self._facts[place] = None if self._held[1] is None else self._held[1].facts
 
 
 def find_parts(
@@ -239,10 +241,21 @@ def _returns(publishers: Sequence[str]) -> int:
     return returns
 
 
-def facts_of(grid: Grid, occupancy: OccupancyParameters) -> MapFacts:
-    """Return what is compared of a map in percent."""
-    free, _ = classify(grid.cells, occupancy)
-    return MapFacts(grid.geometry, float(np.count_nonzero(free)) * grid.geometry.cell_area_m2)
+@dataclass(frozen=True, eq=False)
+class _Seen:
+    """A map as the next one is compared with it: its facts, and some of its floor and walls, (N, 2) meters."""
+
+    facts: MapFacts
+    floor_m: FloatArray
+    walls_m: FloatArray
+
+    @classmethod
+    def of(cls, grid: Grid, occupancy: OccupancyParameters) -> _Seen:
+        """Look at a map in percent."""
+        free, occupied = classify(grid.cells, occupancy)
+        area_m2 = float(np.count_nonzero(free)) * grid.geometry.cell_area_m2
+        floor_m, walls_m = (_some(cells, grid.geometry) for cells in (free, occupied))
+        return cls(MapFacts(grid.geometry, area_m2), floor_m, walls_m)
 
 
 def find_saved_parts(
@@ -269,20 +282,21 @@ def find_saved_parts(
     """
     begins: list[int] = [0]
     areas: list[float] = []
-    latest: tuple[Grid, float] | None = None
+    latest: _Seen | None = None
     for place, time_ns in enumerate(times.tolist()):
         now = read(time_ns)
-        area_m2 = 0.0 if now is None else facts_of(now, occupancy).free_m2
+        seen = None if now is None else _Seen.of(now, occupancy)
+        area_m2 = 0.0 if seen is None else seen.facts.free_m2
         areas.append(area_m2)
         is_next = latest is None or _floor(names[place]) == _floor(names[place - 1])
         if now is not None and latest is not None and area_m2 >= LEAST_AREA_M2:
-            before, before_m2 = latest
-            is_next &= area_m2 >= KEPT_SHARE * before_m2 and _is_continued(before, now, occupancy)
+            is_kept = area_m2 >= KEPT_SHARE * latest.facts.free_m2
+            is_next &= is_kept and _is_continued(latest, now, occupancy)
         if not is_next:
             begins.append(place)
         # A bad map between others, without free cells, parts nothing.
-        if now is not None and (area_m2 >= LEAST_AREA_M2 or not is_next):
-            latest = now, area_m2
+        if seen is not None and (area_m2 >= LEAST_AREA_M2 or not is_next):
+            latest = seen
     parts = [
         Part(times[low:high], areas[high - 1], len(set(areas[low:high])))
         for low, high in pairwise([*begins, len(times)])
@@ -296,38 +310,40 @@ def _floor(name: str) -> str:
     return found[0] if found else ""
 
 
-def _is_continued(before: Grid, now: Grid, occupancy: OccupancyParameters) -> bool:
+def _is_continued(before: _Seen, now: Grid, occupancy: OccupancyParameters) -> bool:
     """Whether a map knows most of the floor of another one, and has most of its walls."""
-    import cv2
-
-    floor, walls = classify(before.cells, occupancy)
-    row, column = _places(floor, before.geometry, now.geometry)
-    if np.count_nonzero(now.cells[row, column] != UNKNOWN) < FALLEN_SHARE * min(
-        np.count_nonzero(floor), MOST_COMPARED
-    ):
+    floor = _around(now, before.floor_m, 0.0)
+    if np.count_nonzero(floor != UNKNOWN) < FALLEN_SHARE * len(floor):
         return False
-    free, occupied = classify(now.cells, occupancy)
-    row, column = _places(walls, before.geometry, now.geometry)
-    reach = 2 * round(WALL_REACH_M / now.geometry.resolution_m) + 1
-    near = cv2.dilate(occupied.astype(np.uint8), np.ones((reach, reach), np.uint8)).astype(bool)
-    shown = near[row, column] | free[row, column]
+    around = _around(now, before.walls_m, WALL_REACH_M)
+    free, occupied = classify(around, occupancy)
+    near = occupied.any(axis=1)
+    shown = near | free[:, free.shape[1] // 2]
     if np.count_nonzero(shown) < LEAST_WALL_CELLS:
         return True
-    return bool(np.count_nonzero(near[row, column]) >= SAME_WALLS_SHARE * np.count_nonzero(shown))
+    return bool(np.count_nonzero(near) >= SAME_WALLS_SHARE * np.count_nonzero(shown))
 
 
-def _places(
-    cells: BoolArray, geometry: GridGeometry, other: GridGeometry
-) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Rows and columns (N,) on another grid of at most `MOST_COMPARED` cells (H, W) that lie on it."""
+def _some(cells: BoolArray, geometry: GridGeometry) -> FloatArray:
+    """World centers (N, 2) of at most `MOST_COMPARED` cells (H, W), evenly taken."""
     places = np.flatnonzero(cells)
     if len(places) > MOST_COMPARED:
         places = places[np.linspace(0, len(places) - 1, MOST_COMPARED).astype(np.intp)]
-    row, column = np.moveaxis(
-        other.world_to_cell(geometry.cell_centers(*np.unravel_index(places, cells.shape))), -1, 0
-    )
-    inside = (row >= 0) & (row < other.shape[0]) & (column >= 0) & (column < other.shape[1])
-    return row[inside], column[inside]
+    return geometry.cell_centers(*np.unravel_index(places, cells.shape))
+
+
+def _around(grid: Grid, points_m: FloatArray, reach_m: float) -> NDArray[np.int8]:
+    """Cells (N, K) of a map within reach of points (N, 2), its own in the middle; unknown outside the map."""
+    reach = round(reach_m / grid.geometry.resolution_m)
+    # Of finer cells not all are looked at: walls are thicker than they are.
+    steps = np.unique(np.linspace(-reach, reach, 2 * min(reach, MOST_STEPS) + 1).round().astype(np.intp))
+    row, column = np.moveaxis(grid.geometry.world_to_cell(points_m), -1, 0)
+    row = (row[:, None, None] + steps[:, None]).repeat(len(steps), axis=2)
+    column = (column[:, None, None] + steps).repeat(len(steps), axis=1)
+    height, width = grid.cells.shape
+    is_inside = (row >= 0) & (row < height) & (column >= 0) & (column < width)
+    cells = grid.cells[row.clip(0, height - 1), column.clip(0, width - 1)]
+    return np.where(is_inside, cells, np.int8(UNKNOWN)).reshape(len(points_m), len(steps) ** 2)
 
 
 def _has_moved(before: Grid, now: Grid, occupancy: OccupancyParameters) -> bool:
