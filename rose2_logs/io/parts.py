@@ -243,7 +243,7 @@ def _returns(publishers: Sequence[str]) -> int:
 
 @dataclass(frozen=True, eq=False)
 class _Seen:
-    """A map as the next one is compared with it: its facts, and some of its floor and walls, (N, 2) meters."""
+    """A map as the next one is compared with it: its facts, and points (N, 2) of its floor and walls."""
 
     facts: MapFacts
     floor_m: FloatArray
