@@ -170,8 +170,9 @@ class _Maps:
             self._look(now)
         if not self._is_continued[before, now] and (before, now) not in self._has_moved:
             then, there = (self._read(int(self._times[place])) for place in (before, now))
-            is_known = then is not None and there is not None
-            self._has_moved[before, now] = is_known and _has_moved(then, there, self._occupancy)
+            if then is None or there is None:
+                return False
+            self._has_moved[before, now] = _has_moved(then, there, self._occupancy)
         return self._is_continued[before, now] or self._has_moved[before, now]
 
     def _look(self, place: int) -> None:
