@@ -221,9 +221,11 @@ class LogReader:
             return {None: self.last()}
         times = np.unique(self._times_in_range())
         parts = np.array([self.part_at(time) for time in times.tolist()])
-        lasts = {number: self._last_of(times[parts == number], ReadCounts()) for number in self._parts}
-        found = {number: last for number, last in lasts.items() if last is not None}
-        return {**found} if found else {None: self.last()}
+        lasts: dict[int | None, OccupancySnapshot] = {}
+        for number in self._parts:
+            if (last := self._last_of(times[parts == number], ReadCounts())) is not None:
+                lasts[number] = last
+        return lasts or {None: self.last()}
 
     def _last_of(self, times: Times, counts: ReadCounts) -> OccupancySnapshot | None:
         # Search backwards: a log may end with messages that are damaged or have no cells.
