@@ -94,7 +94,9 @@ class TrackedStream:
         self.unchanged = 0
         self.last_log_time_ns: int | None = None
         self._snapshots = snapshots
-        self._final_free_m2 = final_free_m2 if isinstance(final_free_m2, Mapping) else {None: final_free_m2}
+        self._final_free_m2: Mapping[int | None, float | None] = (
+            final_free_m2 if isinstance(final_free_m2, Mapping) else {None: final_free_m2}
+        )
         self._part_at = part_at
         self._part: int | None = None
         self._workers = workers

@@ -80,7 +80,8 @@ def analyze(
         other = "--topic" if topics else "--map-from"
         raise ParameterError(f"--all-topics and {other} exclude each other; pass one of them")
     # Whatever is wrong with them is told before the first log is read.
-    of_topics = [dataclasses.replace(options, topic=topic) for topic in dict.fromkeys(topics or [None])]
+    asked: list[str | None] = [*dict.fromkeys(topics or [])]
+    of_topics = [dataclasses.replace(options, topic=topic) for topic in asked or [None]]
     failed = 0
     for log, name in zip(logs, names, strict=True):
         try:
