@@ -9,7 +9,17 @@ from typing import Any
 __version__ = "0.2.0"
 
 _HOMES = {
-    "api": ("analyze", "compare", "evaluate", "load", "open_log", "read_map", "segment", "track"),
+    "api": (
+        "analyze",
+        "compare",
+        "evaluate",
+        "load",
+        "map_topics",
+        "open_log",
+        "read_map",
+        "segment",
+        "track",
+    ),
     "config.parameters": ("Parameters",),
     "config.run_options": ("RunOptions",),
     "config.selection": ("Selection",),

@@ -11,6 +11,9 @@ from rose2_logs.api import (
     load as load,
 )
 from rose2_logs.api import (
+    map_topics as map_topics,
+)
+from rose2_logs.api import (
     open_log as open_log,
 )
 from rose2_logs.api import (

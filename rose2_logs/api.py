@@ -20,6 +20,7 @@ from rose2_logs.config.parameters import OccupancyParameters, Parameters
 from rose2_logs.config.run_options import RunOptions, check_option, options_of, with_detail
 from rose2_logs.config.selection import Selection
 from rose2_logs.errors import InvalidMapError, ParameterError
+from rose2_logs.io import map_topics as map_topics_of_log
 from rose2_logs.io import open_log as open_log_reader
 from rose2_logs.io.cell_values import (
     LEAST_CELLS,
@@ -39,7 +40,7 @@ from rose2_logs.workflows.compare import compare_runs, compare_stored
 from rose2_logs.workflows.evaluate import Evaluation, evaluate_method
 from rose2_logs.workflows.segment import Segmentation, read_static_map, segment_snapshot
 
-__all__ = ["analyze", "compare", "evaluate", "load", "open_log", "read_map", "segment", "track"]
+__all__ = ["analyze", "compare", "evaluate", "load", "map_topics", "open_log", "read_map", "segment", "track"]
 
 GivenParameters = Parameters | Mapping[str, Any] | None
 """Parameters, or a mapping of dotted names (``{"walls.extension_m": 6}``); None for the defaults."""
@@ -339,7 +340,8 @@ def open_log(
     message_type : str, optional
         Type of the maps on channels without a schema.
     part : int, optional
-        Which part of the maps, from 1, where they are not of one run; by default the one that tells most.
+        Which part of the maps to take alone, from 1; by default all where the map was begun anew, and where
+        several nodes publish the one that tells most.
     map_from : str, optional
         Topic of laser scans to build the maps from, instead of reading recorded ones.
     map_frame : str, optional
@@ -387,6 +389,33 @@ def open_log(
     )
 
 
+def map_topics(log: str | Path | Sequence[str | Path], *, message_type: str | None = None) -> list[str]:
+    """List the topics of a log that hold maps, to analyze one after the other.
+
+    Parameters
+    ----------
+    log : str, path, or a sequence of them
+        As for `open_log`.
+    message_type : str, optional
+        Type of the maps on channels without a schema.
+
+    Raises
+    ------
+    LogError, NoMapTopicError, ParameterError
+        As for `open_log`.
+
+    Examples
+    --------
+    >>> import rose2_logs as rl
+    >>> log = "sample_logs/office.mcap"
+    >>> {topic: rl.analyze(log, topic=topic, max_snapshots=2) for topic in rl.map_topics(log)}
+    {'/map': <Run office: 2 maps, 18 rooms at the end>}
+    """
+    check_option(RunOptions, "message_type", message_type)
+    path = [_path(each, "log") for each in log] if isinstance(log, list | tuple) else _path(log, "log")
+    return map_topics_of_log(path, Parameters().reading.with_type(message_type))
+
+
 def read_map(map_file: str | Path, resolution_m: float | None = None) -> OccupancySnapshot:
     """Read a saved map.
 
@@ -421,18 +450,22 @@ def _read_map(map_file: str | Path, resolution_m: float | None, parameters: Para
     return read_static_map(_path(map_file, "map_file"), resolution_m, parameters)
 
 
-def load(folder: str | Path) -> Run:
+def load(folder: str | Path, *, part: int | None = None) -> Run:
     """Open the results of a run.
 
     Parameters
     ----------
     folder : str or path
         The folder that `analyze` or the command line wrote for one log.
+    part : int, optional
+        Take one part alone, of a log in which the map was begun anew; `Run.parts` lists them.
 
     Raises
     ------
     ResultsError
         If the folder holds no results, or those of another version.
+    ParameterError
+        If there is no such part.
 
     Examples
     --------
@@ -443,7 +476,7 @@ def load(folder: str | Path) -> Run:
     ...     rl.load(f"{folder}/office")
     <Run office: 3 maps, 18 rooms at the end>
     """
-    return Run(_path(folder, "folder"))
+    return Run(_path(folder, "folder"), part=part)
 
 
 def compare(

@@ -135,6 +135,10 @@ def tables_page() -> str:
         "All tables are Parquet. Lengths are in meters in the frame of the map unless the column says "
         "otherwise. The files contain these descriptions, too: `rose2_logs.load(folder).rooms.columns`, or "
         "`pyarrow.parquet.read_schema(path).field(name).metadata`.",
+        "",
+        "Where the map was begun anew within the log, or several nodes publish it, each table has one "
+        f"column more, `{table_schemas.PART.name}`: {_meaning(table_schemas.PART)}. Its events may be "
+        "`part_begun`, with track 0.",
     ]
     for name, (schema, about) in TABLES.items():
         lines += ["", f"## {name}", "", about, "", "| column | type | meaning |", "|---|---|---|"]

@@ -224,7 +224,7 @@ class RunOptions:
         None,
         "Topic of the maps. By default /map, or the only topic that holds maps.",
         panel=MAPS,
-        commands=BOTH,
+        commands=("batch",),
         metavar="NAME",
         decides=True,
     )
@@ -241,8 +241,9 @@ class RunOptions:
     )
     part: int | None = option(
         None,
-        "Which part of the maps, from 1, where they are not of one run: where two nodes publish on the "
-        "topic, or the map was begun anew. By default the one that tells most.",
+        "Which part of the maps to take alone, from 1, where the map was begun anew or several nodes publish "
+        "on the topic. By default all that were begun anew, each with its own coverage and tracks; of "
+        "several nodes the one that tells most.",
         panel=MAPS,
         commands=BOTH,
         metavar="N",

@@ -9,6 +9,8 @@ from rose2_logs.tracking.tracked_snapshot import RoomEvent
 
 def event_text(event: RoomEvent) -> str:
     """Describe an event in a sentence."""
+    if event.kind == "part_begun":
+        return "the map was begun anew: a new part of the run"
     if event.motion is not None:
         (x, y), turn_deg = event.motion.shift_xy_m, math.degrees(event.motion.turn_rad)
         return f"the map shifted by {x:+.2f}, {y:+.2f} m and turned by {turn_deg:+.1f}°"

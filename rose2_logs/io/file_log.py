@@ -217,6 +217,18 @@ class FileLog(MessageSource):
         """Log times of all map messages and patches of `topic`, nanoseconds, sorted."""
         return np.array([each.time_ns for each in self._topic_places(topic)], np.int64)
 
+    def publishers(self, topic: str) -> Sequence[str] | None:
+        """Return who published each message of `topic`, by node or connection; None if it is not known."""
+        places = self._topic_places(topic)
+        channels = [self._files[each.file].channels[each.place.channel_id] for each in places]
+        names = [channel.metadata.get("callerid", "") for channel in channels]
+        if all(names):
+            return names
+        # One channel may hold the messages of several nodes, and its number is that of a file.
+        if len({each.file for each in places}) > 1 or len({channel.id for channel in channels}) < 2:
+            return None
+        return [f"channel {channel.id}" for channel in channels]
+
     def recorded_ns(self, time_ns: int) -> int:
         """Return the log time that stands in the file."""
         for places in self._places.values() if self._delays else ():

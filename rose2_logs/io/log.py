@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import logging
+from bisect import bisect_right
 from collections import deque
 from collections.abc import Iterator
 from contextlib import suppress
@@ -20,7 +21,7 @@ from rose2_logs.io.cell_values import MAPS_LOOKED_AT, OVERRULED, CellReading, co
 from rose2_logs.io.grids import Grid, MapWarning, Patch
 from rose2_logs.io.map_stream import MapChecks, MapStream, ReadCounts, without_far_cells
 from rose2_logs.io.messages import is_called_map, is_patch_type, ros_type
-from rose2_logs.io.parts import MapFacts, Part, Parts, facts_of, find_parts, find_saved_parts
+from rose2_logs.io.parts import Part, Parts, find_parts, find_saved_parts
 from rose2_logs.io.poses import RobotPath
 from rose2_logs.io.saved_maps import MapFilesSource
 from rose2_logs.io.scan_topics import mappable_topics
@@ -140,9 +141,22 @@ class LogReader:
         decided: dict[str, Any] = {"values": self.source.value_reading or self.cell_reading.as_json()}
         if self._path_origin is not None:
             decided["path"] = self._path_origin
-        if self._part is not None:
-            decided["part"] = self._part[1]
+        if self.part_count > 1:
+            decided["parts"] = {"count": self.part_count, "analyzed": list(self._parts)}
         return decided
+
+    @property
+    def part_count(self) -> int:
+        """How many parts the maps of the topic have that do not grow from each other."""
+        return self._found_parts[1]
+
+    def part_at(self, log_time_ns: int) -> int | None:
+        """Return which part a map is of that is read, from 1; None if the topic has but one."""
+        if self.part_count == 1:
+            return None
+        numbers = list(self._parts)
+        begins = [int(part.times[0]) for part in self._parts.values()]
+        return numbers[max(bisect_right(begins, log_time_ns) - 1, 0)]
 
     def snapshots(self) -> Iterator[OccupancySnapshot]:
         """Yield the selected maps in log time order.
@@ -190,13 +204,37 @@ class LogReader:
             As for `snapshots`.
         """
         counts = ReadCounts()
+        found = self._last_of(np.unique(self._times_in_range()), counts)
+        if found is None:
+            raise self._no_map(counts)
+        return found
+
+    def lasts(self) -> dict[int | None, OccupancySnapshot]:
+        """Return the last map in the time range of each part that has one, by number; see `part_at`.
+
+        Raises
+        ------
+        LogError
+            As for `snapshots`.
+        """
+        if self.part_count == 1:
+            return {None: self.last()}
+        times = np.unique(self._times_in_range())
+        parts = np.array([self.part_at(time) for time in times.tolist()])
+        lasts: dict[int | None, OccupancySnapshot] = {}
+        for number in self._parts:
+            if (last := self._last_of(times[parts == number], ReadCounts())) is not None:
+                lasts[number] = last
+        return lasts or {None: self.last()}
+
+    def _last_of(self, times: Times, counts: ReadCounts) -> OccupancySnapshot | None:
         # Search backwards: a log may end with messages that are damaged or have no cells.
-        for time in np.unique(self._times_in_range())[::-1]:
+        for time in times[::-1]:
             # Several messages may share a log time, as in logs without times: take the last of them.
             latest = deque(self._read(np.array([time]), counts), maxlen=1)
             if latest:
                 return dataclasses.replace(latest[0], index=-1)
-        raise self._no_map(counts)
+        return None
 
     def robot_path(self, frame_id: str, base_frame: str | None = None) -> RobotPath:
         """Return the robot's path over the selected time range.
@@ -209,8 +247,8 @@ class LogReader:
             Frame of the robot's base, where it is none of the usual ones.
         """
         start_ns = self._selection.start_ns
-        if self._part is not None and self._part[1]["number"] > 1:
-            start_ns = max(start_ns or 0, int(self._part[0].times[0]))
+        if (first := next(iter(self._parts))) > 1:
+            start_ns = max(start_ns or 0, int(self._parts[first].times[0]))
         map_topic = self.source.made_from(self.topic)
         path = RobotPath(self.source, frame_id, start_ns, map_topic=map_topic, base_frame=base_frame)
         self._path_origin = path.origin
@@ -285,35 +323,40 @@ class LogReader:
         patches, following = patches[inside], following[inside]
         return np.unique(np.concatenate([chosen, begins, patches[begins[following] <= patches]]))
 
+    @property
+    def _parts(self) -> dict[int, Part]:
+        """The parts of the maps that are read, by number from 1."""
+        return self._found_parts[0]
+
     @cached_property
-    def _part(self) -> tuple[Part, dict[str, int]] | None:
-        """The part of the maps that is read, its number and how many there are; None if there is but one."""
+    def _found_parts(self) -> tuple[dict[int, Part], int]:
+        """The parts that are read, and how many there are."""
         times = self.source.log_times(self.topic)
         if len(times) > 1 and isinstance(self.source, MapFilesSource):
             return self._chosen(find_saved_parts(self.source.names, times, self._grid, self._occupancy))
-        # Patches have no map of their own, and maps of one time cannot be told apart.
-        if len(self._topics) > 1 or len(np.unique(times)) < len(times):
-            found = Parts((Part(times, 0.0, len(times)),))
-        else:
-            found = find_parts(times, self._facts)
+        whole = Parts((Part(times, 0.0, len(times)),))
+        if len(np.unique(times)) < len(times):
+            return self._chosen(whole)  # maps of one time cannot be told apart
+        publishers = self.source.publishers(self.topic)
+        found = find_parts(times, self._grid, self._occupancy, publishers)
+        if len(self._topics) > 1 and len(found.parts) > 1:
+            # Patches are of the full map before them, which does not say who published them.
+            found = found.with_patches(self._all_times()) if found.is_one_run else whole
         return self._chosen(found)
 
-    def _chosen(self, found: Parts) -> tuple[Part, dict[str, int]] | None:
+    def _chosen(self, found: Parts) -> tuple[dict[int, Part], int]:
+        """The parts that were asked for, else all if they are of one run, else the likeliest."""
         count, number = len(found.parts), self._asked_part
         if number is not None and not 1 <= number <= count:
             raise LogError(f"{self.info.path}: {self.topic} has no part {number}; it has {count}")
-        if count == 1:
-            return None
-        if number is None:
-            number = found.likeliest()
-            other = count if number == 1 else 1
-            text = f"{self.info.path}: {self.topic}: {found.text(number)}; part={other} takes another"
+        if number is None and count > 1:
+            number = None if found.is_one_run else found.likeliest()
+            other = "takes one alone" if number is None else "takes another"
+            other = f"part={2 if number == 1 else 1} {other}"
+            text = f"{self.info.path}: {self.topic}: {found.text(number)}; {other}"
             log_warning(logger, "parts", text, file=self.info.path, topic=self.topic)
-        return found.parts[number - 1], {"number": number, "count": count}
-
-    def _facts(self, time_ns: int) -> MapFacts | None:
-        """Look at the map of one log time."""
-        return None if (grid := self._grid(time_ns)) is None else facts_of(grid, self._occupancy)
+        taken = {place: part for place, part in enumerate(found.parts, start=1) if number in (None, place)}
+        return taken, count
 
     def _grid(self, time_ns: int) -> Grid | None:
         """Read the map of one log time; None if there is none."""
@@ -324,10 +367,14 @@ class LogReader:
                     return without_far_cells(self.cell_reading.of(decoded), self._occupancy)[0]
         return None
 
+    def _all_times(self) -> Times:
+        """Log times (N,) of all maps and patches, ascending."""
+        return np.sort(np.concatenate([self.source.log_times(topic) for topic in self._topics]))
+
     def _times_in_range(self) -> Times:
-        times = np.sort(np.concatenate([self.source.log_times(topic) for topic in self._topics]))
-        if len(times) and self._part is not None:
-            times = self._part[0].times
+        times = self._all_times()
+        if len(times) and self.part_count > 1:
+            times = np.concatenate([part.times for part in self._parts.values()])
         if not len(times):
             raise LogError(f"{self.info.path}: no messages on {self.topic}; choose another topic")
         in_range = self._selection.in_range(times)

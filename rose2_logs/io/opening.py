@@ -28,7 +28,7 @@ from rose2_logs.io.discovery import (
     load_yaml,
     plain_name,
 )
-from rose2_logs.io.log import LogReader
+from rose2_logs.io.log import LogReader, choose_topic
 from rose2_logs.io.source import LogInfo, MessageSource
 from rose2_logs.system.text import counted
 from rose2_logs.system.warnings import UNCOUNTED, log_warning
@@ -90,7 +90,8 @@ def open_log(
     occupancy : OccupancyParameters
         What the numbers in the cells mean.
     part : int, optional
-        Which part of a topic, from 1, whose maps are not of one run; by default the one that tells most.
+        Which part of the maps to take alone, from 1; by default all where the map was begun anew, and where
+        several nodes publish the one that tells most.
     map_from : str, optional
         Topic of laser scans to build the maps from, instead of reading recorded ones.
     map_frame : str, optional
@@ -158,6 +159,28 @@ def inspect_log(path: LogPath, limits: ReadingParameters = DEFAULT_LIMITS) -> Lo
     source = open_source(path, limits)
     source.close()
     return source.info
+
+
+def map_topics(path: LogPath, limits: ReadingParameters = DEFAULT_LIMITS) -> list[str]:
+    """Names of the topics of a log that hold maps, ascending.
+
+    Parameters
+    ----------
+    path : str, Path or a sequence of them
+        As for `open_log`.
+    limits : ReadingParameters
+        The largest sizes that are accepted.
+
+    Raises
+    ------
+    NoMapTopicError
+        If there are none; the message says what could be done.
+    LogError
+        If the log cannot be opened.
+    """
+    info = inspect_log(path, limits)
+    found = [topic.name for topic in info.topics if topic.is_map and topic.message_count != 0]
+    return sorted(set(found)) or [choose_topic(info)]
 
 
 def open_source(

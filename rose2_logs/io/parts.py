@@ -1,6 +1,8 @@
-"""Maps on one topic that are not of one run: of two publishers in turn, or of a map that was begun anew.
+"""Maps on one topic that do not grow from each other: of publishers in turn, or of a map begun anew.
 
-Rooms can only be followed through maps that grow from each other, so that one part is analyzed at a time.
+Rooms can only be followed through maps that grow from each other. Parts that follow one another in a log are
+parts of one run, each with its own coverage and tracks; of publishers in turn, and of saved maps that are of
+several runs, one part is read.
 """
 
 from __future__ import annotations
@@ -11,25 +13,30 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rose2_logs.config.parameters import OccupancyParameters
 from rose2_logs.config.selection import Times
+from rose2_logs.config.tracking import TrackingParameters
 from rose2_logs.io.grids import Grid
-from rose2_logs.model.occupancy import GridGeometry, classify
+from rose2_logs.model.occupancy import UNKNOWN, BoolArray, FloatArray, GridGeometry, classify
 from rose2_logs.system.text import counted
+from rose2_logs.tracking.registration import WallFit, wall_faces
 
 LOOKED_AT = 64
 """Maps, evenly spread, that are looked at: where a map is begun anew, all maps around are looked at, too."""
 LEAST_RETURNS = 2
-"""Times that the maps come back to a grid they had left, from which on they are of several publishers."""
+"""Times that the maps come back to a publisher, or to a grid, that they had left, from which on they are of
+several publishers."""
 ANOTHER_SHARE = 0.1
 """Maps of two publishers differ by more than this share of their free area, most times. A mapping node that
 crops its map to what is known goes back and forth between two grids, too, but not between two areas."""
 FALLEN_SHARE = 0.5
-"""A map is begun anew if it has less than this share of the free area of the one before. Loop closures and
-corrections of a map change a few percent."""
+"""A map is begun anew if it has less than this share of the free area of the one before, or knows less of its
+floor. Loop closures and corrections of a map change a few percent."""
 BACK_SHARE = 0.8
-"""A map that has this share again one map later was a bad map, and none that was begun anew."""
+"""A map that has this share again one map later was a bad map, and none that was begun anew. The map of a
+publisher has this share of its free area again when its turn comes; a map begun anew on its grid has not."""
 LEAST_AREA_M2 = 5.0
 """Smaller maps are no loss."""
 
@@ -46,6 +53,10 @@ FLOOR = re.compile(
 """What names of maps tell of floors."""
 LEAST_WALL_CELLS = 100
 """Walls that two maps show, 5 m of 5 cm, below which they are not compared."""
+MOST_COMPARED = 2000
+"""Cells of walls and of the floor, evenly taken, that are enough to compare."""
+MOST_STEPS = 4
+"""Cells between a wall and the end of `WALL_REACH_M`, of 5 cm, of which each is looked at."""
 
 
 @dataclass(frozen=True)
@@ -75,16 +86,22 @@ class Part:
     maps: int
 
 
-Facts = Callable[[int], MapFacts | None]
-"""What is known of a map, by its log time or by its place among the maps; None if it cannot be read."""
-
-
 @dataclass(frozen=True)
 class Parts:
-    """The parts of a topic in the order of their first maps, and why there are several."""
+    """The parts of a topic in the order of their first maps, and why there are several.
+
+    Attributes
+    ----------
+    parts : tuple of Part
+    why : str
+        What shows that there are several.
+    is_one_run : bool
+        Whether they follow one another in one log, so that they are parts of one run.
+    """
 
     parts: tuple[Part, ...]
     why: str = ""
+    is_one_run: bool = False
 
     def likeliest(self) -> int:
         """Return the number, from 1, of the part with most maps that differ, then most free area."""
@@ -92,51 +109,154 @@ class Parts:
         key = [(each.maps, each.free_m2) for each in self.parts]
         return max(places, key=lambda place: (*key[place], place)) + 1
 
-    def text(self, number: int) -> str:
-        """Return what is told of the choice of one part."""
+    def with_patches(self, times: Times) -> Parts:
+        """Give each of several parts that follow one another all times (N,) from its first map on."""
+        begins = [0, *(int(np.searchsorted(times, part.times[0])) for part in self.parts[1:]), len(times)]
+        parts = (
+            replace(part, times=times[low:high])
+            for part, (low, high) in zip(self.parts, pairwise(begins), strict=True)
+        )
+        return replace(self, parts=tuple(parts))
+
+    def text(self, number: int | None) -> str:
+        """Return what is told of the choice of one part, or of all."""
         sizes = ", ".join(
             f"{place} of {counted(len(each.times), 'map')} ({each.free_m2:.0f} m2 free at its end)"
             for place, each in enumerate(self.parts, start=1)
         )
-        return f"{self.why}, so that there are {len(self.parts)} parts: {sizes}; part {number} is analyzed"
+        done = "each has its own coverage and tracks" if number is None else f"part {number} is analyzed"
+        return f"{self.why}, so that there are {len(self.parts)} parts: {sizes}; {done}"
 
 
-def find_parts(times: Times, look: Facts) -> Parts:
+class _Maps:
+    """What is known of the maps of a topic, by their places; each is read as often as another one is between.
+
+    Parameters
+    ----------
+    times : (N,) int64
+        Their log times.
+    read : callable
+        Returns the map of a time, in percent; None if it cannot be read.
+    occupancy : OccupancyParameters
+        Which cells are free and occupied.
+    """
+
+    def __init__(
+        self, times: Times, read: Callable[[int], Grid | None], occupancy: OccupancyParameters
+    ) -> None:
+        self._times, self._read, self._occupancy = times, read, occupancy
+        self._facts: dict[int, MapFacts | None] = {}
+        self._is_continued: dict[tuple[int, int], bool] = {}
+        self._has_moved: dict[tuple[int, int], bool] = {}
+        self._held: tuple[int, _Seen | None] = (-1, None)
+
+    def facts(self, place: int) -> MapFacts | None:
+        """Return what is known of a map; None if it cannot be read."""
+        if place not in self._facts:
+            self._look(place)
+        return self._facts[place]
+
+    def is_other(self, before: int, now: int, least_share: float) -> bool:
+        """Whether a map has lost the floor of an earlier one, down to a share, or shows other walls."""
+        then, there = self.facts(before), self.facts(now)
+        if then is None or there is None or then.free_m2 < LEAST_AREA_M2:
+            return False
+        return there.free_m2 < least_share * then.free_m2 or not self._has_walls(before, now)
+
+    def _has_walls(self, before: int, now: int) -> bool:
+        """Whether a map shows the walls of an earlier one, maybe moved as a whole."""
+        if (before, now) not in self._is_continued:
+            self._look(before)
+            self._look(now)
+        if not self._is_continued[before, now] and (before, now) not in self._has_moved:
+            then, there = (self._read(int(self._times[place])) for place in (before, now))
+            if then is None or there is None:
+                return False
+            self._has_moved[before, now] = _has_moved(then, there, self._occupancy)
+        return self._is_continued[before, now] or self._has_moved[before, now]
+
+    def _look(self, place: int) -> None:
+        """Read a map, and compare it with the one that was read before."""
+        before, held = self._held
+        if place == before:
+            return
+        now = self._read(int(self._times[place]))
+        if held is not None and now is not None:
+            self._is_continued[before, place] = _is_continued(held, now, self._occupancy)
+        self._held = place, None if now is None else _Seen.of(now, self._occupancy)
+        self._facts[place] = None if self._held[1] is None else self._held[1].facts
+
+
+def find_parts(
+    times: Times,
+    read: Callable[[int], Grid | None],
+    occupancy: OccupancyParameters,
+    publishers: Sequence[str] | None = None,
+) -> Parts:
     """Find which maps of a topic belong together.
 
     Parameters
     ----------
     times : (N,) int64
         Log times of the maps, ascending, each once.
-    look : callable
-        Returns what is known of the map of a time.
+    read : callable
+        Returns the map of a time, in percent; None if it cannot be read.
+    occupancy : OccupancyParameters
+        Which cells are free and occupied.
+    publishers : sequence of N str, optional
+        Who published each of them; without, their grids tell.
     """
     if len(times) < 2:
         return Parts((Part(times, 0.0, len(times)),))
-    seen: dict[int, MapFacts | None] = {}
-
-    def facts(place: int) -> MapFacts | None:
-        if place not in seen:
-            seen[place] = look(int(times[place]))
-        return seen[place]
-
-    if publishers := _publishers(min(len(times), LOOKED_AT), facts):
-        grids = [(found := facts(place)) and _grid(found.geometry) for place in range(len(times))]
+    maps = _Maps(times, read, occupancy)
+    if publishers is not None and _returns(publishers) >= LEAST_RETURNS:
+        names = list(dict.fromkeys(publishers))
+        of_each = [[place for place, one in enumerate(publishers) if one == name] for name in names]
+        parts = [_part(times, places, maps.facts, _spread(places)) for places in of_each]
+        return Parts(tuple(parts), f"{', '.join(names)} publish in turn")
+    if publishers is None and (grids_in_turn := _grids_in_turn(min(len(times), LOOKED_AT), maps.facts)):
+        grids = [(found := maps.facts(place)) and _grid(found.geometry) for place in range(len(times))]
         parts = [
-            _part(times, [place for place, grid in enumerate(grids) if grid == publisher], facts)
-            for publisher in publishers
+            _part(times, [place for place, grid in enumerate(grids) if grid == publisher], maps.facts)
+            for publisher in grids_in_turn
         ]
         return Parts(tuple(parts), "maps of several grids come in turn, as of several publishers")
-    spread = np.unique(np.linspace(0, len(times) - 1, LOOKED_AT).round().astype(int)).tolist()
-    begins = [0, *_begins(spread, facts), len(times)]
-    parts = [_part(times, range(low, high), facts, spread) for low, high in pairwise(begins)]
-    return Parts(tuple(parts), "the map is begun anew" if len(parts) > 1 else "")
+    spread = _spread(range(len(times)))
+    begins = [0, *_begins(spread, maps), len(times)]
+    parts = [_part(times, range(low, high), maps.facts, spread) for low, high in pairwise(begins)]
+    return Parts(tuple(parts), "the map is begun anew" if len(parts) > 1 else "", is_one_run=True)
 
 
-def facts_of(grid: Grid, occupancy: OccupancyParameters) -> MapFacts:
-    """Return what is compared of a map in percent."""
-    free, _ = classify(grid.cells, occupancy)
-    return MapFacts(grid.geometry, float(np.count_nonzero(free)) * grid.geometry.cell_area_m2)
+def _spread(places: Sequence[int]) -> list[int]:
+    """At most `LOOKED_AT` of the places, evenly, the first and the last among them."""
+    chosen = np.unique(np.linspace(0, len(places) - 1, LOOKED_AT).round().astype(int))
+    return [places[at] for at in chosen.tolist()]
+
+
+def _returns(publishers: Sequence[str]) -> int:
+    """How often another publisher follows that has published before."""
+    seen, returns = set(publishers[:1]), 0
+    for before, now in pairwise(publishers):
+        returns += now != before and now in seen
+        seen.add(now)
+    return returns
+
+
+@dataclass(frozen=True, eq=False)
+class _Seen:
+    """A map as the next one is compared with it: its facts, and points (N, 2) of its floor and walls."""
+
+    facts: MapFacts
+    floor_m: FloatArray
+    walls_m: FloatArray
+
+    @classmethod
+    def of(cls, grid: Grid, occupancy: OccupancyParameters) -> _Seen:
+        """Look at a map in percent."""
+        free, occupied = classify(grid.cells, occupancy)
+        area_m2 = float(np.count_nonzero(free)) * grid.geometry.cell_area_m2
+        floor_m, walls_m = (_some(cells, grid.geometry) for cells in (free, occupied))
+        return cls(MapFacts(grid.geometry, area_m2), floor_m, walls_m)
 
 
 def find_saved_parts(
@@ -163,20 +283,21 @@ def find_saved_parts(
     """
     begins: list[int] = [0]
     areas: list[float] = []
-    latest: tuple[Grid, float] | None = None
+    latest: _Seen | None = None
     for place, time_ns in enumerate(times.tolist()):
         now = read(time_ns)
-        area_m2 = 0.0 if now is None else facts_of(now, occupancy).free_m2
+        seen = None if now is None else _Seen.of(now, occupancy)
+        area_m2 = 0.0 if seen is None else seen.facts.free_m2
         areas.append(area_m2)
         is_next = latest is None or _floor(names[place]) == _floor(names[place - 1])
         if now is not None and latest is not None and area_m2 >= LEAST_AREA_M2:
-            before, before_m2 = latest
-            is_next &= area_m2 >= KEPT_SHARE * before_m2 and _is_continued(before, now, occupancy)
+            is_kept = area_m2 >= KEPT_SHARE * latest.facts.free_m2
+            is_next &= is_kept and _is_continued(latest, now, occupancy)
         if not is_next:
             begins.append(place)
         # A bad map between others, without free cells, parts nothing.
-        if now is not None and (area_m2 >= LEAST_AREA_M2 or not is_next):
-            latest = now, area_m2
+        if seen is not None and (area_m2 >= LEAST_AREA_M2 or not is_next):
+            latest = seen
     parts = [
         Part(times[low:high], areas[high - 1], len(set(areas[low:high])))
         for low, high in pairwise([*begins, len(times)])
@@ -190,79 +311,100 @@ def _floor(name: str) -> str:
     return found[0] if found else ""
 
 
-def _is_continued(before: Grid, now: Grid, occupancy: OccupancyParameters) -> bool:
-    """Whether most walls of a map that another one shows are walls there, too; also if few are shown."""
-    import cv2
-
-    _, walls = classify(before.cells, occupancy)
-    free, occupied = classify(now.cells, occupancy)
-    row, column = np.moveaxis(
-        now.geometry.world_to_cell(before.geometry.cell_centers(*np.nonzero(walls))), -1, 0
-    )
-    inside = (row >= 0) & (row < free.shape[0]) & (column >= 0) & (column < free.shape[1])
-    row, column = row[inside], column[inside]
-    reach = 2 * round(WALL_REACH_M / now.geometry.resolution_m) + 1
-    near = cv2.dilate(occupied.astype(np.uint8), np.ones((reach, reach), np.uint8)).astype(bool)
-    shown = near[row, column] | free[row, column]
+def _is_continued(before: _Seen, now: Grid, occupancy: OccupancyParameters) -> bool:
+    """Whether a map knows most of the floor of another one, and has most of its walls."""
+    floor = _around(now, before.floor_m, 0.0)
+    if np.count_nonzero(floor != UNKNOWN) < FALLEN_SHARE * len(floor):
+        return False
+    around = _around(now, before.walls_m, WALL_REACH_M)
+    free, occupied = classify(around, occupancy)
+    near = occupied.any(axis=1)
+    shown = near | free[:, free.shape[1] // 2]
     if np.count_nonzero(shown) < LEAST_WALL_CELLS:
         return True
-    return bool(np.count_nonzero(near[row, column]) >= SAME_WALLS_SHARE * np.count_nonzero(shown))
+    return bool(np.count_nonzero(near) >= SAME_WALLS_SHARE * np.count_nonzero(shown))
+
+
+def _some(cells: BoolArray, geometry: GridGeometry) -> FloatArray:
+    """World centers (N, 2) of at most `MOST_COMPARED` cells (H, W), evenly taken."""
+    places = np.flatnonzero(cells)
+    if len(places) > MOST_COMPARED:
+        places = places[np.linspace(0, len(places) - 1, MOST_COMPARED).astype(np.intp)]
+    return geometry.cell_centers(*np.unravel_index(places, cells.shape))
+
+
+def _around(grid: Grid, points_m: FloatArray, reach_m: float) -> NDArray[np.int8]:
+    """Cells (N, K) of a map within reach of points (N, 2), its own in the middle; unknown outside the map."""
+    reach = round(reach_m / grid.geometry.resolution_m)
+    # Of finer cells not all are looked at: walls are thicker than they are.
+    steps = np.unique(np.linspace(-reach, reach, 2 * min(reach, MOST_STEPS) + 1).round().astype(np.intp))
+    row, column = np.moveaxis(grid.geometry.world_to_cell(points_m), -1, 0)
+    row = (row[:, None, None] + steps[:, None]).repeat(len(steps), axis=2)
+    column = (column[:, None, None] + steps).repeat(len(steps), axis=1)
+    height, width = grid.cells.shape
+    is_inside = (row >= 0) & (row < height) & (column >= 0) & (column < width)
+    cells = grid.cells[row.clip(0, height - 1), column.clip(0, width - 1)]
+    return np.where(is_inside, cells, np.int8(UNKNOWN)).reshape(len(points_m), len(steps) ** 2)
+
+
+def _has_moved(before: Grid, now: Grid, occupancy: OccupancyParameters) -> bool:
+    """Whether a map shows the walls of another one elsewhere, as after a loop closure."""
+    tracking = TrackingParameters()
+    then, there = (wall_faces(*classify(each.cells, occupancy), each.geometry) for each in (before, now))
+    if min(len(then), len(there)) < tracking.fit_min_points:
+        return True
+    walls = WallFit(then, before.geometry.resolution_m, tracking).sample()
+    fit = WallFit(there, now.geometry.resolution_m, tracking)
+    return fit.share(walls.points, fit.best(walls)) >= SAME_WALLS_SHARE
 
 
 def _grid(geometry: GridGeometry) -> GridGeometry:
     return replace(geometry, yaw_rad=round(geometry.yaw_rad, 6))
 
 
-def _publishers(count: int, facts: Facts) -> list[GridGeometry]:
-    """Grids between which the maps go back and forth; none if they do not."""
-    order: list[GridGeometry] = []
-    returns = switches = 0
+def _grids_in_turn(count: int, facts: Callable[[int], MapFacts | None]) -> list[GridGeometry]:
+    """Grids between which the maps go back and forth, and find again what they had left; else none."""
+    left: dict[GridGeometry, float] = {}
+    returns = found_again = switches = 0
     latest: MapFacts | None = None
     for place in range(count):
         if (found := facts(place)) is None:
             continue
         grid = _grid(found.geometry)
         if latest is not None and grid != _grid(latest.geometry):
-            returns += grid in order
+            if grid in left:
+                returns += 1
+                found_again += found.free_m2 >= BACK_SHARE * left[grid]
             low, high = sorted((latest.free_m2, found.free_m2))
             switches += 1 if high - low > ANOTHER_SHARE * high else -1
-        if grid not in order:
-            order.append(grid)
+        left[grid] = found.free_m2
         latest = found
-    return order if returns >= LEAST_RETURNS and 1 < len(order) <= returns + 1 and switches > 0 else []
+    is_in_turn = found_again >= max(LEAST_RETURNS, len(left) - 1) and 2 * found_again > returns
+    return list(left) if is_in_turn and len(left) > 1 and switches > 0 else []
 
 
-def _begins(spread: Sequence[int], facts: Facts) -> list[int]:
+def _begins(spread: Sequence[int], maps: _Maps) -> list[int]:
     """Places of the maps that are begun anew."""
     begins = []
+    before = spread[0]
     for low, high in pairwise(spread):
-        if not _has_fallen(facts(low), facts(high)):
+        if not maps.is_other(before, high, FALLEN_SHARE):
+            before = high
             continue
         for place in range(low + 1, high + 1):
-            if _has_fallen(facts(place - 1), facts(place)) and not _is_back(
-                facts(place - 1), facts(place + 1) if place + 1 <= spread[-1] else None
-            ):
+            if maps.is_other(before, place, FALLEN_SHARE):
+                then = place + 1
+                if then <= spread[-1] and maps.facts(then) and not maps.is_other(before, then, BACK_SHARE):
+                    continue  # a bad map: the next one goes on from those before
                 begins.append(place)
+            before = place
     return begins
-
-
-def _has_fallen(before: MapFacts | None, now: MapFacts | None) -> bool:
-    return (
-        before is not None
-        and now is not None
-        and before.free_m2 >= LEAST_AREA_M2
-        and now.free_m2 < FALLEN_SHARE * before.free_m2
-    )
-
-
-def _is_back(before: MapFacts | None, then: MapFacts | None) -> bool:
-    return before is not None and then is not None and then.free_m2 >= BACK_SHARE * before.free_m2
 
 
 def _part(
     times: Times,
     places: Sequence[int],
-    facts: Facts,
+    facts: Callable[[int], MapFacts | None],
     looked_at: Sequence[int] | None = None,
 ) -> Part:
     known = places if looked_at is None else sorted({*set(places).intersection(looked_at), places[-1]})

@@ -161,6 +161,10 @@ class MessageSource(ABC):
     def read(self, topics: Sequence[str], times: Times) -> Iterator[LoggedMap]:
         """Yield the messages of `topics` logged at `times` (sorted, distinct), in log time order."""
 
+    def publishers(self, topic: str) -> Sequence[str] | None:
+        """Return who published each message of `topic`; None if the log does not tell them apart."""
+        return None
+
     def recorded_ns(self, time_ns: int) -> int:
         """Return the log time that stands in the log, of a map whose own goes on where a clock was set."""
         return time_ns

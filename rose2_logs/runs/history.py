@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from itertools import groupby
 from statistics import median
 
 from rose2_logs.config.parameters import Parameters
 from rose2_logs.model.occupancy import OccupancySnapshot
 from rose2_logs.system.text import counted
 from rose2_logs.tracking.back_projection import BackProjectedSnapshot, RunBackProjection
-from rose2_logs.tracking.convergence import Convergence, RoomRows, measure_convergence
+from rose2_logs.tracking.convergence import Convergence, RoomRows, map_by_map, measure_convergence
 from rose2_logs.tracking.registration import RigidMotion
 from rose2_logs.tracking.track_history import SnapshotRef, TrackHistories
 from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot
@@ -99,8 +100,8 @@ class RunTotals:
         self.rooms_last = len(step.track_ids)
         self.free_m2_last = step.analysis.free_area_m2
         self.outside_m2_last = step.analysis.outside_m2
-        self.tracks = max(self.tracks, *step.track_ids, 0)
         self.events.update(event.kind for event in step.events)
+        self.tracks = self.events["born"]
         if step.change is not None:
             self.changed_share.add(step.change.changed_share)
             self.variation_bits.add(step.change.variation_bits)
@@ -123,6 +124,9 @@ class RunSummary:
         What is known of every room.
     convergence : Convergence
         Since when each room, and the layout, was as in the last map.
+    parts : dict of int to RunSummary
+        The same for each part of a run in which maps were begun anew, by number; empty for other runs. Of the
+        whole run, what refers to the last map is that of the last part.
 
     Examples
     --------
@@ -140,6 +144,7 @@ class RunSummary:
     totals: RunTotals
     histories: TrackHistories
     convergence: Convergence
+    parts: Mapping[int, RunSummary] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         maps, rooms = counted(self.totals.snapshots, "map"), counted(self.totals.rooms_last, "room")
@@ -162,6 +167,21 @@ class RunSummary:
         return median_of(since[track].coverage for track in tracks if track in since)
 
 
+@dataclass
+class _Followed:
+    """What is collected of a run, or of one of its parts."""
+
+    histories: TrackHistories
+    totals: RunTotals = field(default_factory=RunTotals)
+    snapshot_refs: dict[int, SnapshotRef] = field(default_factory=dict)
+
+    def add(self, step: TrackedSnapshot) -> None:
+        """Take the next map."""
+        self.totals.add(step)
+        self.histories.add(step)
+        self.snapshot_refs[step.snapshot.index] = self.histories.snapshot_ref(step)
+
+
 class RunHistory:
     """Observes a run: totals, the histories of its rooms, and what the second pass needs.
 
@@ -181,21 +201,31 @@ class RunHistory:
     """
 
     def __init__(self, parameters: Parameters, *, back_project: bool = False) -> None:
-        self.totals = RunTotals()
-        self.histories = TrackHistories()
+        self._run = _Followed(TrackHistories())
+        self._parts: dict[int, _Followed] = {}
         self._tracking = parameters.tracking
-        self._snapshot_refs: dict[int, SnapshotRef] = {}
         self._drifts: dict[int, RigidMotion] = {}
         self._back_projection = RunBackProjection(parameters) if back_project else None
 
+    @property
+    def totals(self) -> RunTotals:
+        """What is summed up so far."""
+        return self._run.totals
+
+    @property
+    def histories(self) -> TrackHistories:
+        """What is known of every room so far."""
+        return self._run.histories
+
     def add(self, step: TrackedSnapshot) -> None:
         """Take the next map."""
-        self.totals.add(step)
-        self.histories.add(step)
-        index = step.snapshot.index
-        self._snapshot_refs[index] = self.histories.snapshot_ref(step)
+        self._run.add(step)
+        if step.part is not None:
+            if step.part not in self._parts:
+                self._parts[step.part] = _Followed(TrackHistories(self.totals.first_log_time_ns))
+            self._parts[step.part].add(step)
         x, y, yaw = (0.0, 0.0, 0.0) if step.change is None else step.change.drift.pose
-        self._drifts[index] = RigidMotion((0.0, 0.0), (x, y), yaw)
+        self._drifts[step.snapshot.index] = RigidMotion((0.0, 0.0), (x, y), yaw)
         if self._back_projection is not None:
             self._back_projection.add(step)
 
@@ -207,7 +237,7 @@ class RunHistory:
     @property
     def snapshot_refs(self) -> Mapping[int, SnapshotRef]:
         """When each map was, by its index."""
-        return self._snapshot_refs
+        return self._run.snapshot_refs
 
     def back_projected(self, snapshots: Iterable[OccupancySnapshot]) -> Iterator[BackProjectedSnapshot]:
         """Yield what each map shows of the last map's rooms, if that was requested.
@@ -228,10 +258,22 @@ class RunHistory:
         rooms : iterable of RoomRows
             Every room of every map, in the order of the maps.
         """
-        convergence = measure_convergence(
-            rooms, self.histories, self._snapshot_refs, self._drifts, self._tracking
+        followed = list(self._parts.values()) or [self._run]
+        part_of = {index: place for place, each in enumerate(followed) for index in each.snapshot_refs}
+        # Of a part without rooms there are no rows.
+        found = [self._converged(each, ()) for each in followed]
+        for place, rows in groupby(map_by_map(rooms), lambda rows: part_of[int(rows.snapshot[0])]):
+            found[place] = self._converged(followed[place], rows)
+        parts = {
+            number: RunSummary(each.totals, each.histories, convergence)
+            for (number, each), convergence in zip(self._parts.items(), found, strict=False)
+        }
+        return RunSummary(self.totals, self.histories, Convergence.joined(found), parts)
+
+    def _converged(self, followed: _Followed, rooms: Iterable[RoomRows]) -> Convergence:
+        return measure_convergence(
+            rooms, followed.histories, followed.snapshot_refs, self._drifts, self._tracking
         )
-        return RunSummary(self.totals, self.histories, convergence)
 
 
 def median_of(values: Iterable[float | None]) -> float | None:

@@ -33,17 +33,23 @@ class Run(StoredRun, Sequence["RunSnapshot"]):
         The folder with ``summary.json``.
     temporary : TemporaryDirectory, optional
         Holds the folder, which is deleted together with this object.
+    part : int, optional
+        Take one part alone of a run in which maps were begun anew; `parts` lists them.
 
     Attributes
     ----------
     folder : path
     summary : dict
-        The content of ``summary.json``.
+        The content of ``summary.json``; of a part, with its results and layout.
+    part : int or None
+        The part that was taken alone.
 
     Raises
     ------
     ResultsError
         If the folder is not one of results, its summary cannot be read, or it is of another version.
+    ParameterError
+        If there is no such part.
     OutputError
         If its name is not UTF-8.
 
@@ -57,8 +63,14 @@ class Run(StoredRun, Sequence["RunSnapshot"]):
     True
     """
 
-    def __init__(self, folder: str | Path, temporary: TemporaryDirectory[str] | None = None) -> None:
-        super().__init__(Path(folder))
+    def __init__(
+        self,
+        folder: str | Path,
+        temporary: TemporaryDirectory[str] | None = None,
+        *,
+        part: int | None = None,
+    ) -> None:
+        super().__init__(Path(folder), part)
         if temporary is not None:
             # Without this, Python warns that the folder is removed implicitly.
             weakref.finalize(self, temporary.cleanup)

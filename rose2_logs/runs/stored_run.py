@@ -61,6 +61,8 @@ SUMMARY_KEYS: dict[str, type | tuple[type, ...]] = {
     "files": list,
 }
 """What every summary holds, and is read from it."""
+PART_KEYS: dict[str, type] = {"part": int, "results": dict, "layout": dict}
+"""What the summary of a run in parts holds of each."""
 SINCE = ("layout.final_since", "layout.known_final_since")
 """From which map on the layout, and what was known of it, was final; null if it never was."""
 SINCE_KEYS: dict[str, type | tuple[type, ...]] = {"snapshot": int, "time_s": NUMBER, "coverage": NUMBER}
@@ -92,12 +94,38 @@ def find_results(folder: Path) -> list[Path]:
 
 
 class StoredRun:
-    """What a run has stored, as reports, exports and comparisons need it; see `Run`."""
+    """What a run has stored, as reports, exports and comparisons need it; see `Run`.
 
-    def __init__(self, folder: Path) -> None:
+    Parameters
+    ----------
+    folder : path
+        The folder with ``summary.json``.
+    part : int, optional
+        The part to take alone, of a run in which maps were begun anew.
+    """
+
+    def __init__(self, folder: Path, part: int | None = None) -> None:
         self.folder = folder
         require_utf8(folder)
         self.summary: dict[str, Any] = _read_summary(folder)
+        self.part = part
+        if part is not None:
+            of_part = next((each for each in self._parts if each["part"] == part), None)
+            if of_part is None:
+                has = f"it has {', '.join(map(str, self.parts))}" if self._parts else "it has no parts"
+                raise ParameterError(f"{folder}: no part {part}; {has}")
+            results = self.summary["results"] | of_part["results"]
+            self.summary |= {"results": results, "layout": of_part["layout"]}
+
+    @property
+    def parts(self) -> tuple[int, ...]:
+        """Numbers of the parts of a log in which maps were begun anew; none for other logs."""
+        return tuple(each["part"] for each in self._parts)
+
+    @property
+    def _parts(self) -> list[dict[str, Any]]:
+        parts: list[dict[str, Any]] = self.summary.get("parts", [])
+        return parts
 
     @property
     def name(self) -> str:
@@ -148,10 +176,11 @@ class StoredRun:
         if name not in (*TABLES, BACK_PROJECTED):
             raise ParameterError(f"no table {name!r}; there are {', '.join((*TABLES, BACK_PROJECTED))}")
         path = self.folder / f"{name}.parquet"
-        rows = None if snapshot is None else [("snapshot", "=", snapshot)]
+        rows = [] if snapshot is None else [("snapshot", "=", snapshot)]
+        rows += [] if self.part is None else [("part", "=", self.part)]
         try:
             _require_columns(path, pq.read_schema(path), name, columns)
-            return pq.read_table(path, columns=columns, filters=rows, partitioning=None)
+            return pq.read_table(path, columns=columns, filters=rows or None, partitioning=None)
         except (OSError, pa.ArrowException) as error:
             why = " ".join(str(error).split())
             raise ResultsError(f"{path}: cannot be read: {why}; {MAKE_AGAIN}", file=path) from error
@@ -199,7 +228,9 @@ class StoredRun:
             raise ParameterError(f"the coverage is a number from 0 to 1, not {coverage!r}")
         if not 0 <= coverage <= 1:
             raise ParameterError(f"the coverage is a share from 0 to 1, not {coverage:g}; half is 0.5")
-        covered = np.flatnonzero(self.columns["coverage"] >= coverage)
+        # Each part has its own coverage; that of the last one leads to the run's last map.
+        part = self.columns.get("part", np.zeros(len(numbers)))
+        covered = np.flatnonzero((self.columns["coverage"] >= coverage) & (part == part[-1]))
         return int(numbers[covered[0]] if len(covered) else numbers[-1])
 
     def row(self, snapshot: int) -> Row:
@@ -355,6 +386,12 @@ def _read_summary(folder: Path) -> dict[str, Any]:
             file=path,
         )
     _require_keys(path, summary, SUMMARY_KEYS)
+    parts = summary.get("parts", [])
+    if not isinstance(parts, list) or not all(
+        isinstance(each, dict) and all(isinstance(each.get(key), kind) for key, kind in PART_KEYS.items())
+        for each in parts
+    ):
+        raise ResultsError(f"{path}: its parts are damaged; {MAKE_AGAIN}", file=path)
     for since in SINCE:
         block, name = since.split(".")
         if summary[block][name] is not None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import math
 import traceback
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import partial
 from pathlib import Path
 
@@ -24,7 +24,7 @@ from rose2_logs.segmentation.pipeline import analyze
 from rose2_logs.system.warnings import log_warning
 from rose2_logs.system.workers import Workers, give_back_freed_memory
 from rose2_logs.tracking.layout_change import LayoutFollower
-from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot, map_motion
+from rose2_logs.tracking.tracked_snapshot import MAP_TRACK, RoomEvent, TrackedSnapshot, map_motion
 from rose2_logs.tracking.tracker import RoomTracker
 
 logger = logging.getLogger(__name__)
@@ -54,7 +54,7 @@ class TrackedStream:
         The maps.
     final_free_m2 : float or None
         Known free area of the last map of the run in square meters, which coverage refers to; coverage is NaN
-        where it is not known.
+        where it is not known. Of a run in parts, that of the last map of each, by number.
     workers : Workers
         What analyzes the maps, started.
     parameters : Parameters
@@ -65,6 +65,9 @@ class TrackedStream:
         The map topic.
     path : RobotPath, optional
         Where the robot was, to be part of the steps.
+    part_at : callable, optional
+        Returns the part of the run that the map of a log time is of, None if the run has no parts. Each part
+        has its own coverage and tracks.
 
     Attributes
     ----------
@@ -79,19 +82,24 @@ class TrackedStream:
     def __init__(
         self,
         snapshots: Iterable[OccupancySnapshot],
-        final_free_m2: float | None,
+        final_free_m2: float | Mapping[int | None, float] | None,
         workers: SnapshotWorkers | JournaledWorkers,
         parameters: Parameters,
         *,
         source: str = "the maps",
         topic: str | None = None,
         path: RobotPath | None = None,
+        part_at: Callable[[int], int | None] = lambda _: None,
     ) -> None:
         self.invalid = 0
         self.unchanged = 0
         self.last_log_time_ns: int | None = None
         self._snapshots = snapshots
-        self._final_free_m2 = final_free_m2
+        self._final_free_m2: Mapping[int | None, float | None] = (
+            final_free_m2 if isinstance(final_free_m2, Mapping) else {None: final_free_m2}
+        )
+        self._part_at = part_at
+        self._part: int | None = None
         self._workers = workers
         self._occupancy = parameters.occupancy
         self._source, self._topic = source, topic
@@ -128,18 +136,21 @@ class TrackedStream:
         LogError
             If the log holds no map that can be read.
         """
-        last = reader.last()
-        if (text := few_walls(last, parameters.occupancy)) is not None:
-            text = f"{reader.info.path}: the last map on {reader.topic}: {text}"
-            log_warning(logger, "few_walls", text, file=reader.info.path, topic=reader.topic)
+        lasts = reader.lasts()
+        for last in lasts.values():
+            if (text := few_walls(last, parameters.occupancy)) is not None:
+                text = f"{reader.info.path}: the last map on {reader.topic}: {text}"
+                log_warning(logger, "few_walls", text, file=reader.info.path, topic=reader.topic)
+        *_, last = lasts.values()
         stream = cls(
             reader.snapshots(),
-            free_area_m2(last, parameters.occupancy),
+            {part: free_area_m2(each, parameters.occupancy) for part, each in lasts.items()},
             workers,
             parameters,
             source=str(reader.info.path),
             topic=reader.topic,
             path=reader.robot_path(last.geometry.frame_id, base_frame) if with_path else None,
+            part_at=reader.part_at,
         )
         stream.last_log_time_ns = last.log_time_ns
         stream._has_told_far = True  # the reader leaves them out, and tells it
@@ -172,15 +183,27 @@ class TrackedStream:
         if analysis.index != snapshot.index:
             analysis = analysis.again_for(snapshot)
             self.unchanged += 1
+        begun = self._begun_part(snapshot)
         track_ids, events = self._tracker.update(snapshot, analysis)
         change = self._layout.update(analysis.rooms, track_ids, map_motion(events))
         coverage = self._coverage(analysis.free_area_m2)
         poses = None if self._path is None else self._path.until(snapshot.log_time_ns)
         quality = analysis.quality
-        return TrackedSnapshot(snapshot, analysis, coverage, track_ids, events, quality, change, poses)
+        return TrackedSnapshot(
+            snapshot, analysis, coverage, track_ids, begun + events, quality, change, poses, self._part
+        )
+
+    def _begun_part(self, snapshot: OccupancySnapshot) -> tuple[RoomEvent, ...]:
+        """Begin a part anew if the map is the first of one; an event unless the run begins with it."""
+        before, self._part = self._part, self._part_at(snapshot.log_time_ns)
+        if before in (None, self._part):
+            return ()
+        self._tracker.begin_part()
+        self._layout = LayoutFollower()
+        return (RoomEvent("part_begun", snapshot.index, MAP_TRACK),)
 
     def _coverage(self, free_m2: float) -> float:
-        final_m2 = self._final_free_m2
+        final_m2 = self._final_free_m2.get(self._part)
         if final_m2 is None:
             return math.nan
         return min(free_m2 / final_m2, 1.0) if final_m2 > 0 else 0.0

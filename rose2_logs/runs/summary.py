@@ -80,17 +80,10 @@ def write_summary(
             "snapshots": totals.snapshots,
             "invalid_maps": totals.invalid,
             "unchanged_maps": totals.unchanged,
-            "first_log_time_ns": totals.first_log_time_ns,
-            "last_log_time_ns": totals.last_log_time_ns,
-            "coverage_first": totals.coverage_first,
-            "coverage_last": totals.coverage_last,
-            "rooms_last": totals.rooms_last,
-            "outside_m2_last": totals.outside_m2_last,
-            "tracks": totals.tracks,
-            "brief_tracks": len(summary.convergence.brief),
-            "events": dict(sorted(totals.events.items())),
+            **_results(summary),
         },
         "layout": _layout(summary),
+        **({"parts": _parts(summary)} if summary.parts else {}),
         "files": files,
         "seconds": {
             "run": seconds,
@@ -102,6 +95,34 @@ def write_summary(
     if taken := sorted(facts.keys() & content.keys()):
         raise OutputError(f"{path}: a sink has a fact named {taken[0]!r}, which the summary itself has")
     write_json(path, content | dict(facts))
+
+
+def _results(summary: RunSummary) -> dict[str, Any]:
+    """Return what the run, or a part of it, came to."""
+    totals = summary.totals
+    return {
+        "first_log_time_ns": totals.first_log_time_ns,
+        "last_log_time_ns": totals.last_log_time_ns,
+        "coverage_first": totals.coverage_first,
+        "coverage_last": totals.coverage_last,
+        "rooms_last": totals.rooms_last,
+        "outside_m2_last": totals.outside_m2_last,
+        "tracks": totals.tracks,
+        "brief_tracks": len(summary.convergence.brief),
+        "events": dict(sorted(totals.events.items())),
+    }
+
+
+def _parts(summary: RunSummary) -> list[dict[str, Any]]:
+    """Describe each part of a run in the form of the whole."""
+    return [
+        {
+            "part": number,
+            "results": {"snapshots": part.totals.snapshots, **_results(part)},
+            "layout": _layout(part),
+        }
+        for number, part in summary.parts.items()
+    ]
 
 
 def _layout(summary: RunSummary) -> dict[str, Any]:

@@ -333,6 +333,20 @@ SCHEMAS = {
 }
 """The schema of each table of a run."""
 
+PART = pa.field(
+    "part",
+    pa.int32(),
+    nullable=False,
+    metadata={"description": "part of the log, from 1; maps of one part grow from each other"},
+)
+"""First column of each table of a log in which maps were begun anew, or are of several publishers."""
+
+
+def with_part(name: str) -> pa.Schema:
+    """Return the schema of a table with the column `PART`."""
+    return SCHEMAS[name].insert(0, PART)
+
+
 ROOM_CHANGES = _table(
     {
         "status": (

@@ -34,7 +34,15 @@ Row = dict[str, Any]
 
 def snapshot_key(step: TrackedSnapshot | BackProjectedSnapshot) -> Row:
     """Return what all tables with rows per map begin with."""
-    return {"snapshot": step.snapshot.index, "log_time_ns": step.snapshot.log_time_ns}
+    return part_key(step.part) | {
+        "snapshot": step.snapshot.index,
+        "log_time_ns": step.snapshot.log_time_ns,
+    }
+
+
+def part_key(part: int | None) -> Row:
+    """Return the column that a run in parts has besides."""
+    return {} if part is None else {"part": part}
 
 
 def snapshot_row(step: TrackedSnapshot, ref: SnapshotRef) -> Row:

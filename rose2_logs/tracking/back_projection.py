@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import groupby
 
 import cv2
 import numpy as np
@@ -174,6 +175,8 @@ class BackProjectedSnapshot:
         Their tracks.
     to_last : RigidMotion
         How the whole map moved from then to the end.
+    part : int, optional
+        As of `TrackedSnapshot`: of a run in parts, the last map is that of the part.
     """
 
     snapshot: OccupancySnapshot
@@ -182,6 +185,7 @@ class BackProjectedSnapshot:
     last_rooms: RoomMap
     track_ids: tuple[int, ...]
     to_last: RigidMotion
+    part: int | None = None
 
 
 class RunBackProjection:
@@ -195,33 +199,34 @@ class RunBackProjection:
 
     def __init__(self, parameters: Parameters) -> None:
         self._parameters = parameters
-        self._last: TrackedSnapshot | None = None
-        self._motions: dict[int, RigidMotion | None] = {}
+        # By part, None in a run without parts.
+        self._last: dict[int | None, TrackedSnapshot] = {}
+        self._motions: dict[int | None, dict[int, RigidMotion | None]] = {}
         self._coverages: dict[int, float] = {}
 
     def add(self, step: TrackedSnapshot) -> None:
         """Take the next map of the run."""
-        self._last = step
-        self._motions[step.snapshot.index] = map_motion(step.events)
+        self._last[step.part] = step
+        self._motions.setdefault(step.part, {})[step.snapshot.index] = map_motion(step.events)
         self._coverages[step.snapshot.index] = step.coverage
 
     def back_projected(self, snapshots: Iterable[OccupancySnapshot]) -> Iterator[BackProjectedSnapshot]:
-        """Yield the maps with the rooms of the last one; one map at a time is held.
+        """Yield the maps with the rooms of the last one of their part; one map at a time is held.
 
         Parameters
         ----------
         snapshots : iterable of OccupancySnapshot
             The maps of the run again. Those that were not taken before are left out.
         """
-        last = self._last
-        if last is None:
-            return
-        rooms = last.analysis.rooms
-        projector = BackProjector(last.snapshot, rooms, self._parameters.tracking, self._parameters.occupancy)
-        to_last = dict(zip(self._motions, motions_to_last(list(self._motions.values())), strict=True))
-        for snapshot in snapshots:
-            if snapshot.index in to_last:
+        part_of = {index: part for part, motions in self._motions.items() for index in motions}
+        taken = (snapshot for snapshot in snapshots if snapshot.index in part_of)
+        for part, of_part in groupby(taken, lambda snapshot: part_of[snapshot.index]):
+            last, motions = self._last[part], self._motions[part]
+            rooms, parameters = last.analysis.rooms, self._parameters
+            projector = BackProjector(last.snapshot, rooms, parameters.tracking, parameters.occupancy)
+            to_last = dict(zip(motions, motions_to_last(list(motions.values())), strict=True))
+            for snapshot in of_part:
                 motion = to_last[snapshot.index]
                 shown = projector.rooms(snapshot, motion)
                 coverage = self._coverages[snapshot.index]
-                yield BackProjectedSnapshot(snapshot, coverage, shown, rooms, last.track_ids, motion)
+                yield BackProjectedSnapshot(snapshot, coverage, shown, rooms, last.track_ids, motion, part)

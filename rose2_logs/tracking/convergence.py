@@ -91,6 +91,20 @@ class Convergence:
     known_final: SnapshotRef | None = None
     brief: tuple[int, ...] = ()
 
+    @classmethod
+    def joined(cls, parts: Sequence[Convergence]) -> Convergence:
+        """Take the parts of a run together; the layout is that of the last one."""
+        joined = cls(layout_final=parts[-1].layout_final, known_final=parts[-1].known_final)
+        for part in parts:
+            joined.area_settled |= part.area_settled
+            joined.shape_right |= part.shape_right
+            joined.shape_right_seen |= part.shape_right_seen
+            joined.final_iou |= part.final_iou
+            joined.final_share |= part.final_share
+            joined.known_final_share |= part.known_final_share
+            joined.brief += part.brief
+        return joined
+
 
 def measure_convergence(
     rows: Iterable[RoomRows],
@@ -118,7 +132,7 @@ def measure_convergence(
     layout = _LastLayout(histories, drifts, parameters.final_room_min_iou)
     measured = Convergence()
     likeness = dict.fromkeys(snapshot_refs, layout.likeness_of_nothing)
-    for of_map in _map_by_map(rows):
+    for of_map in map_by_map(rows):
         _follow_tracks(measured, of_map, histories, snapshot_refs, drifts, parameters)
         likeness[int(of_map.snapshot[0])] = layout.likeness(of_map)
     measured.final_iou = {snapshot: like.iou for snapshot, like in likeness.items()}
@@ -136,7 +150,7 @@ def measure_convergence(
     return measured
 
 
-def _map_by_map(rows: Iterable[RoomRows]) -> Iterator[RoomRows]:
+def map_by_map(rows: Iterable[RoomRows]) -> Iterator[RoomRows]:
     """Rooms of one map at a time, however they came together."""
     held: list[RoomRows] = []
     for batch in rows:

@@ -66,6 +66,11 @@ class TrackHistory:
 class TrackHistories:
     """Gathers the history of every room.
 
+    Parameters
+    ----------
+    first_time_ns : int, optional
+        When the run began; by default with the first map given.
+
     Attributes
     ----------
     histories : dict
@@ -80,13 +85,13 @@ class TrackHistories:
         The first of the greatest of these.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, first_time_ns: int | None = None) -> None:
         self.tracks: dict[int, TrackHistory] = {}
         self.last: SnapshotRef | None = None
         self.in_last_map: tuple[int, ...] = ()
         self.shifts = 0
         self.largest_shift: tuple[SnapshotRef, RigidMotion] | None = None
-        self._first_time_ns: int | None = None
+        self._first_time_ns = first_time_ns
 
     def snapshot_ref(self, step: TrackedSnapshot) -> SnapshotRef:
         """Return when a map was recorded; the first map given begins the run."""

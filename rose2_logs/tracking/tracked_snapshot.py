@@ -16,7 +16,7 @@ from rose2_logs.model.rooms import RoomMap
 from rose2_logs.tracking.layout_change import LayoutChange
 from rose2_logs.tracking.registration import RigidMotion
 
-EventKind = Literal["shifted", "continued", "returned", "born", "split", "merged", "lost"]
+EventKind = Literal["part_begun", "shifted", "continued", "returned", "born", "split", "merged", "lost"]
 EVENT_ORDER: tuple[EventKind, ...] = get_args(EventKind)
 """Order of one snapshot's events: the map, the present rooms, then what happened to the earlier tracks."""
 MAP_TRACK = 0
@@ -32,12 +32,13 @@ class RoomEvent:
     kind : str
         born: a track begins; continued: a room takes its track on; split: a track's room is now several
         rooms; merged: several tracks' rooms are now one; lost: a track has no room any more;
-        returned: a lost track has a room again; shifted: the whole map moved within its frame.
+        returned: a lost track has a room again; shifted: the whole map moved within its frame;
+        part_begun: the map was begun anew, and with it a part of the run.
     snapshot : int
         Index of the snapshot.
     track : int
         The track that the event is about: of a split the one that was split, of a merge the one that stays,
-        of a shift `MAP_TRACK`.
+        of the whole map `MAP_TRACK`.
     others : tuple of int
         The further tracks: the parts that a split gave birth to, the tracks that a merge ended.
     overlap : float
@@ -77,7 +78,7 @@ class TrackedSnapshot:
     analysis : SnapshotAnalysis
         Its structure and rooms.
     coverage : float
-        Known free area over that of the last map of the run, in [0, 1].
+        Known free area over that of the last map of the run, or of its part, in [0, 1].
     track_ids : tuple of R int
         The track (1, 2, ... never used again) of room i + 1.
     events : tuple of RoomEvent
@@ -88,6 +89,8 @@ class TrackedSnapshot:
         How the layout changed since the map before.
     path : (K, 3) float, optional
         Poses of the robot since the map before: x, y in world meters, yaw in radians.
+    part : int, optional
+        Number of the part, from 1, in a log in which maps were begun anew or are of several publishers.
 
     Examples
     --------
@@ -104,6 +107,7 @@ class TrackedSnapshot:
     quality: RoomQuality | None = None
     change: LayoutChange | None = None
     path: FloatArray | None = None
+    part: int | None = None
 
     def __repr__(self) -> str:
         return (

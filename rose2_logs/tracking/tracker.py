@@ -80,8 +80,14 @@ class RoomTracker:
 
     def __init__(self, parameters: TrackingParameters, occupancy: OccupancyParameters | None = None) -> None:
         self._parameters = parameters
+        self._occupancy = occupancy
         self._aligner = MapAligner(parameters, occupancy)
         self._tracks = _Tracks()
+
+    def begin_part(self) -> None:
+        """Forget all rooms, as the next map does not grow from the ones before; numbers go on."""
+        self._aligner = MapAligner(self._parameters, self._occupancy)
+        self._tracks = _Tracks(count=self._tracks.count)
 
     def update(
         self, snapshot: OccupancySnapshot, analysis: SnapshotAnalysis | RoomMap

@@ -213,7 +213,12 @@ def _follow(
         with_path="path" in options.shown_layers or options.annotated_log,
         base_frame=options.base_frame,
     )
-    store = RunStore(folder, parameters.occupancy, back_project=options.back_project)
+    store = RunStore(
+        folder,
+        parameters.occupancy,
+        back_project=options.back_project,
+        has_parts=reader.part_count > 1,
+    )
     with store, abandoned_on_error(sinks):
         for sink in sinks:
             sink.begin(info)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import dataclasses
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -20,17 +22,19 @@ from rose2_logs.cli.printing import (
     print_text,
     progress_bar,
 )
-from rose2_logs.config.run_options import RunOptions
+from rose2_logs.config.run_options import MAPS, RunOptions
 from rose2_logs.errors import AlreadyWholeError, ParameterError, Rose2LogsError
+from rose2_logs.system.text import counted
 
 if TYPE_CHECKING:
-    from rose2_logs.runs.history import RunTotals
+    from rose2_logs.runs.history import RunSummary, RunTotals
     from rose2_logs.tracking.track_history import SnapshotRef
     from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot
     from rose2_logs.workflows.analyze import OnSnapshot, RunResult
 
 EXAMPLE = (
     "Example: [bold]rose2-logs analyze run.mcap -o results --workers 4[/bold]\n\n"
+    "The maps of several robots: [bold]rose2-logs analyze run.mcap -o results --all-topics[/bold]\n\n"
     "A first look at a long log: [bold]rose2-logs analyze run.mcap -o look --max-snapshots 20[/bold]\n\n"
     "A log of laser scans without maps: [bold]rose2-logs analyze run.bag -o results --map-from /scan[/bold]"
 )
@@ -47,31 +51,92 @@ def analyze(
         Path,
         typer.Option("--out", "-o", help="Folder for results; those of a log go to OUT/<name of the log>/."),
     ],
+    *,
+    topics: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--topic",
+            metavar="NAME",
+            help="Topic of the maps. By default /map, or the only topic that holds maps. May be repeated: "
+            "each of several topics has a folder of its own, OUT/<name of the log>/<topic>/.",
+            show_default=False,
+            rich_help_panel=MAPS,
+        ),
+    ] = None,
+    all_topics: Annotated[
+        bool, typer.Option("--all-topics", help="Take all topics that hold maps.", rich_help_panel=MAPS)
+    ] = False,
     options: RunOptions,
 ) -> None:
     """Find and track the rooms in all maps of a log; write a recording, an annotated MCAP, and tables."""
     from rose2_logs.system.workers import keep_freed_memory
-    from rose2_logs.workflows.analyze import analyze_log, log_stem
+    from rose2_logs.workflows.analyze import log_stem
 
     keep_freed_memory()
     names = [log_stem(log) for log in logs]
     if twice := {name for name in names if names.count(name) > 1}:
         raise ParameterError(f"several logs are named {min(twice)}: analyze them to different folders")
-    failed = False
+    if all_topics and (topics or options.map_from is not None):
+        other = "--topic" if topics else "--map-from"
+        raise ParameterError(f"--all-topics and {other} exclude each other; pass one of them")
+    # Whatever is wrong with them is told before the first log is read.
+    asked: list[str | None] = [*dict.fromkeys(topics or [])]
+    of_topics = [dataclasses.replace(options, topic=topic) for topic in asked or [None]]
+    failed = 0
     for log, name in zip(logs, names, strict=True):
         try:
-            with run_progress(name) as on_snapshot:
-                result = analyze_log(log, out / name, options, on_snapshot)
-            print_run(result)
-        except AlreadyWholeError as whole:
-            print_text(str(whole))
+            chosen = _of_all_topics(log, options) if all_topics else of_topics
         except Rose2LogsError as error:
-            if len(logs) == 1:
-                raise
-            failed = True
-            show_error(error)
+            failed += 1
+            _tell(error, is_only=len(logs) == 1)
+            continue
+        for folder, one in zip(_folders(out / name, chosen), chosen, strict=True):
+            try:
+                _run(log, folder, one)
+            except Rose2LogsError as error:
+                failed += 1
+                _tell(error, is_only=len(logs) == len(chosen) == 1)
     if failed:
         raise typer.Exit(EXIT_KNOWN)
+
+
+def _of_all_topics(log: Path, options: RunOptions) -> list[RunOptions]:
+    """Options for each topic of a log that holds maps."""
+    from rose2_logs.io import map_topics
+
+    return [dataclasses.replace(options, topic=topic) for topic in map_topics(log, options.reading)]
+
+
+def _folders(folder: Path, chosen: Sequence[RunOptions]) -> list[Path]:
+    """Folder for the results of each topic: that of the log itself if there is but one."""
+    from rose2_logs.batch.folders import safe_name
+
+    if len(chosen) == 1:
+        return [folder]
+    names: dict[str, None] = {}
+    for name in (safe_name(one.topic or "") for one in chosen):
+        free = (f"{name}_{number}" for number in count(2))
+        names[name if name not in names else next(each for each in free if each not in names)] = None
+    return [folder / name for name in names]
+
+
+def _run(log: Path, folder: Path, options: RunOptions) -> None:
+    """Analyze the maps of one topic, and print what came out."""
+    from rose2_logs.workflows.analyze import analyze_log
+
+    try:
+        with run_progress(folder.name) as on_snapshot:
+            result = analyze_log(log, folder, options, on_snapshot)
+        print_run(result)
+    except AlreadyWholeError as whole:
+        print_text(str(whole))
+
+
+def _tell(error: Rose2LogsError, *, is_only: bool) -> None:
+    """Show an error and go on, unless there is nothing else to do."""
+    if is_only:
+        raise error
+    show_error(error)
 
 
 @contextmanager
@@ -101,7 +166,11 @@ def print_run(result: RunResult) -> None:
     table = Table(box=None, show_header=False, pad_edge=False)
     left_out = f" ({totals.invalid} could not be analyzed)" if totals.invalid else ""
     table.add_row("maps", f"{totals.snapshots}{left_out}")
-    table.add_row("coverage", f"{totals.coverage_first:.1%} to {totals.coverage_last:.1%}")
+    parts = result.summary.parts
+    if len(parts) < 2:
+        table.add_row("coverage", f"{totals.coverage_first:.1%} to {totals.coverage_last:.1%}")
+    for number, part in parts.items() if len(parts) > 1 else ():
+        table.add_row(f"part {number}", _part(part))
     brief = len(result.summary.convergence.brief)
     over_the_run = f"{totals.tracks} over the run" + (f", {brief} only briefly" if brief else "")
     table.add_row("rooms at the end", f"{totals.rooms_last} ({over_the_run})")
@@ -123,6 +192,13 @@ def print_run(result: RunResult) -> None:
     print_line(f"results in [bold]{escape(str(result.folder))}[/]")
     for file in result.files:
         print_line(f"  {escape(file.name)}  {megabytes(file.stat().st_size)}")
+
+
+def _part(part: RunSummary) -> str:
+    """Say what a part of a run came to."""
+    totals = part.totals
+    coverage = f"coverage {totals.coverage_first:.1%} to {totals.coverage_last:.1%}"
+    return f"{counted(totals.snapshots, 'map')}, {coverage}, {counted(totals.rooms_last, 'room')} at its end"
 
 
 def _since(since: SnapshotRef, totals: RunTotals) -> str:

@@ -72,12 +72,21 @@ def report(
             rich_help_panel=WHAT,
         ),
     ] = PANELS,
+    part: Annotated[
+        int | None,
+        typer.Option(
+            metavar="N",
+            help="Part of the run, from 1, where the map was begun anew within the log. By default the last.",
+            show_default=False,
+            rich_help_panel=WHAT,
+        ),
+    ] = None,
     overwrite: Overwrite = False,
 ) -> None:
     """Write the results of a run as one HTML page with pictures, curves and tables. It needs no network."""
     from rose2_logs.outputs.report.overview import write_reports
 
-    written = write_reports(folder, out, panels=panels, overwrite=overwrite)
+    written = write_reports(folder, out, panels=panels, part=part, overwrite=overwrite)
     for page in written.pages:
         print_file(page)
     for error in written.failed:

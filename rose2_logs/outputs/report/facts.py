@@ -44,7 +44,8 @@ class Note:
 def subtitle(results: Run) -> list[tuple[str, str]]:
     """Log, time, topic and method, by name."""
     summary, found = results.summary, results.summary["results"]
-    span = results.columns["time_s"][-1]
+    time_s = results.columns["time_s"]
+    span = time_s[-1] - time_s[0]
     date = date_of(found.get("first_log_time_ns"))
     began = f"{date}, " if date else ""
     source = summary.get("input", {})
@@ -55,7 +56,19 @@ def subtitle(results: Run) -> list[tuple[str, str]]:
         ("Recorded", f"{began}{duration(span)} from the first to the last map"),
         ("Map topic", f"{summary['topic']} in frame {results.columns['frame_id'][-1]}"),
         ("Method", f"{summary['method']}, rose2-logs {summary['versions'].get('rose2-logs', '')}".strip()),
+        *_part(results),
     ]
+
+
+def _part(results: Run) -> list[tuple[str, str]]:
+    """Say which part of the log the page is about, where the log has several."""
+    if results.part is None:
+        return []
+    numbers = results.columns["snapshot"]
+    others = [number for number in results.parts if number != results.part]
+    more = f"; a report of part {' or '.join(map(str, others))} is written if it is named" if others else ""
+    count = results.summary.get("decided", {}).get("parts", {}).get("count", len(results.parts))
+    return [("Part of the log", f"{results.part} of {count}, maps {numbers[0]} to {numbers[-1]}{more}")]
 
 
 def tiles(results: Run, plan: RoomPlan) -> list[Tile]:

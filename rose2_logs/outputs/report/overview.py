@@ -12,7 +12,7 @@ from urllib.parse import quote
 from rose2_logs.drawing.pixels import as_pixels
 from rose2_logs.drawing.plan import PANEL, draw_plan
 from rose2_logs.drawing.svg import png_uri
-from rose2_logs.errors import LogError
+from rose2_logs.errors import LogError, ParameterError
 from rose2_logs.outputs.report import PANELS
 from rose2_logs.outputs.report.facts import is_last
 from rose2_logs.outputs.report.page import REPORT_NAME, render, write_page, write_report
@@ -61,7 +61,12 @@ class _Listed:
 
 
 def write_reports(
-    folder: Path, out: Path | None = None, *, panels: int = PANELS, overwrite: bool = False
+    folder: Path,
+    out: Path | None = None,
+    *,
+    panels: int = PANELS,
+    part: int | None = None,
+    overwrite: bool = False,
 ) -> ReportsWritten:
     """Write the report of a log, or of all logs below a folder with a page that lists them.
 
@@ -73,6 +78,8 @@ def write_reports(
         The page of one log; of several the folder for their pages. By default each goes next to its results.
     panels, overwrite
         As for `write_report`.
+    part : int, optional
+        As for `write_report`; only of one log.
 
     Returns
     -------
@@ -82,12 +89,17 @@ def write_reports(
     ------
     LogError
         If there are no results, or those of the only log cannot be read.
+    ParameterError
+        If there is no such part, or a part of several logs is wanted.
     OutputError
         If there is a page already that may not be replaced, or one cannot be written.
     """
     found = find_results(folder)
     if found == [folder]:
-        return ReportsWritten((write_report(folder, out, panels=panels, overwrite=overwrite),), ())
+        page = write_report(folder, out, panels=panels, part=part, overwrite=overwrite)
+        return ReportsWritten((page,), ())
+    if part is not None:
+        raise ParameterError(f"{folder}: holds the results of several logs; part={part} is of one of them")
     base = folder if out is None else out
     names = [each.relative_to(folder).as_posix() for each in found]
     pages = [base / (f"{name}/{REPORT_NAME}" if out is None else f"{name}.html") for name in names]

@@ -37,7 +37,12 @@ class Panel:
 
 
 def write_report(
-    folder: Path, out: Path | None = None, *, panels: int = PANELS, overwrite: bool = False
+    folder: Path,
+    out: Path | None = None,
+    *,
+    panels: int = PANELS,
+    part: int | None = None,
+    overwrite: bool = False,
 ) -> Path:
     """Write the report of a run.
 
@@ -46,9 +51,11 @@ def write_report(
     folder : path
         What `analyze_log` has written.
     out : path, optional
-        The page; by default ``report.html`` in the folder.
+        The page; by default ``report.html`` in the folder, or ``report_part_1.html`` of a part that is named.
     panels : int
         Small pictures of the layout along the run.
+    part : int, optional
+        The part to report on, of a run in which maps were begun anew; by default the last.
     overwrite : bool
         Whether an earlier page may be replaced.
 
@@ -61,12 +68,17 @@ def write_report(
     ------
     LogError
         If the results cannot be read.
+    ParameterError
+        If there is no such part.
     OutputError
         If there is a page already that may not be replaced, or it cannot be written.
     """
-    out = folder / REPORT_NAME if out is None else out
+    name = REPORT_NAME if part is None else f"report_part_{part}.html"
+    out = folder / name if out is None else out
     refuse_existing([out], overwrite=overwrite)
-    results = Run(folder)
+    results = Run(folder, part=part)
+    if part is None and results.parts:
+        results = Run(folder, part=results.parts[-1])
     text = render(
         "report.html.j2", **_content(results, panels, is_beside=out.parent.resolve() == folder.resolve())
     )

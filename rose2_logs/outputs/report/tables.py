@@ -26,6 +26,7 @@ from rose2_logs.runs.run import Run
 ROWS_MOST = 300
 """Rows of a table: more are useful to programs only, and those are in the Parquet tables."""
 EVENT_WORDS = {
+    "part_begun": "the map was begun anew",
     "shifted": "the whole map shifted",
     "split": "split",
     "merged": "merged with",

@@ -48,7 +48,8 @@ class RerunRecording(Sink):
     """Sink that writes a ``.rrd`` with its layout, or shows the run in an open viewer, or both.
 
     Timelines are ``message_log_time`` and ``ros2_timestamp`` (as in Rerun's own MCAP importer), ``snapshot``,
-    and ``coverage``, the greatest so far, in steps of 1e-4. Rooms stand under ``/world/rooms/TRACK``, their
+    and ``coverage``, the greatest so far, in steps of 1e-4; a part of the run that begins anew goes on where
+    the one before ends, so that its 50 % stand at 150 %. Rooms stand under ``/world/rooms/TRACK``, their
     areas under ``/run/area/TRACK``; they are cleared when their track is lost. What has not changed since the
     snapshot before is not logged again. The lanes of the tracks and the convergence, which only the last map
     tells, follow at the end; before them the back-projected rooms, in a second pass, if there is one.
@@ -87,6 +88,7 @@ class RerunRecording(Sink):
         self._back_projected: BackProjectedWorld | None = None
         self._extent = Extent()
         self._maps = 0
+        self._parts: list[int | None] = []
 
     def begin(self, info: RunInfo) -> None:
         """Open the file, or a viewer, and log what stays the same."""
@@ -121,7 +123,9 @@ class RerunRecording(Sink):
     def write(self, step: TrackedSnapshot) -> None:
         """Log one snapshot at all its times."""
         snapshot = step.snapshot
-        coverage = _steps(step.coverage)
+        if step.part not in self._parts:
+            self._parts.append(step.part)
+        coverage = self._steps(step.coverage, step.part)
         self._layers.begin(snapshot.log_time_ns, snapshot.stamp_ns, snapshot.index, coverage)
         self._extent.add(step)
         self._world.log(step, view_side_m(self._extent.low_m, self._extent.high_m))
@@ -143,7 +147,7 @@ class RerunRecording(Sink):
             self._layers.flush()
             self._back_projected = BackProjectedWorld(self._new_layers(), self._stream)
         view_m = view_side_m(self._extent.low_m, self._extent.high_m)
-        self._back_projected.log(found, _steps(found.coverage), view_m)
+        self._back_projected.log(found, self._steps(found.coverage, found.part), view_m)
         self._flush()
 
     def finish(self, summary: RunSummary) -> None:
@@ -168,6 +172,10 @@ class RerunRecording(Sink):
             self._recording.disconnect()
         if self._part is not None:
             self._part.unlink(missing_ok=True)
+
+    def _steps(self, coverage: float, part: int | None) -> int:
+        """Place on the coverage timeline."""
+        return round((self._parts.index(part) + coverage) / COVERAGE_UNIT)
 
     def _new_layers(self) -> Layers:
         # A live viewer shows each snapshot at once.
@@ -216,11 +224,6 @@ class RerunRecording(Sink):
             self._layers.add(f"/run/area/{track}", Scalar(area))
 
 
-def _steps(coverage: float) -> int:
-    """Place on the coverage timeline."""
-    return round(coverage / COVERAGE_UNIT)
-
-
 def _event_level(event: RoomEvent) -> str:
-    is_warning = event.kind in ("split", "merged", "lost", "shifted")
+    is_warning = event.kind in ("part_begun", "split", "merged", "lost", "shifted")
     return str(rr.TextLogLevel.WARN if is_warning else rr.TextLogLevel.INFO)

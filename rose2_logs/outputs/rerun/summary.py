@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 
 from rose2_logs.model.room_quality import UNSURE_SIGN, is_unsure
 from rose2_logs.outputs.rerun.blueprint import COVERAGE_UNIT
@@ -29,6 +30,7 @@ def summary_text(info: RunInfo, summary: RunSummary) -> str:
         What it came to.
     """
     histories, convergence, maps = summary.histories, summary.convergence, summary.totals.snapshots
+    parts = summary.parts if len(summary.parts) > 1 else {}
     minutes = "" if histories.last is None else f", {_duration(histories.last.time_s)}"
     rooms = len(histories.in_last_map)
     text = [
@@ -37,6 +39,7 @@ def summary_text(info: RunInfo, summary: RunSummary) -> str:
         f"{f', {len(convergence.brief)} only briefly' if convergence.brief else ''}; "
         f"{counted(maps, 'map')}{minutes}.",
     ]
+    text += [_parts_text(parts)] if parts else []
     final = summary.layout_final
     last = None if maps == 1 or histories.last is None else histories.last.snapshot
     text.append(
@@ -70,7 +73,8 @@ def summary_text(info: RunInfo, summary: RunSummary) -> str:
         "Percent of coverage: when the room was first seen; when its shape, including the unseen part, first "
         "overlapped its final shape by 0.8; since when its area has been within 10 % of the final one. "
         "Walls: share of its outline that is supported by walls. "
-        f"On the timeline `coverage`, {1 / COVERAGE_UNIT:.0f} is 100 %."
+        f"On the timeline `coverage`, {1 / COVERAGE_UNIT:.0f} is 100 %"
+        f"{', and each part begins at the next multiple of it' if parts else ''}."
     )
     about = {
         "log": info.origin or info.log_path.name,
@@ -84,6 +88,19 @@ def summary_text(info: RunInfo, summary: RunSummary) -> str:
         )
     )
     return "\n\n".join(text) + "\n"
+
+
+def _parts_text(parts: Mapping[int, RunSummary]) -> str:
+    """Say what each part came to, of a log in which the map was begun anew."""
+    named = (
+        f"part {number} with {counted(part.totals.snapshots, 'map')} and "
+        f"{counted(part.totals.rooms_last, 'room')} at its end"
+        for number, part in parts.items()
+    )
+    return (
+        f"**The map was begun anew**: {', '.join(named)}. Coverage is that of the part; what follows is of "
+        "the last one."
+    )
 
 
 def _worth_a_look(histories: TrackHistories) -> list[str]:

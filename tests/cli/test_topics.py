@@ -1,0 +1,89 @@
+"""Several map topics of a log are analyzed in one go, each to a folder of its own."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from reader_logs import SHARED, START_NS, Map, McapLog, Text
+
+import rose2_logs as rl
+from rose2_logs.errors import NoMapTopicError
+
+TOPICS = {"/map": 90, "/a/map": 50, "/a_map": 70}
+QUIET = ("--no-rrd", "--no-mcap")
+
+
+@pytest.fixture
+def log(tmp_path: Path) -> Path:
+    log = McapLog(tmp_path / "run.mcap")
+    log.add("/chatter", START_NS, Text("hello"))
+    for k, (topic, columns) in enumerate(TOPICS.items(), start=1):
+        cells = np.full((60, 100), 100, np.int8)
+        cells[5:55, 5:columns] = 0
+        log.add(topic, START_NS + k, Map(cells))
+    return log.close()
+
+
+def topics_in(folder: Path) -> dict[str, str]:
+    """Topic of each folder of results."""
+    found = {path.parent: json.loads(path.read_text("utf-8")) for path in folder.rglob("summary.json")}
+    return {path.relative_to(folder).as_posix(): summary["topic"] for path, summary in found.items()}
+
+
+def test_each_of_several_topics_has_its_own_folder(cli, log: Path, tmp_path: Path):
+    asked = ("--topic", "/a/map", "--topic", "/map", "--topic", "/a/map")
+    code, _, err = cli("analyze", log, "-o", tmp_path / "two", *asked, *QUIET)
+    assert (code, err) == (0, "")
+    assert topics_in(tmp_path / "two" / "run") == {"a_map": "/a/map", "map": "/map"}
+    code, _, err = cli("analyze", log, "-o", tmp_path / "all", "--all-topics", *QUIET)
+    assert (code, err) == (0, "")
+    names = topics_in(tmp_path / "all" / "run")
+    assert sorted(names.values()) == sorted(TOPICS)
+    assert set(names) == {"map", "a_map", "a_map_2"}
+    free = {
+        topic: rl.load(tmp_path / "all" / "run" / name).snapshots["free_area_m2"].tolist()
+        for name, topic in names.items()
+    }
+    assert free == {topic: [pytest.approx(50 * (right - 5) * 0.0025)] for topic, right in TOPICS.items()}
+    assert cli("report", tmp_path / "all" / "run")[0] == 0
+    assert (tmp_path / "all" / "run" / "report.html").exists()
+
+
+def test_a_single_topic_has_the_folder_of_the_log(cli, log: Path, tmp_path: Path):
+    assert cli("analyze", log, "-o", tmp_path / "one", "--topic", "a/map", *QUIET)[0] == 0
+    assert topics_in(tmp_path / "one") == {"run": "/a/map"}
+
+
+def test_a_topic_that_is_not_there_does_not_stop_the_others(cli, log: Path, tmp_path: Path):
+    code, _, err = cli("analyze", log, "-o", tmp_path, "--topic", "/b", "--topic", "/map", *QUIET)
+    assert code == 2
+    assert "/b is not a topic with occupancy grids" in err
+    assert topics_in(tmp_path / "run") == {"map": "/map"}
+
+
+@pytest.mark.parametrize("other", ["--topic", "--map-from"])
+def test_all_topics_and_one_exclude_each_other(cli, log: Path, tmp_path: Path, other: str):
+    code, _, err = cli("analyze", log, "-o", tmp_path / "out", "--all-topics", other, "/map")
+    assert (code, err) == (2, f"error: --all-topics and {other} exclude each other; pass one of them\n")
+    assert not (tmp_path / "out").exists()
+
+
+def test_topics_with_maps_are_listed(log: Path, tmp_path: Path):
+    assert rl.map_topics(log) == sorted(TOPICS)
+    none = McapLog(tmp_path / "none.mcap")
+    none.add("/chatter", START_NS, Text("hello"))
+    with pytest.raises(NoMapTopicError, match="no topic has occupancy grids"):
+        rl.map_topics(none.close())
+
+
+@pytest.mark.skipif(not (SHARED / "faults").is_dir(), reason="needs ../shared/faults")
+def test_the_maps_of_two_robots_and_the_merged_one(cli, tmp_path: Path):
+    log = SHARED / "faults" / "two_robots.mcap"
+    assert cli("analyze", log, "-o", tmp_path, "--all-topics", *QUIET)[::2] == (0, "")
+    names = {"map": "/map", "tb3_0_map": "/tb3_0/map", "tb3_1_map": "/tb3_1/map"}
+    assert topics_in(tmp_path / "two_robots") == names
+    for name in ("tb3_0_map", "tb3_1_map"):
+        assert rl.load(tmp_path / "two_robots" / name).summary["results"]["rooms_last"] == 7
