@@ -11,9 +11,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rose2_logs.errors import LogError, OutputError
+from rose2_logs.errors import LogError, OutputError, ResultsError
 from rose2_logs.model.occupancy import FloatArray
 from rose2_logs.outputs.rerun.blueprint import make_blueprint
+from rose2_logs.runs.stored_run import StoredRun
+from rose2_logs.runs.summary import SUMMARY
 
 if TYPE_CHECKING:
     from rerun.server import Server
@@ -112,13 +114,15 @@ def _set_layout(server: Server, name: str, recordings: Sequence[Path], scratch: 
 
 def _corners_m(recordings: Sequence[Path]) -> tuple[FloatArray, FloatArray]:
     """Corners (2,), in world meters, of the part of the world where the runs have their rooms."""
-    import pyarrow.parquet as pq
-
     points = []
     for path in recordings:
-        table = path.with_name("rooms.parquet")
-        if table.is_file():
-            columns = pq.read_table(table, columns=["label_x_m", "label_y_m"]).drop_null()
+        # A recording needs no results next to it; results that are damaged do not keep it from being shown.
+        if (path.parent / SUMMARY).is_file():
+            try:
+                columns = StoredRun(path.parent).table("rooms", ["label_x_m", "label_y_m"]).drop_null()
+            except (ResultsError, OutputError) as error:
+                logger.warning("%s; its recording is served all the same", error)
+                continue
             points.append(np.column_stack([column.to_numpy() for column in columns.columns]))
     known = np.concatenate([each for each in points if len(each)] or [np.empty((0, 2))])
     if not len(known):
