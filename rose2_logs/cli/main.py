@@ -31,7 +31,6 @@ app = App(
     "[bold]rose2-logs report results/run[/bold] makes a page of it.",
     epilog=EXIT_CODES,
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
     context_settings={"help_option_names": ["-h", "--help"]},

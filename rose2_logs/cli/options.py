@@ -168,7 +168,17 @@ def _typer_option(name: str, about: Option, default: Any) -> Any:
         help=f"Do not {about.help[0].lower()}{about.help[1:]}" if default is True else about.help,
         show_default=shown is not None,
         rich_help_panel=about.panel,
+        autocompletion=_completing(about.choices) if about.choices else None,
     )
+
+
+def _completing(choices: tuple[str, ...]) -> Callable[[str], list[str]]:
+    """Return what a shell asks for the names that begin as what was typed."""
+
+    def complete(incomplete: str) -> list[str]:
+        return [name for name in choices if name.startswith(incomplete)]
+
+    return complete
 
 
 def _built(kind: Any, command: str, given: dict[str, Any]) -> Any:

@@ -127,7 +127,9 @@ def _checked(name: str, declared: dataclasses.Field[Any], value: Any) -> float |
     meta = declared.metadata
     if "choices" in meta:
         if value not in meta["choices"]:
-            raise ParameterError(f"{name} is {reprlib.repr(value)}; it must be one of {', '.join(meta['choices'])}")
+            raise ParameterError(
+                f"{name} is {reprlib.repr(value)}; it must be one of {', '.join(meta['choices'])}"
+            )
     elif not meta["low"] <= value <= meta["high"]:
         shown = reprlib.repr(value) if isinstance(value, int) else value
         raise ParameterError(f"{name} is {shown}; it must lie between {meta['low']} and {meta['high']}")

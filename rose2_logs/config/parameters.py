@@ -108,9 +108,9 @@ class OccupancyParameters(ParameterBlock):
         0.05, "m", "Finer maps are analyzed in blocks of up to this size: the usual cell size of SLAM.", 0.0
     )
     analyzed_max_cells: int = number(
-        20_000_000,
+        10_000_000,
         "cells",
-        "Explored areas with more cells are analyzed in blocks: 220 m by 220 m at 5 cm.",
+        "Explored areas with more cells are analyzed in blocks: 158 m by 158 m at 5 cm.",
         10_000,
         2**40,
     )
@@ -474,7 +474,9 @@ class Parameters:
         if isinstance(value, cls):
             return value
         if value is not None and not isinstance(value, Mapping):
-            raise ParameterError(f"parameters must be Parameters or a dict of values, not {reprlib.repr(value)}")
+            raise ParameterError(
+                f"parameters must be Parameters or a dict of values, not {reprlib.repr(value)}"
+            )
         return cls().replaced(value or {})
 
     def resolved(self) -> dict[str, dict[str, float | int | str]]:

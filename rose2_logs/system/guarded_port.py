@@ -139,9 +139,7 @@ class _Gate:
         hosts = [line.partition(":")[2].strip() for line in lines if line.lower().startswith("host:")]
         return len(hosts) == 1 and is_welcome(hosts[0], self._names)
 
-    async def _pass_on(
-        self, head: bytes, reader: asyncio.StreamReader, writer: asyncio.StreamWriter
-    ) -> None:
+    async def _pass_on(self, head: bytes, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         from_server, to_server = await asyncio.open_connection(*self._behind)
         try:
             to_server.write(head)

@@ -15,7 +15,6 @@ from urllib.parse import parse_qs, urlsplit
 
 import pytest
 from commands import ROSE2_LOGS, WAIT_S, below, is_running, started, wait_for
-from finished_runs import run_of
 from saved_maps import save_run
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="needs signals of POSIX")
@@ -179,5 +178,7 @@ def test_a_viewer_that_a_failed_run_started_ends_with_it(tmp_path: Path, monkeyp
             raise rl.OutputError("nothing more can be written")
 
     with pytest.raises(rl.OutputError, match="nothing more"):
-        rl.analyze(save_run(tmp_path / "maps"), tmp_path / "out", sinks=[Failing()], live=True, recording=False)
+        rl.analyze(
+            save_run(tmp_path / "maps"), tmp_path / "out", sinks=[Failing()], live=True, recording=False
+        )
     wait_for(lambda: not viewer.listens(port))

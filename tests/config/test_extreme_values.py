@@ -72,7 +72,9 @@ PAIRS = [
 
 @pytest.mark.parametrize(("one", "other", "partner"), PAIRS, ids=lambda each: each)
 @pytest.mark.parametrize("turned", [False, True])
-def test_a_value_is_checked_with_its_partner(tmp_path: Path, one: str, other: str, partner: str, turned: bool):
+def test_a_value_is_checked_with_its_partner(
+    tmp_path: Path, one: str, other: str, partner: str, turned: bool
+):
     """In whatever order, and from a file as from settings."""
     path = tmp_path / "config.toml"
     block, name = one.partition("=")[0].split(".")

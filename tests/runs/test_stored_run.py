@@ -108,7 +108,10 @@ def change_summary(folder: Path, **values: object) -> None:
         (lambda folder: (folder / "summary.json").write_text("[1]"), "is not the summary of a run"),
         (lambda folder: change_summary(folder, topic=None), "its topic is missing"),
         (lambda folder: (folder / "summary.json").write_text('{"a": 1}'), "is not the summary of a run"),
-        (lambda folder: change_summary(folder, layout=3), "its layout is damaged: expected `object`, got `int`"),
+        (
+            lambda folder: change_summary(folder, layout=3),
+            "its layout is damaged: expected `object`, got `int`",
+        ),
         (lambda folder: change_summary(folder, messages=None), "its messages is missing"),
     ],
 )
@@ -246,7 +249,9 @@ def test_values_that_are_missing_are_named(copied: Path, name: str):
             nothing = pa.nulls(whole.num_rows, field.type)
             place = whole.schema.get_field_index(field.name)
             pq.write_table(whole.set_column(place, field.name, nothing), file)
-            assert f"its column {field.name} lacks values" in told(lambda: StoredRun(copied).table(name), file)
+            assert f"its column {field.name} lacks values" in told(
+                lambda: StoredRun(copied).table(name), file
+            )
 
 
 @pytest.mark.parametrize("name", TABLES)

@@ -194,7 +194,7 @@ class _OneFile(BaseHTTPRequestHandler):
         self._path, self._place, self._origin = path, place, origin
         super().__init__(*connection)
 
-    def do_GET(self) -> None:  # noqa: N802 (the name that http.server calls)
+    def do_GET(self) -> None:
         """Send the file."""
         if not is_welcome(self.headers.get("Host")):
             self.send_error(HTTPStatus.FORBIDDEN)

@@ -91,9 +91,7 @@ def test_parameters_of_a_method_are_its_own():
     for method in BASELINES:
         changed = PARAMETERS.replaced({method: EVERY_ROOM_TOO_SMALL})
         assert segment(method, free, changed).max() == 0
-        others = PARAMETERS.replaced(
-            {other: EVERY_ROOM_TOO_SMALL for other in BASELINES if other != method}
-        )
+        others = PARAMETERS.replaced({other: EVERY_ROOM_TOO_SMALL for other in BASELINES if other != method})
         assert (segment(method, free, others) == segment(method, free)).all()
 
 
