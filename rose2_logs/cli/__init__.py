@@ -1,1 +1,20 @@
 """The command line ``rose2-logs``: the only place that prints."""
+
+from __future__ import annotations
+
+import os
+import sys
+
+
+def _open_closed_streams() -> None:
+    """Lead standard streams that are closed nowhere: files that are opened later must not take their place."""
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        if getattr(sys, name) is None:
+            nowhere = os.open(os.devnull, os.O_RDWR)
+            if nowhere != number:
+                os.dup2(nowhere, number)
+                os.close(nowhere)
+            setattr(sys, name, open(number, "w" if number else "r", encoding="utf-8", closefd=False))  # noqa: PTH123, SIM115
+
+
+_open_closed_streams()
