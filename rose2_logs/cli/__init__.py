@@ -7,7 +7,7 @@ import sys
 
 
 def _open_closed_streams() -> None:
-    """Lead standard streams that are closed nowhere: files that are opened later must not take their place."""
+    """Lead standard streams that are closed nowhere, so that no file that is opened takes their place."""
     for number, name in enumerate(("stdin", "stdout", "stderr")):
         if getattr(sys, name) is None:
             nowhere = os.open(os.devnull, os.O_RDWR)

@@ -29,7 +29,7 @@ HIGHEST = {
 }
 """Upper bound of a parameter that names none, by its unit: buildings fit, slips of the unit do not."""
 TIMES_DEFAULT = {"m": 20.0, "cells": 20.0}
-"""And it is at most so many times the default: a length in centimeters taken for meters is a hundred times."""
+"""And it is at most so many times the default: centimeters taken for meters are a hundred times as much."""
 
 
 def number(default: float, unit: str, why: str, low: float = 0.0, high: float | None = None) -> Any:

@@ -271,8 +271,9 @@ def oddity(snapshot: OccupancySnapshot, parameters: OccupancyParameters) -> tupl
         )
     if np.count_nonzero(free) >= BORDER_LEAST_SIDES and is_scattered(free):
         return "no_building", (
-            f"its free cells have {sides_per_cell(free):.1f} sides each to cells that are not free, where the "
-            "floor of a building has 0.1: this is noise, or a picture of something else, and no map of a building"
+            f"its free cells have {sides_per_cell(free):.1f} sides each to cells that are not free, where "
+            "the floor of a building has 0.1: this is noise, or a picture of something else, and no map of a "
+            "building"
         )
     text = few_walls(snapshot, parameters)
     return None if text is None else ("few_walls", text)

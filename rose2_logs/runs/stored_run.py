@@ -363,7 +363,8 @@ def _read_summary(folder: Path) -> dict[str, Any]:
         written_by = f"rose2-logs {version}" if version else "another version"
         raise ResultsError(
             f"{folder}: was written by {written_by}, whose results this version cannot read; "
-            f"{MAKE_AGAIN} ({summary.get('log', 'no name is kept')}) to another folder, or overwrite this one",
+            f"{MAKE_AGAIN} ({summary.get('log', 'no name is kept')}) to another folder, or overwrite this "
+            "one",
             file=path,
         )
     if lack := what_it_lacks(summary):

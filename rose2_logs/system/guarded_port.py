@@ -1,7 +1,8 @@
 """A server of this machine behind a port that refuses pages of other sites.
 
-A browser lets a page read what its own host serves. A site whose name is made to point to 127.0.0.1 while its
-page is open (DNS rebinding) is such a host, but for the ``Host`` header of its requests, which names the site.
+A browser lets a page read what its own host serves. A site whose name is made to point to 127.0.0.1 while
+its page is open (DNS rebinding) is such a host, but for the ``Host`` header of its requests, which names the
+site.
 """
 
 from __future__ import annotations

@@ -284,7 +284,7 @@ def _context(function: Callable[..., Any], started: list[WorkerProcess]) -> Base
 
 
 def _start_fork_server() -> None:
-    """Start the process that workers are forked from, unless it runs; signals are blocked while it imports."""
+    """Start the process that workers are forked from, unless it runs; it imports with signals blocked."""
     from multiprocessing import forkserver, resource_tracker
 
     with held_back():

@@ -49,7 +49,8 @@ def stop(process: subprocess.Popen[str], number: int, to_group: bool = False) ->
 
 
 def shared_memory() -> set[str]:
-    return set(os.listdir("/dev/shm")) if Path("/dev/shm").is_dir() else set()
+    folder = Path("/dev/shm")
+    return {path.name for path in folder.iterdir()} if folder.is_dir() else set()
 
 
 @pytest.mark.parametrize("to_group", [False, True], ids=["to the command", "to all of its group"])

@@ -86,14 +86,16 @@ def test_an_output_that_is_full_is_told(log: Path, tmp_path: Path):
 
 
 def test_an_output_folder_that_is_removed_is_told(tmp_path: Path):
+    """Or made again, if nothing was written to it yet."""
     many, out = save_run(tmp_path / "maps", tuple(range(100, 240))), tmp_path / "out"
     with started(*ROSE2_LOGS, "analyze", many, "-o", out, *QUICK) as process:
         wait_for(lambda: list(out.rglob("*.part")))
         shutil.rmtree(out)
         _, err = process.communicate(timeout=WAIT_S)
-    assert (process.returncode, len(errors(err))) == (2, 1), err
     assert "internal error" not in err
-    assert not list(tmp_path.rglob("summary.json"))
+    assert (process.returncode, len(errors(err))) in ((2, 1), (0, 0)), err
+    assert process.returncode == 2 or is_whole(out / "maps")
+    assert process.returncode == 0 or not list(tmp_path.rglob("summary.json"))
 
 
 def mounted(folder: Path, kilobytes: int) -> bool:
@@ -146,13 +148,15 @@ def test_names_with_line_breaks_and_of_255_bytes(log: Path, tmp_path: Path, name
 
 
 def test_an_annotated_log_can_be_analyzed_again(tmp_path: Path):
-    """Its own maps are taken again; the same rooms are found."""
-    for log, out in (
-        (SAMPLE_LOGS / "office.mcap", "one"),
-        (tmp_path / "one/office/office.rose2.mcap", "two"),
-    ):
-        done = run('exec "$@"', "analyze", log, "-o", tmp_path / out, "--no-rrd", "--max-snapshots", 2)
-        assert (done.returncode, errors(done.stderr)) == (0, []), done.stderr
-    summaries = [json.loads(path.read_text()) for path in sorted(tmp_path.glob("*/*/summary.json"))]
-    assert summaries[0]["topic"] == summaries[1]["topic"]
-    assert summaries[1]["results"]["rooms_last"] > 0
+    """The maps of the robot are taken, not what was added; it is not annotated twice."""
+    options = ("--no-rrd", "--max-snapshots", 2)
+    run('exec "$@"', "analyze", SAMPLE_LOGS / "office.mcap", "-o", tmp_path / "one", *options)
+    annotated = tmp_path / "one" / "office" / "office.rose2.mcap"
+    done = run('exec "$@"', "analyze", annotated, "-o", tmp_path / "two", *options)
+    assert (done.returncode, len(errors(done.stderr))) == (2, 1)
+    assert "analyze the log it was made from" in done.stderr
+    done = run('exec "$@"', "analyze", annotated, "-o", tmp_path / "two", *options, "--no-mcap")
+    assert (done.returncode, errors(done.stderr)) == (0, [])
+    one, two = (json.loads(path.read_text()) for path in sorted(tmp_path.glob("*/*/summary.json")))
+    assert one["topic"] == two["topic"]
+    assert one["results"] == two["results"]

@@ -24,7 +24,8 @@ from drawn_maps import snapshot
 from rose2_logs.segmentation.pipeline import analyze
 start = time.process_time()
 found = analyze(snapshot(np.zeros((8000, 8000), np.int8)))
-print(len(found.rooms), time.process_time() - start, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024)
+peak_kb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+print(len(found.rooms), time.process_time() - start, peak_kb * 1024)
 """
 
 

@@ -48,8 +48,8 @@ def test_names_of_this_machine_are_welcome(host: str):
 @pytest.mark.parametrize(
     "host",
     [
-        None, "", "rebound.example", "rebound.example:51234", "127.0.0.1.example", "localhost.example", "evil@x",
-        "10.0.0.7", "[::2]", "localhost@rebound.example", "[", "127.0.0.1:80@rebound.example",
+        None, "", "rebound.example", "rebound.example:51234", "127.0.0.1.example", "localhost.example",
+        "evil@x", "10.0.0.7", "[::2]", "localhost@rebound.example", "[", "127.0.0.1:80@rebound.example",
     ],
 )  # fmt: skip
 def test_other_names_are_not(host: str | None):
@@ -105,18 +105,23 @@ def test_what_names_no_host_gets_nothing(head: bytes):
 
 def test_programs_that_speak_http_2_pass():
     """As Rerun's own viewer does, and no browser without encryption."""
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        with guarded_port("127.0.0.1", 0, server.getsockname()) as port:
-            with socket.create_connection(("127.0.0.1", port), timeout=60) as link:
-                link.sendall(HTTP2 + b"SM\r\n\r\n")
-                inside, _ = server.accept()
-                with inside:
-                    assert inside.recv(100).startswith(HTTP2)
-                    inside.sendall(b"settings")
-                assert link.recv(100) == b"settings"
+    with (
+        socket.create_server(("127.0.0.1", 0)) as server,
+        guarded_port("127.0.0.1", 0, server.getsockname()) as port,
+        socket.create_connection(("127.0.0.1", port), timeout=60) as link,
+    ):
+        link.sendall(HTTP2 + b"SM\r\n\r\n")
+        inside, _ = server.accept()
+        with inside:
+            assert inside.recv(100).startswith(HTTP2)
+            inside.sendall(b"settings")
+        assert link.recv(100) == b"settings"
 
 
 def test_a_port_in_use_is_an_error():
-    with socket.create_server(("127.0.0.1", 0)) as taken, pytest.raises(OSError, match="in use"):
-        with guarded_port("127.0.0.1", taken.getsockname()[1], ("127.0.0.1", 1)):
-            pass
+    with (
+        socket.create_server(("127.0.0.1", 0)) as taken,
+        pytest.raises(OSError, match="in use"),
+        guarded_port("127.0.0.1", taken.getsockname()[1], ("127.0.0.1", 1)),
+    ):
+        pass
