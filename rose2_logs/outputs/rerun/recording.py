@@ -167,10 +167,11 @@ class RerunRecording(Sink):
 
     def abandon(self) -> None:
         """Remove the file that was begun, and end the viewer that was started for it."""
-        if self._recording is not None and not self._is_lost:
-            self._recording.disconnect()
+        # First, so that what was not sent yet is not waited for.
         if self._viewer is not None:
             rerun_viewer.end(self._viewer)
+        if self._recording is not None and not self._is_lost:
+            self._recording.disconnect()
         if self._part is not None:
             self._part.unlink(missing_ok=True)
 
