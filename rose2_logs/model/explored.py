@@ -140,7 +140,7 @@ class ExploredPart:
 def sides_per_cell(free: BoolArray) -> float:
     """Sides between free cells of a map (H, W) and others, per free cell; 0 without any."""
     sides = np.count_nonzero(free[:, :-1] != free[:, 1:]) + np.count_nonzero(free[:-1] != free[1:])
-    return float(sides / max(np.count_nonzero(free), 1))
+    return int(sides) / max(int(np.count_nonzero(free)), 1)
 
 
 def is_scattered(free: BoolArray) -> bool:
