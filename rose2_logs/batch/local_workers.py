@@ -15,6 +15,7 @@ from types import TracebackType
 from typing import Self
 
 from rose2_logs.batch.task import LogOutcome, LogTask, Progress, analyze_task
+from rose2_logs.system import signals
 from rose2_logs.system.workers import limit_process_to_one_thread, usable_processes
 
 DEATH_TIMEOUT_S = 5.0
@@ -114,7 +115,7 @@ class _Worker:
 def _serve(connection: Connection) -> None:
     """Carry out the tasks that come through a pipe, one by one, until it is closed."""
     # Ctrl-C reaches the whole group of processes; the parent ends its workers itself.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signals.ignore()
     threading.Thread(target=_end_with_parent, daemon=True).start()
     limit_process_to_one_thread()
     while True:

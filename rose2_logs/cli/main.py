@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from contextlib import suppress
 from typing import Annotated
 
 import typer
@@ -10,8 +11,17 @@ import typer
 from rose2_logs import __version__
 from rose2_logs.cli import messages
 from rose2_logs.cli.commands import analyze, batch, compare, evaluate, info, results, segment, view
-from rose2_logs.cli.options import EXIT_CODES, EXIT_FAULT, EXIT_INTERRUPTED, EXIT_KNOWN, App, Debug
+from rose2_logs.cli.options import (
+    EXIT_CODES,
+    EXIT_FAULT,
+    EXIT_INTERRUPTED,
+    EXIT_KNOWN,
+    EXIT_SIGNALED,
+    App,
+    Debug,
+)
 from rose2_logs.errors import Rose2LogsError
+from rose2_logs.system.signals import heeded
 
 app = App(
     name="rose2-logs",
@@ -21,7 +31,6 @@ app = App(
     "[bold]rose2-logs report results/run[/bold] makes a page of it.",
     epilog=EXIT_CODES,
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -43,14 +52,18 @@ def main() -> None:
     """Run the command line and exit."""
     messages.style.debug = False
     try:
-        app()
+        with heeded() as came:
+            app()
     except Rose2LogsError as error:
         messages.show_error(error)
         sys.exit(EXIT_KNOWN)
     except SystemExit as ended:
-        # Typer ends so, without a word, upon Ctrl-C.
+        # Typer ends so, without a word, upon Ctrl-C and what is taken for it.
         if ended.code == EXIT_INTERRUPTED:
-            messages.error("interrupted; unfinished results were removed")
+            with suppress(OSError):  # the terminal may be gone
+                messages.error("interrupted; unfinished results were removed")
+            if came:
+                sys.exit(EXIT_SIGNALED + came[0])
         raise
     except OSError as error:
         where = f"{error.filename}: " if error.filename else ""

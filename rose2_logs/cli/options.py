@@ -22,10 +22,12 @@ MESSAGES = "Messages on stderr"
 VALUES = {bool: "", int: "N", str: "NAME", Path: "PATH"}
 """Placeholder in a command's help for the value of an option of this type, where it declares none."""
 EXIT_FAULT, EXIT_KNOWN, EXIT_INTERRUPTED = 1, 2, 130
+EXIT_SIGNALED = 128
+"""Plus the number of the signal, as shells have it."""
 EXIT_CODES = (
     "[bold]Exit codes:[/bold] 0 done, also with warnings, which summary.json counts; 1 internal error of "
     "rose2-logs; 2 a log, a file or an option cannot be used, or there was a warning with --strict, and one "
-    "line says which; 130 interrupted."
+    "line says which; 130 interrupted, 143 ended by TERM, 129 by HUP."
 )
 
 
@@ -166,7 +168,17 @@ def _typer_option(name: str, about: Option, default: Any) -> Any:
         help=f"Do not {about.help[0].lower()}{about.help[1:]}" if default is True else about.help,
         show_default=shown is not None,
         rich_help_panel=about.panel,
+        autocompletion=_completing(about.choices) if about.choices else None,
     )
+
+
+def _completing(choices: tuple[str, ...]) -> Callable[[str], list[str]]:
+    """Return what a shell asks for the names that begin as what was typed."""
+
+    def complete(incomplete: str) -> list[str]:
+        return [name for name in choices if name.startswith(incomplete)]
+
+    return complete
 
 
 def _built(kind: Any, command: str, given: dict[str, Any]) -> Any:

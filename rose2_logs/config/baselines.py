@@ -16,6 +16,7 @@ class MorphologicalParameters(ParameterBlock):
     """Baseline: morphological segmentation (survey of Bormann et al., ICRA 2016)."""
 
     block: ClassVar[str] = "morphological"
+    ascending: ClassVar[tuple[tuple[str, ...], ...]] = (("room_min_area_m2", "room_max_area_m2"),)
 
     room_min_area_m2: float = number(
         0.8, "m2", "A part left by erosion is a room above this area; the survey's value."
@@ -29,6 +30,7 @@ class DistanceParameters(ParameterBlock):
     """Baseline: distance transform segmentation (survey of Bormann et al., ICRA 2016)."""
 
     block: ClassVar[str] = "distance"
+    ascending: ClassVar[tuple[tuple[str, ...], ...]] = (("room_min_area_m2", "room_max_area_m2"),)
 
     room_min_area_m2: float = number(0.35, "m2", "Minimum area of a room's seed; the survey's value.")
     room_max_area_m2: float = number(163.0, "m2", "Maximum area of a room's seed; the survey's value.")
@@ -39,6 +41,7 @@ class VoronoiBaselineParameters(ParameterBlock):
     """Baseline: Voronoi segmentation (survey of Bormann et al., ICRA 2016)."""
 
     block: ClassVar[str] = "voronoi"
+    ascending: ClassVar[tuple[tuple[str, ...], ...]] = (("room_min_area_m2", "room_max_area_m2"),)
 
     room_min_area_m2: float = number(0.1, "m2", "Minimum area of a piece between cuts; the survey's value.")
     room_max_area_m2: float = number(1e6, "m2", "Maximum area of a piece; the survey's value: any.")

@@ -14,6 +14,7 @@ class ComparisonParameters(ParameterBlock):
     """Comparison of two runs in one building: placement, rooms, walls."""
 
     block: ClassVar[str] = "comparison"
+    ascending: ClassVar[tuple[tuple[str, ...], ...]] = (("pair_min_iou", "same_room_min_iou"),)
 
     wall_reach_m: float = number(
         0.2,
@@ -41,7 +42,7 @@ class ComparisonParameters(ParameterBlock):
         "cells",
         "Most cells of these grids along a side; in larger maps the cells are larger.",
         16,
-        2**15,
+        2**13,
     )
     wall_blur_m: float = number(
         0.5,
@@ -54,18 +55,18 @@ class ComparisonParameters(ParameterBlock):
         "turns",
         "Rotations tried, each also turned by 180 degrees: two for right angles, more for others.",
         1,
-        1000,
+        180,
     )
     turn_min_gap_rad: float = number(
         math.radians(3.0), "rad", "Rotations closer than this are one: the fit corrects the difference.", 1e-3
     )
-    starts_per_turn: int = number(3, "starts", "Number of best positions of each rotation.", 1, 1000)
+    starts_per_turn: int = number(3, "starts", "Number of best positions of each rotation.", 1, 100)
     starts_fitted: int = number(
-        10, "starts", "Number of best positions of all rotations that are refined by the fit.", 1, 1000
+        10, "starts", "Number of best positions of all rotations that are refined by the fit.", 1, 100
     )
     start_min_gap_m: float = number(1.0, "m", "Minimum distance between the positions of one rotation.")
     points_max: int = number(
-        4000, "points", "Wall cells of each map, evenly sampled, for which agreement is counted.", 10, 10**6
+        4000, "points", "Wall cells of each map, evenly sampled, for which agreement is counted.", 10, 10**5
     )
     faces_min_share: float = number(
         0.05,
@@ -125,7 +126,7 @@ class ComparisonParameters(ParameterBlock):
         "points",
         "Most such points per room; the spacing is larger in halls of more than 50 m.",
         100,
-        10**9,
+        10**7,
     )
     wall_step_m: float = number(
         0.1, "m", "Spacing of the points at which walls are examined: two cells of 5 cm.", 0.001

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+import math
 import numbers
+import reprlib
 from collections.abc import Mapping
 from dataclasses import field
 from typing import Any, ClassVar
@@ -26,6 +28,8 @@ HIGHEST = {
     "tracks": 1e6,
 }
 """Upper bound of a parameter that names none, by its unit: buildings fit, slips of the unit do not."""
+TIMES_DEFAULT = {"m": 20.0, "cells": 20.0}
+"""And it is at most so many times the default: centimeters taken for meters are a hundred times as much."""
 
 
 def number(default: float, unit: str, why: str, low: float = 0.0, high: float | None = None) -> Any:
@@ -40,9 +44,11 @@ def number(default: float, unit: str, why: str, low: float = 0.0, high: float | 
     why : str
         The sentence that says where the default comes from.
     low, high : float, optional
-        Bounds, both inclusive; the upper one is by default that of the unit, see `HIGHEST`.
+        Bounds, both inclusive; the upper one is by default that of the unit, see `HIGHEST` and
+        `TIMES_DEFAULT`.
     """
-    high = HIGHEST[unit] if high is None else high
+    if high is None:
+        high = min(HIGHEST[unit], TIMES_DEFAULT.get(unit, math.inf) * default)
     return field(default=default, metadata={"unit": unit, "why": why, "low": low, "high": high})
 
 
@@ -117,12 +123,15 @@ def _checked(name: str, declared: dataclasses.Field[Any], value: Any) -> float |
     kind: Any = type(declared.default)
     accepted: Any = {float: numbers.Real, int: numbers.Integral}.get(kind, kind)
     if isinstance(value, bool) or not isinstance(value, accepted):
-        raise ParameterError(f"{name} must be of type {kind.__name__}, not {value!r}")
+        raise ParameterError(f"{name} must be of type {kind.__name__}, not {reprlib.repr(value)}")
     meta = declared.metadata
     if "choices" in meta:
         if value not in meta["choices"]:
-            raise ParameterError(f"{name} is {value!r}; it must be one of {', '.join(meta['choices'])}")
+            raise ParameterError(
+                f"{name} is {reprlib.repr(value)}; it must be one of {', '.join(meta['choices'])}"
+            )
     elif not meta["low"] <= value <= meta["high"]:
-        raise ParameterError(f"{name} is {value}; it must lie between {meta['low']} and {meta['high']}")
+        shown = reprlib.repr(value) if isinstance(value, int) else value
+        raise ParameterError(f"{name} is {shown}; it must lie between {meta['low']} and {meta['high']}")
     checked: float | int | str = kind(value)
     return checked

@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 import difflib
 import math
+import reprlib
 import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -35,6 +36,9 @@ CELL_VALUES = ("auto", "stored", "percent", "zero_one", "fifty_unknown", "costs"
 
 FAR_CELLS = ("leave_out", "keep")
 """What can be done with known cells far from the rest of a map."""
+
+LONGEST_SHOWN = 100
+"""Signs of a setting that a message shows."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -134,7 +138,7 @@ class SpectrumParameters(ParameterBlock):
         0.2,
     )
     angle_sigma_rad: float = number(
-        math.radians(0.75), "rad", "Smoothing of the angular energy, three bins.", 0.0, 0.2
+        math.radians(0.75), "rad", "Smoothing of the angular energy, three bins.", 1e-4, 0.2
     )
     peak_min_prominence: float = number(
         0.12,
@@ -295,7 +299,7 @@ class FloorPlanParameters(ParameterBlock):
         10,
     )
     dbscan_max_weight: float = number(
-        0.24, "share", "DBSCAN joins faces with edges up to this weight: exp(-w / 0.125) = 0.15.", 0, 1
+        0.24, "share", "DBSCAN joins faces with edges up to this weight: exp(-w / 0.125) = 0.15.", 0.001, 1
     )
     join_min_openness: float = number(
         0.7, "share", "Faces are joined if at least this share of their known border is open.", 0, 1
@@ -426,7 +430,7 @@ class Parameters:
         for declared in dataclasses.fields(self):
             kind: Any = declared.default_factory
             if not isinstance(value := getattr(self, declared.name), kind):
-                raise ParameterError(f"{declared.name} must be {kind.__name__}, not {value!r}")
+                raise ParameterError(f"{declared.name} must be {kind.__name__}, not {reprlib.repr(value)}")
 
     def __repr__(self) -> str:
         blocks = ((block.name, getattr(self, block.name)) for block in dataclasses.fields(self))
@@ -456,7 +460,9 @@ class Parameters:
         if isinstance(value, cls):
             return value
         if value is not None and not isinstance(value, Mapping):
-            raise ParameterError(f"parameters must be Parameters or a dict of values, not {value!r}")
+            raise ParameterError(
+                f"parameters must be Parameters or a dict of values, not {reprlib.repr(value)}"
+            )
         return cls().replaced(value or {})
 
     def resolved(self) -> dict[str, dict[str, float | int | str]]:
@@ -493,7 +499,7 @@ def _by_block(changes: Mapping[str, Any], blocks: Iterable[str]) -> dict[str, di
             hint = meant or f"there are: {', '.join(blocks)}"
             raise ParameterError(f"no parameter block {name!r}; {hint}")
         if not isinstance(values, Mapping):
-            raise ParameterError(f"{name!r} must be a table of parameters, not {values!r}")
+            raise ParameterError(f"{name!r} must be a table of parameters, not {reprlib.repr(values)}")
         nested.setdefault(name, {}).update(values)
     return nested
 
@@ -545,13 +551,14 @@ def load_parameters(config: Path | None = None, settings: Iterable[str] = ()) ->
     if config is not None:
         try:
             parameters = parameters.replaced(tomllib.loads(config.read_text(encoding="utf-8")))
-        except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        except (OSError, ValueError, RecursionError) as error:
             raise ParameterError(f"{config}: cannot be read as TOML: {reason_of(error)}") from error
     for setting in settings:
         try:
             parsed = _parsed_setting(setting)
-        except tomllib.TOMLDecodeError as error:
-            raise ParameterError(f"setting {setting!r}: write it as block.name=value") from error
+        except (ValueError, RecursionError) as error:  # also a number of thousands of digits
+            shown = setting if len(setting) <= LONGEST_SHOWN else f"{setting[:LONGEST_SHOWN]}..."
+            raise ParameterError(f"setting {shown!r}: write it as block.name=value") from error
         if not all(isinstance(values, Mapping) for values in parsed.values()):
             meant = _meant(next(iter(parsed)))
             hint = f"; {meant}" if meant else ""

@@ -16,6 +16,9 @@ class RegionParameters(ParameterBlock):
     """Stage C with fitted borders: atoms of the floor, and how far they are joined."""
 
     block: ClassVar[str] = "regions"
+    ascending: ClassVar[tuple[tuple[str, ...], ...]] = (
+        ("surroundings_rest_min_edge", "surroundings_min_edge"),
+    )
 
     clean_min_score: float = number(
         0.35,

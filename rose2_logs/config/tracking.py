@@ -7,6 +7,10 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from rose2_logs.config.fields import ParameterBlock, number
+from rose2_logs.errors import ParameterError
+
+MOST_SEARCH_STEPS = 40
+"""Steps of the search to each side: 6,561 positions for each rotation, which a gigabyte holds."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -33,6 +37,7 @@ class TrackingParameters(ParameterBlock):
     block: ClassVar[str] = "tracking"
     ascending: ClassVar[tuple[tuple[str, ...], ...]] = (
         ("fit_gate_4_m", "fit_gate_3_m", "fit_gate_2_m", "fit_gate_1_m"),
+        ("fit_neighbors", "fit_min_points", "fit_points"),
     )
 
     match_min_iou: float = number(
@@ -63,7 +68,7 @@ class TrackingParameters(ParameterBlock):
         0.1, "m", "The whole map has moved if its walls moved by this on average: two cells of 5 cm.", 0.0
     )
     shift_search_m: float = number(
-        2.0, "m", "Largest shift of the whole map, as in a loop closure, that is searched.", 0.0, 50
+        2.0, "m", "Largest shift of the whole map, as in a loop closure, that is searched.", 0.0, 50.0
     )
     shift_search_rad: float = number(
         math.radians(5.0), "rad", "Largest rotation of the whole map that is searched.", 0.0, math.pi
@@ -82,10 +87,10 @@ class TrackingParameters(ParameterBlock):
         "points",
         "Wall cells, evenly sampled, that are aligned with the next map: enough for millimeters.",
         3,
-        10**6,
+        10**5,
     )
     fit_min_points: int = number(
-        50, "points", "Fewer wall cells cannot determine the alignment: two meters of wall.", 3, 10**6
+        50, "points", "Fewer wall cells cannot determine the alignment: two meters of wall.", 3, 10**5
     )
     fit_neighbors: int = number(
         12, "points", "Neighboring wall cells that give the direction of a wall: half a meter of it.", 2, 1000
@@ -118,13 +123,13 @@ class TrackingParameters(ParameterBlock):
     fit_better_share: float = number(
         0.05, "share", "A map has moved if this share more of its walls coincide than without the motion."
     )
-    search_points: int = number(500, "points", "Wall cells used in the search over many positions.", 3, 10**6)
-    search_raster_m: float = number(0.1, "m", "Cell size of the grid on which positions are searched.", 0.01)
+    search_points: int = number(500, "points", "Wall cells used in the search over many positions.", 3, 2000)
+    search_raster_m: float = number(0.1, "m", "Cell size of the grid on which positions are searched.", 0.02)
     search_step_m: float = number(
         0.3, "m", "Step of the search: less than the largest distance in the fit's first step.", 0.01
     )
     search_candidates: int = number(
-        5, "positions", "Number of best positions of the search that are refined by the fit.", 1, 1000
+        5, "positions", "Number of best positions of the search that are refined by the fit.", 1, 100
     )
     settled_area_tolerance: float = number(
         0.1, "share", "The area of a room has settled when it is within this share of its last area."
@@ -156,3 +161,11 @@ class TrackingParameters(ParameterBlock):
         1,
         10**6,
     )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.shift_search_m > MOST_SEARCH_STEPS * self.search_step_m:
+            raise ParameterError(
+                f"tracking.shift_search_m is {self.shift_search_m}; it must not be above {MOST_SEARCH_STEPS} "
+                f"times tracking.search_step_m, which is {self.search_step_m}"
+            )

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from rose2_logs.config.parameters import OccupancyParameters
 from rose2_logs.errors import InvalidMapError
 from rose2_logs.io.grids import Cells, Grid, MapWarning, Patch, percent
+from rose2_logs.model.explored import is_scattered, sides_per_cell
 from rose2_logs.model.labels import cells_where, label_sizes
 from rose2_logs.model.occupancy import HIGHEST_PERCENT, UNKNOWN, OccupancySnapshot, classify
 from rose2_logs.system.text import percent as as_percent
@@ -272,6 +273,24 @@ def _threshold_table(free_below: float, occupied_above: float) -> Cells:
     ):
         table[:101][which] = np.round(np.linspace(low, high, np.count_nonzero(which)))
     return table
+
+
+def oddity(snapshot: OccupancySnapshot, parameters: OccupancyParameters) -> tuple[str, str] | None:
+    """Say why the rooms of a map mean little: kind of the warning and its text; None where nothing is odd."""
+    free, _ = classify(snapshot.cells, parameters)
+    if not free.any() and bool((snapshot.cells != UNKNOWN).any()):
+        return "nothing_free", (
+            "none of its cells is free, so it has no rooms; if free cells hold higher values, raise the "
+            "parameter occupancy.free_max_percent"
+        )
+    if np.count_nonzero(free) >= BORDER_LEAST_SIDES and is_scattered(free):
+        return "no_building", (
+            f"its free cells have {sides_per_cell(free):.1f} sides each to cells that are not free, where "
+            "the floor of a building has 0.1: this is noise, or a picture of something else, and no map of a "
+            "building"
+        )
+    text = few_walls(snapshot, parameters)
+    return None if text is None else ("few_walls", text)
 
 
 def reading_of(maps: Iterable[Cells], parameters: OccupancyParameters, name: str) -> CellReading:

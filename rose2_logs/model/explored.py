@@ -18,6 +18,13 @@ NEIGHBORS = ((0, -1), (0, 1), (-1, 0), (1, 0), (-1, -1), (-1, 1), (1, -1), (1, 1
 """Where a coarse cell without a room looks for one: cells with a common side first."""
 
 
+SCATTERED_SIDES = 1.0
+"""Sides to other cells, for each free cell, from which on these are scattered: floors of buildings have 0.1,
+full of clutter 0.6, noise 2."""
+SCATTERED_MAX_CELLS = 500_000
+"""Scattered cells are no floor: a map of them is analyzed in so few blocks, as its rooms mean nothing."""
+
+
 @dataclass(frozen=True, eq=False)
 class ExploredPart:
     """The smallest window of a canvas that holds its known cells, with blocks of cells taken as one.
@@ -55,10 +62,15 @@ class ExploredPart:
         far = find_far_cells(cells, geometry.resolution_m, parameters)
         known = known_window(cells >= 0) if far is None else far.window
         free, occupied = classify(cells[known], parameters)
+        if not free.any():
+            nothing = np.zeros((1, 1), bool)  # walls alone enclose no room
+            return cls(geometry, (slice(0, 1), slice(0, 1)), 1, nothing, nothing, nothing, nothing)
         window = known_window(free | occupied)
         free, occupied = free[window].copy(), occupied[window].copy()
         window = _within(known, window)
         factor = block_side(geometry.resolution_m, free.size, parameters)
+        if free.size > SCATTERED_MAX_CELLS and is_scattered(free):
+            factor = max(factor, int(np.ceil(np.sqrt(free.size / SCATTERED_MAX_CELLS))))
         if factor == 1:
             return cls(geometry, window, 1, free, occupied, free, occupied)
         any_occupied: BoolArray = np.any(_blocks(occupied, factor), axis=(1, 3))
@@ -129,6 +141,17 @@ class ExploredPart:
         return values.repeat(self.factor, axis=0).repeat(self.factor, axis=1)[:height, :width]
 
 
+def sides_per_cell(free: BoolArray) -> float:
+    """Sides between free cells of a map (H, W) and others, per free cell; 0 without any."""
+    sides = np.count_nonzero(free[:, :-1] != free[:, 1:]) + np.count_nonzero(free[:-1] != free[1:])
+    return int(sides) / max(int(np.count_nonzero(free)), 1)
+
+
+def is_scattered(free: BoolArray) -> bool:
+    """Whether the free cells of a map (H, W) are strewn as in noise, and no floor."""
+    return sides_per_cell(free) > SCATTERED_SIDES
+
+
 def block_side(resolution_m: float, cells: int, parameters: OccupancyParameters) -> int:
     """Cells along the side of the blocks that a map is analyzed in.
 
@@ -149,7 +172,7 @@ def coarser_for_its_size(
 ) -> str | None:
     """Say that a map was analyzed coarser than it is because it is large; None if it was not."""
     usual = max(geometry.resolution_m, parameters.working_resolution_m) * (1 + 1e-9)
-    if analyzed_resolution_m <= usual:
+    if analyzed_resolution_m <= usual or np.prod(geometry.shape) <= parameters.analyzed_max_cells:
         return None
     return (
         f"more than {parameters.analyzed_max_cells} explored cells: analyzed at "

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import cached_property
 from numbers import Integral, Real
 from pathlib import Path
-from types import NoneType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -25,6 +25,7 @@ from rose2_logs.model.occupancy import GridGeometry
 from rose2_logs.model.room_plan import PlanMap, PlanRoom, RoomPlan
 from rose2_logs.model.rooms import Doorway
 from rose2_logs.runs.summary import RESULTS_FORMAT, SUMMARY
+from rose2_logs.runs.summary_schema import what_it_lacks
 from rose2_logs.runs.tables import BACK_PROJECTED, TABLES, Row, unpack_image
 from rose2_logs.system.files import reason_of, require_utf8
 from rose2_logs.system.text import percent
@@ -33,40 +34,6 @@ from rose2_logs.tracking.registration import RigidMotion
 if TYPE_CHECKING:
     import pyarrow as pa
 
-MISSING = object()
-"""The value of a key that is not there."""
-NUMBER = (int, float)
-SUMMARY_KEYS: dict[str, type | tuple[type, ...]] = {
-    "log": str,
-    "topic": str,
-    "method": str,
-    "input": dict,
-    "versions": dict,
-    "parameters": dict,
-    "messages": dict,
-    "warnings": dict,
-    "parameters.occupancy": dict,
-    "parameters.reading": dict,
-    "results": dict,
-    "results.snapshots": int,
-    "results.rooms_last": int,
-    "results.tracks": int,
-    "results.brief_tracks": int,
-    "results.coverage_first": NUMBER,
-    "results.coverage_last": NUMBER,
-    "results.events": dict,
-    "layout": dict,
-    "layout.final_since": (dict, NoneType),
-    "layout.known_final_since": (dict, NoneType),
-    "files": list,
-}
-"""What every summary holds, and is read from it."""
-PART_KEYS: dict[str, type] = {"part": int, "results": dict, "layout": dict}
-"""What the summary of a run in parts holds of each."""
-SINCE = ("layout.final_since", "layout.known_final_since")
-"""From which map on the layout, and what was known of it, was final; null if it never was."""
-SINCE_KEYS: dict[str, type | tuple[type, ...]] = {"snapshot": int, "time_s": NUMBER, "coverage": NUMBER}
-"""And what stands under each of these, unless it is null."""
 MAKE_AGAIN = "analyze the log again"
 """The remedy for results that cannot be used."""
 
@@ -116,6 +83,9 @@ class StoredRun:
                 raise ParameterError(f"{folder}: no part {part}; {has}")
             results = self.summary["results"] | of_part["results"]
             self.summary |= {"results": results, "layout": of_part["layout"]}
+        self._require_parameters()
+        for name in (*TABLES, *([BACK_PROJECTED] if self.is_back_projected else ())):
+            self._schema(name)
 
     @property
     def parts(self) -> tuple[int, ...]:
@@ -134,19 +104,23 @@ class StoredRun:
 
     @cached_property
     def parameters(self) -> Parameters:
-        """The parameters that the run had.
+        """The parameters that the run had."""
+        return Parameters().replaced(self.summary["parameters"])
 
-        Raises
-        ------
-        ResultsError
-            If they are not those of this version.
-        """
+    def _require_parameters(self) -> None:
+        """Refuse parameters that are not those of this version."""
+        path, kept = self.folder / SUMMARY, self.summary["parameters"]
         try:
-            return Parameters().replaced(self.summary["parameters"])
+            known = self.parameters.resolved()
         except ParameterError as error:
-            path = self.folder / SUMMARY
             text = f"{path}: is of another version ({error}); {MAKE_AGAIN}"
             raise ResultsError(text, file=path) from error
+        for block, values in known.items():
+            for name in values:
+                if name not in kept.get(block, {}):
+                    raise ResultsError(
+                        f"{path}: its parameters.{block}.{name} is missing; {MAKE_AGAIN}", file=path
+                    )
 
     @property
     def annotated_log(self) -> Path | None:
@@ -170,7 +144,6 @@ class StoredRun:
         ResultsError
             If it is not there, cannot be read or lacks a column.
         """
-        import pyarrow as pa
         import pyarrow.parquet as pq
 
         if name not in (*TABLES, BACK_PROJECTED):
@@ -178,12 +151,36 @@ class StoredRun:
         path = self.folder / f"{name}.parquet"
         rows = [] if snapshot is None else [("snapshot", "=", snapshot)]
         rows += [] if self.part is None else [("part", "=", self.part)]
-        try:
-            _require_columns(path, pq.read_schema(path), name, columns)
-            return pq.read_table(path, columns=columns, filters=rows or None, partitioning=None)
-        except (OSError, pa.ArrowException) as error:
-            why = " ".join(str(error).split())
-            raise ResultsError(f"{path}: cannot be read: {why}; {MAKE_AGAIN}", file=path) from error
+        schema = self._schema(name)  # the file may have changed since the folder was opened
+        with _reading(path):
+            read = pq.read_table(path, columns=columns, filters=rows or None, partitioning=None)
+        for field in schema:
+            if not field.nullable and field.name in read.column_names and read[field.name].null_count:
+                raise ResultsError(f"{path}: its column {field.name} lacks values; {MAKE_AGAIN}", file=path)
+        return read
+
+    def _schema(self, name: str) -> pa.Schema:
+        """Return the schema of a table, which its file has.
+
+        Raises
+        ------
+        ResultsError
+            If the file cannot be read, or a column is missing or of another type.
+        """
+        import pyarrow.parquet as pq
+
+        from rose2_logs.runs.table_schemas import SCHEMAS, with_part
+
+        path = self.folder / f"{name}.parquet"
+        with _reading(path):
+            found = pq.read_schema(path)
+        wanted = with_part(name) if self._parts else SCHEMAS[name]
+        for field in wanted:
+            at = found.get_field_index(field.name)
+            if at < 0 or found.field(at).type != field.type:
+                lack = "is missing" if at < 0 else f"is of type {found.field(at).type}, not {field.type}"
+                raise ResultsError(f"{path}: its column {field.name} {lack}; {MAKE_AGAIN}", file=path)
+        return wanted
 
     def shapes(self, name: str, wkb: list[bytes]) -> list[BaseGeometry]:
         """Read shapes of a table.
@@ -374,7 +371,7 @@ def _read_summary(folder: Path) -> dict[str, Any]:
         summary = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise ResultsError(f"{path}: cannot be read: {reason_of(error)}; {MAKE_AGAIN}", file=path) from error
-    if not isinstance(summary, dict) or not {"log", "topic", "results", "files"} <= summary.keys():
+    if not isinstance(summary, dict) or not {"log", "topic", "results"} & summary.keys():
         raise ResultsError(f"{path}: is not the summary of a run; give a folder of results", file=path)
     if summary.get("results_format") != RESULTS_FORMAT:
         versions = summary.get("versions")
@@ -382,31 +379,13 @@ def _read_summary(folder: Path) -> dict[str, Any]:
         written_by = f"rose2-logs {version}" if version else "another version"
         raise ResultsError(
             f"{folder}: was written by {written_by}, whose results this version cannot read; "
-            f"{MAKE_AGAIN} ({summary['log']}) to another folder, or overwrite this one",
+            f"{MAKE_AGAIN} ({summary.get('log', 'no name is kept')}) to another folder, or overwrite this "
+            "one",
             file=path,
         )
-    _require_keys(path, summary, SUMMARY_KEYS)
-    parts = summary.get("parts", [])
-    if not isinstance(parts, list) or not all(
-        isinstance(each, dict) and all(isinstance(each.get(key), kind) for key, kind in PART_KEYS.items())
-        for each in parts
-    ):
-        raise ResultsError(f"{path}: its parts are damaged; {MAKE_AGAIN}", file=path)
-    for since in SINCE:
-        block, name = since.split(".")
-        if summary[block][name] is not None:
-            _require_keys(path, summary, {f"{since}.{key}": kind for key, kind in SINCE_KEYS.items()})
+    if lack := what_it_lacks(summary):
+        raise ResultsError(f"{path}: {lack}; {MAKE_AGAIN}", file=path)
     return summary
-
-
-def _require_keys(path: Path, summary: dict[str, Any], keys: Mapping[str, type | tuple[type, ...]]) -> None:
-    """Refuse a summary in which a dotted key is missing or has a value of another type."""
-    for key, kind in keys.items():
-        value: Any = summary
-        for name in key.split("."):
-            value = value.get(name, MISSING)
-        if not isinstance(value, kind):
-            raise ResultsError(f"{path}: its {key} is missing or damaged; {MAKE_AGAIN}", file=path)
 
 
 def _ends(table: pa.Table) -> NDArray[np.float64]:
@@ -414,17 +393,18 @@ def _ends(table: pa.Table) -> NDArray[np.float64]:
     return np.column_stack([table[name].to_numpy() for name in ("x0_m", "y0_m", "x1_m", "y1_m")])
 
 
-def _require_columns(path: Path, schema: pa.Schema, name: str, columns: list[str] | None) -> None:
-    """Refuse a table that lacks columns, or whose columns are not of their types."""
-    from rose2_logs.runs.table_schemas import SCHEMAS
+@contextmanager
+def _reading(path: Path) -> Iterator[None]:
+    """Turn what goes wrong with a table's file into one line that names it."""
+    import pyarrow as pa
 
-    for field in SCHEMAS[name]:
-        # Rows of a map are found by its number.
-        if columns is None or field.name in (*columns, "snapshot"):
-            at = schema.get_field_index(field.name)
-            if at < 0 or schema.field(at).type != field.type:
-                lack = "is missing" if at < 0 else f"is not of type {field.type}"
-                raise ResultsError(f"{path}: its column {field.name} {lack}; {MAKE_AGAIN}", file=path)
+    try:
+        yield
+    except FileNotFoundError as error:
+        raise ResultsError(f"{path}: there is no such file; {MAKE_AGAIN}", file=path) from error
+    except (OSError, pa.ArrowException) as error:
+        why = " ".join(str(error).split())
+        raise ResultsError(f"{path}: cannot be read: {why}; {MAKE_AGAIN}", file=path) from error
 
 
 def _room(row: Row, shape: BaseGeometry) -> PlanRoom:

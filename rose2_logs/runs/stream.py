@@ -12,7 +12,7 @@ from pathlib import Path
 from rose2_logs.config.parameters import Parameters
 from rose2_logs.config.run_options import RunOptions
 from rose2_logs.errors import InvalidMapError
-from rose2_logs.io.cell_values import few_walls
+from rose2_logs.io.cell_values import oddity
 from rose2_logs.io.log import LogReader
 from rose2_logs.io.poses import RobotPath
 from rose2_logs.model.analysis import SnapshotAnalysis
@@ -138,9 +138,9 @@ class TrackedStream:
         """
         lasts = reader.lasts()
         for last in lasts.values():
-            if (text := few_walls(last, parameters.occupancy)) is not None:
-                text = f"{reader.info.path}: the last map on {reader.topic}: {text}"
-                log_warning(logger, "few_walls", text, file=reader.info.path, topic=reader.topic)
+            if (odd := oddity(last, parameters.occupancy)) is not None:
+                text = f"{reader.info.path}: the last map on {reader.topic}: {odd[1]}"
+                log_warning(logger, odd[0], text, file=reader.info.path, topic=reader.topic)
         *_, last = lasts.values()
         stream = cls(
             reader.snapshots(),

@@ -21,7 +21,9 @@ from types import ModuleType, TracebackType
 from typing import TYPE_CHECKING, Any, Generic, Self, TypeVar
 
 from rose2_logs.errors import Rose2LogsError
+from rose2_logs.system import signals
 from rose2_logs.system.shared_memory import Packed, pack, shared_memory_folders, unpack
+from rose2_logs.system.signals import STOPPING, held_back
 
 if TYPE_CHECKING:
     from threadpoolctl import ThreadpoolController
@@ -218,9 +220,13 @@ class WorkerProcess(_CONTEXT.Process):  # type: ignore[misc]
     """
 
     def start(self) -> None:
-        """Start the process; Ctrl-C comes after it, when it can be ended, not while it is half started."""
-        with _interrupts_held_back():
+        """Start the process; signals come after it, when it can be ended, not while it is half started."""
+        with held_back():
             super().start()
+
+    def terminate(self) -> None:
+        """End the process, which leaves all other signals to the one that started it."""
+        self.kill()
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _awakened, (bytes(ForkingPickler.dumps(self.__dict__)),)
@@ -238,7 +244,7 @@ class WorkerProcess(_CONTEXT.Process):  # type: ignore[misc]
 
 def _awakened(state: bytes) -> WorkerProcess:
     """Unpack, in a process that starts, what it is to do; if its parent is gone by now, end it silently."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signals.ignore()
     try:
         known = ForkingPickler.loads(state)
     except (OSError, EOFError):
@@ -250,28 +256,6 @@ def _awakened(state: bytes) -> WorkerProcess:
     process = WorkerProcess.__new__(WorkerProcess)
     process.__dict__.update(known)
     return process
-
-
-@contextmanager
-def _interrupts_held_back() -> Iterator[None]:
-    """Let a Ctrl-C that comes while the context lasts take effect after it."""
-    before = signal.getsignal(signal.SIGINT)
-    if threading.current_thread() is not threading.main_thread() or not callable(before):
-        yield
-        return
-    came = False
-
-    def remember(*_: object) -> None:
-        nonlocal came
-        came = True
-
-    signal.signal(signal.SIGINT, remember)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
-        if came:
-            signal.raise_signal(signal.SIGINT)
 
 
 def _context(function: Callable[..., Any], started: list[WorkerProcess]) -> BaseContext:
@@ -300,13 +284,16 @@ def _context(function: Callable[..., Any], started: list[WorkerProcess]) -> Base
 
 
 def _start_fork_server() -> None:
-    """Start the process that workers are forked from, unless it runs; Ctrl-C is blocked while it imports."""
+    """Start the process that workers are forked from, unless it runs; it imports with signals blocked."""
     from multiprocessing import forkserver, resource_tracker
 
-    resource_tracker.ensure_running()  # it would unblock the signal itself
-    with _interrupts_held_back():
-        before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    with held_back():
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, STOPPING)
         try:
+            # It ends with this process. Of the signals it unblocks those that it knows itself: not HUP, which
+            # would end it before what it tracks is removed.
+            resource_tracker.ensure_running()
+            signal.pthread_sigmask(signal.SIG_BLOCK, STOPPING)
             forkserver.ensure_running()
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
@@ -337,9 +324,9 @@ _folders: tuple[str, ...]
 
 
 def _begin(function: Callable[[Any], Any], folders: tuple[str, ...]) -> None:
-    """Initialize a worker process; Ctrl-C is left to the parent, which then ends its workers."""
+    """Initialize a worker process; stopping is left to the parent, which then ends its workers."""
     global _function, _folders
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signals.ignore()
     keep_freed_memory()
     _function, _folders = function, folders
     threading.Thread(target=_end_with_parent, daemon=True).start()

@@ -20,7 +20,7 @@ from rose2_logs.drawing.plan import draw_segmentation
 from rose2_logs.drawing.plot import plot_plan
 from rose2_logs.errors import LogError, ParameterError
 from rose2_logs.io import open_log
-from rose2_logs.io.cell_values import few_walls
+from rose2_logs.io.cell_values import oddity
 from rose2_logs.io.discovery import IMAGE_ENDINGS
 from rose2_logs.io.saved_maps import MapFilesSource
 from rose2_logs.model.analysis import SnapshotAnalysis, left_out_note
@@ -155,13 +155,13 @@ def segment_snapshot(
 ) -> Segmentation:
     """Segment a single map.
 
-    It is warned of what was left out, of hardly any walls, and of coarser cells that a large map took.
+    It is warned of what was left out, of a map that is odd, and of coarser cells that a large map took.
     """
     far = find_far_cells(snapshot.cells, snapshot.geometry.resolution_m, parameters.occupancy)
     if far is not None:
         log_warning(logger, "far_cells", f"{name}: {far.note}")
-    if (text := few_walls(snapshot, parameters.occupancy)) is not None:
-        log_warning(logger, "few_walls", f"{name}: {text}")
+    if (odd := oddity(snapshot, parameters.occupancy)) is not None:
+        log_warning(logger, odd[0], f"{name}: {odd[1]}")
     found, tree = analyze_with_tree(snapshot, parameters, method, voronoi=voronoi)
     coarser = coarser_for_its_size(snapshot.geometry, found.resolution_m, parameters.occupancy)
     for note in (coarser, left_out_note(found.outside_m2, found.free_area_m2)):

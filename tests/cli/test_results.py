@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import json
+import re
+import shutil
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
+import pyarrow.parquet as pq
 import pytest
 from PIL import Image
 from saved_maps import save_map, two_rooms
+
+import rose2_logs as rl
 
 
 def test_report_writes_a_page(cli, office_results: Path, tmp_path: Path):
@@ -81,3 +87,43 @@ def test_nothing_is_replaced_unasked(cli, office_results: Path, tmp_path: Path):
         code, _, err = cli(*arguments)
         assert (code, "--overwrite" in err) == (2, True)
         assert cli(*arguments, "--overwrite")[0] == 0
+
+
+def _without_key(folder: Path) -> str:
+    path = folder / "summary.json"
+    summary = json.loads(path.read_text())
+    del summary["results"]["coverage_last"]
+    path.write_text(json.dumps(summary))
+    return "its results.coverage_last is missing"
+
+
+def _without_file(folder: Path) -> str:
+    (folder / "lines.parquet").unlink()
+    return "lines.parquet: there is no such file"
+
+
+def _of_another_type(folder: Path) -> str:
+    path = folder / "events.parquet"
+    table = pq.read_table(path, partitioning=None)
+    place = table.schema.get_field_index("track")
+    pq.write_table(table.set_column(place, "track", table["track"].cast("string")), path)
+    return "events.parquet: its column track is of type string, not int32"
+
+
+@pytest.mark.parametrize("damage", [_without_key, _without_file, _of_another_type])
+def test_every_command_names_what_damaged_results_lack(cli, office_results: Path, tmp_path: Path, damage):
+    """Whether it needs it or not: a folder is checked as a whole when it is opened. Nothing is written."""
+    folder = shutil.copytree(office_results, tmp_path / "damaged")
+    lack = damage(folder)
+    before = sorted(path.name for path in folder.iterdir())
+    for command in (
+        ("report", folder), ("figure", folder), ("export", folder, "--format", "geojson"),
+        ("compare", office_results, folder, "-o", tmp_path / "compared"),
+        ("compare", folder, office_results, "-o", tmp_path / "compared"),
+    ):  # fmt: skip
+        code, _, err = cli(*command)
+        assert (code, lack in err, len(err.splitlines())) == (2, True, 1), (command, err)
+    with pytest.raises(rl.ResultsError, match=re.escape(lack)):
+        rl.load(folder)
+    assert sorted(path.name for path in folder.iterdir()) == before
+    assert not (tmp_path / "compared").exists()

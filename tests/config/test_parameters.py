@@ -52,7 +52,7 @@ def test_numbers_beyond_their_bounds_are_refused():
     [
         (
             lambda: WallParameters(segment_min_length_m=-5.0),
-            "walls.segment_min_length_m is -5.0; it must lie between 0.01 and 100.0",
+            "walls.segment_min_length_m is -5.0; it must lie between 0.01 and 8.0",
         ),
         (
             lambda: FloorPlanParameters(grouping="dbscann"),

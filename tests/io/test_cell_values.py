@@ -8,7 +8,7 @@ from reader_logs import SHARED, START_NS, Map, McapLog, Update
 from rose2_logs.config.parameters import OccupancyParameters, Parameters
 from rose2_logs.errors import ParameterError
 from rose2_logs.io import open_log
-from rose2_logs.io.cell_values import STORED, count_values, decide, few_walls
+from rose2_logs.io.cell_values import STORED, count_values, decide, few_walls, oddity
 from rose2_logs.model.occupancy import GridGeometry, OccupancySnapshot
 from rose2_logs.system.warnings import StrictError, collect_warnings
 
@@ -186,6 +186,18 @@ def test_a_map_with_hardly_any_wall_is_told_of_and_others_are_not():
     without = np.where(building() == 100, -1, building())
     assert "only 0% of the border" in few_walls(snapshot_of(without), usual)
     assert few_walls(snapshot_of(without[10:20, 10:20]), usual) is None
+
+
+def test_maps_that_are_none_of_a_building_are_told_of_by_kind():
+    usual, noise = OccupancyParameters(), np.random.default_rng(5)
+    assert oddity(snapshot_of(building()), usual) is None
+    assert oddity(snapshot_of(np.full((9, 9), -1, np.int8)), usual) is None
+    without = np.where(building() == 100, -1, building())
+    full = np.full((90, 90), 100, np.int8)
+    strewn = noise.choice(np.array([-1, 0, 100], np.int8), (200, 200))
+    told = [oddity(snapshot_of(cells), usual) for cells in (without, full, strewn)]
+    assert [each[0] for each in told] == ["few_walls", "nothing_free", "no_building"]
+    assert all("\n" not in each[1] for each in told)
 
 
 def save(folder, pixels, name="map", **described):

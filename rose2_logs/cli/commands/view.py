@@ -47,12 +47,11 @@ def view(
     source = viewer.find_recording(recording)
     if not web:
         raise typer.Exit(viewer.show(source))
-    with viewer.served_page(source, port) as (url, server):
+    with viewer.served_page(source, port) as (url, server), suppress(KeyboardInterrupt):
         print_line(f"{url} shows it until Ctrl-C is pressed")
         if viewer.has_screen():
             typer.launch(url)
-        with suppress(KeyboardInterrupt):
-            server.wait()
+        server.wait()
 
 
 def serve(

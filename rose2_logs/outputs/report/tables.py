@@ -231,7 +231,7 @@ def software_table(results: Run) -> Table:
         about["time of the analysis"] = f"{seconds['run']:.1f} s, {seconds.get('workers', 1)} process(es)"
     for stage, total in seconds.get("stages", {}).items():
         about[f"stage {stage}"] = (
-            f"{total:.2f} s in all, {seconds['stages_max'][stage]:.2f} s at most for a map"
+            f"{total:.2f} s in all, {seconds['stages_max'].get(stage, total):.2f} s at most for a map"
         )
     columns = (Column("what", is_number=False), Column("value", is_number=False))
     return Table(

@@ -5,15 +5,20 @@ from __future__ import annotations
 import logging
 import tempfile
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
+from urllib.parse import urlsplit
 
 import numpy as np
 
-from rose2_logs.errors import LogError, OutputError
+from rose2_logs.errors import LogError, OutputError, ResultsError
 from rose2_logs.model.occupancy import FloatArray
 from rose2_logs.outputs.rerun.blueprint import make_blueprint
+from rose2_logs.runs.stored_run import StoredRun
+from rose2_logs.runs.summary import SUMMARY
+from rose2_logs.system.files import reason_of
+from rose2_logs.system.guarded_port import guarded_port, hidden_address
 
 if TYPE_CHECKING:
     from rerun.server import Server
@@ -35,7 +40,7 @@ def serve_recordings(folder: Path, host: str, port: int) -> Iterator[tuple[str, 
     folder : path
         Searched at any depth. Of recordings of one and the same run the newest is taken.
     host : str
-        Address to listen on.
+        Address or name to listen on; a page may name it so, or by the names of this machine alone.
     port : int
         Port to listen on; 0 for any that is free.
 
@@ -57,13 +62,21 @@ def serve_recordings(folder: Path, host: str, port: int) -> Iterator[tuple[str, 
 
     recordings = find_recordings(folder)
     name = folder.resolve().name or "recordings"
-    try:
-        server = Server(host=host, port=port, datasets={name: [str(path) for path in recordings]})
-    except (OSError, ValueError) as error:
-        raise OutputError(f"{host}:{port}: no server can be started there: {error}") from error
-    with server, tempfile.TemporaryDirectory(prefix="rose2_logs_") as scratch:
+    # Rerun's server answers pages of any site; what stands before it only those of its own names.
+    hidden = hidden_address()
+    with ExitStack() as stack:
+        try:
+            server = stack.enter_context(
+                Server(host=hidden, port=0, datasets={name: [str(path) for path in recordings]})
+            )
+            behind = hidden, urlsplit(server.url().removeprefix("rerun+")).port or 0
+            port = stack.enter_context(guarded_port(host, port, behind))
+        except (OSError, ValueError, OverflowError) as error:
+            raise OutputError(f"{host}:{port}: no server can be started there: {reason_of(error)}") from error
+        scratch = stack.enter_context(tempfile.TemporaryDirectory(prefix="rose2_logs_"))
         _set_layout(server, name, recordings, Path(scratch))
-        yield server.url(), len(recordings)
+        shown = f"[{host}]" if ":" in host else host
+        yield f"rerun+http://{shown}:{port}", len(recordings)
 
 
 def find_recordings(folder: Path) -> list[Path]:
@@ -112,13 +125,15 @@ def _set_layout(server: Server, name: str, recordings: Sequence[Path], scratch: 
 
 def _corners_m(recordings: Sequence[Path]) -> tuple[FloatArray, FloatArray]:
     """Corners (2,), in world meters, of the part of the world where the runs have their rooms."""
-    import pyarrow.parquet as pq
-
     points = []
     for path in recordings:
-        table = path.with_name("rooms.parquet")
-        if table.is_file():
-            columns = pq.read_table(table, columns=["label_x_m", "label_y_m"]).drop_null()
+        # A recording needs no results next to it; results that are damaged do not keep it from being shown.
+        if (path.parent / SUMMARY).is_file():
+            try:
+                columns = StoredRun(path.parent).table("rooms", ["label_x_m", "label_y_m"]).drop_null()
+            except (ResultsError, OutputError) as error:
+                logger.warning("%s; its recording is served all the same", error)
+                continue
             points.append(np.column_stack([column.to_numpy() for column in columns.columns]))
     known = np.concatenate([each for each in points if len(each)] or [np.empty((0, 2))])
     if not len(known):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import subprocess
 from collections.abc import Collection
 from pathlib import Path
 
@@ -81,6 +82,7 @@ class RerunRecording(Sink):
         self._live = live
         self._wanted = layers
         self._recording: rr.RecordingStream | None = None
+        self._viewer: subprocess.Popen[bytes] | None = None
         self._viewer_answers = live
         self._is_lost = False
         self._shown: set[int] = set()
@@ -107,7 +109,8 @@ class RerunRecording(Sink):
                 self._part.parent.mkdir(parents=True, exist_ok=True)
             sinks.append(rr.FileSink(str(self._part)))
         if self._live:
-            sinks.append(rr.GrpcSink(rerun_viewer.open_viewer(rerun_viewer.VIEWER_PORT)))
+            address, self._viewer = rerun_viewer.open_viewer(rerun_viewer.VIEWER_PORT)
+            sinks.append(rr.GrpcSink(address))
         self._stream.set_sinks(*sinks)
         self._stream.set_log_time_enabled(False)
         self._stream.set_log_tick_enabled(False)
@@ -167,7 +170,10 @@ class RerunRecording(Sink):
                 self._part.replace(self._path)
 
     def abandon(self) -> None:
-        """Remove the file that was begun."""
+        """Remove the file that was begun, and end the viewer that was started for it."""
+        # First, so that what was not sent yet is not waited for.
+        if self._viewer is not None:
+            rerun_viewer.end(self._viewer)
         if self._recording is not None and not self._is_lost:
             self._recording.disconnect()
         if self._part is not None:

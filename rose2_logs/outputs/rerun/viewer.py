@@ -3,19 +3,27 @@
 from __future__ import annotations
 
 import os
+import secrets
+import shutil
 import signal
 import socket
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
+from functools import partial
+from http import HTTPStatus
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 from urllib.parse import quote
 
 from rose2_logs.errors import LogError, OutputError
+from rose2_logs.system.files import reason_of
+from rose2_logs.system.guarded_port import is_welcome
 
 VIEWER_PORT = 9876
 """Where Rerun's viewer listens by default."""
@@ -23,15 +31,20 @@ VIEWER_START_S, VIEWER_SETTLE_S = 120.0, 1.0
 """Longest wait for a viewer, which starts within seconds unless the machine is busy; time for it to fail."""
 PAGE_PORT = 9090
 """Where Rerun serves its web viewer by default."""
-SERVER_MEMORY = "50%"
 SCREENS = ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET")
 """Environment variables that are set where there is a screen."""
 RERUN = (sys.executable, "-m", "rerun", "--bind", "127.0.0.1")
 """Rerun's servers answer the whole network by default."""
 
 
-def open_viewer(port: int) -> str:
-    """Start a viewer, for this machine only, unless one is open; return its address.
+def open_viewer(port: int) -> tuple[str, subprocess.Popen[bytes] | None]:
+    """Start a viewer, for this machine only, unless one is open.
+
+    Returns
+    -------
+    address : str
+    process : Popen or None
+        The viewer, if it was started; see `end`.
 
     Raises
     ------
@@ -40,18 +53,22 @@ def open_viewer(port: int) -> str:
     """
     address = f"rerun+http://127.0.0.1:{port}/proxy"
     if listens(port):
-        return address
+        return address, None
     command, nowhere = [*RERUN, "--port", str(port)], subprocess.DEVNULL
     viewer = subprocess.Popen(command, stdout=nowhere, stderr=nowhere, start_new_session=True)
-    end = time.monotonic() + VIEWER_START_S
-    while time.monotonic() < end and viewer.poll() is None:
-        if listens(port):
-            # A viewer without a screen listens for a moment before it ends.
-            time.sleep(VIEWER_SETTLE_S)
-            if viewer.poll() is None:
-                return address
-        time.sleep(0.1)
-    _end(viewer)
+    try:
+        latest = time.monotonic() + VIEWER_START_S
+        while time.monotonic() < latest and viewer.poll() is None:
+            if listens(port):
+                # A viewer without a screen listens for a moment before it ends.
+                time.sleep(VIEWER_SETTLE_S)
+                if viewer.poll() is None:
+                    return address, viewer
+            time.sleep(0.1)
+    except BaseException:
+        end(viewer)
+        raise
+    end(viewer)
     raise OutputError("no Rerun viewer is open and none can be started here; leave out live=True")
 
 
@@ -101,7 +118,8 @@ def show(recording: str) -> int:
     """
     if not has_screen():
         raise OutputError("there is no screen here for a window; show it in a browser (web=True)")
-    return subprocess.run([*RERUN, recording], check=False).returncode
+    with _running([*RERUN, recording]) as viewer:
+        return viewer.wait()
 
 
 @contextmanager
@@ -127,33 +145,86 @@ def served_page(recording: str, port: int | None = None) -> Iterator[tuple[str, 
     """
     if port is not None and listens(port):
         raise OutputError(f"port {port} is in use; choose another port")
-    page, data = port or _free_port(PAGE_PORT), _free_port(VIEWER_PORT)
-    options = ["--serve-web", "--web-viewer-port", str(page), "--port", str(data)]
-    # The server forgets the beginning of what is larger than its memory.
-    command = [*RERUN, recording, *options, "--server-memory-limit", SERVER_MEMORY]
-    with tempfile.TemporaryFile() as said, _running(command, said) as server:
-        end = time.monotonic() + VIEWER_START_S
-        while not (listens(page) and ("://" in recording or listens(data))):
-            if server.poll() is not None or time.monotonic() > end:
-                said.seek(0)
-                lines = said.read().decode(errors="replace").strip().splitlines()
-                raise OutputError(f"the web viewer cannot be started: {lines[-1] if lines else 'it ended'}")
-            time.sleep(0.1)
-        source = recording if "://" in recording else f"rerun+http://127.0.0.1:{data}/proxy"
-        yield f"http://127.0.0.1:{page}/?url={quote(source, safe='')}", server
+    page = port or _free_port(PAGE_PORT)
+    origin = f"http://127.0.0.1:{page}"
+    # The page takes the file itself: Rerun's own server of recordings is never idle.
+    at_address = nullcontext(recording) if "://" in recording else served_file(Path(recording), origin)
+    with at_address as source, tempfile.TemporaryFile() as said:
+        options = ["--serve-web", "--web-viewer-port", str(page), "--port", str(_free_port(VIEWER_PORT))]
+        with _running([*RERUN, source, *options], said) as server:
+            latest = time.monotonic() + VIEWER_START_S
+            while not listens(page):
+                if server.poll() is not None or time.monotonic() > latest:
+                    said.seek(0)
+                    lines = said.read().decode(errors="replace").strip().splitlines()
+                    told = lines[-1] if lines else "it ended"
+                    raise OutputError(f"the web viewer cannot be started: {told}")
+                time.sleep(0.1)
+            yield f"{origin}/?url={quote(source, safe='')}", server
 
 
 @contextmanager
-def _running(command: Sequence[str], said: IO[bytes]) -> Iterator[subprocess.Popen[bytes]]:
+def served_file(path: Path, origin: str) -> Iterator[str]:
+    """Serve one file to the page of one origin on this machine; yield its address.
+
+    Raises
+    ------
+    LogError
+        If it cannot be read.
+    """
+    try:
+        path.open("rb").close()
+    except OSError as error:
+        raise LogError(f"{path}: cannot be read: {reason_of(error)}") from error
+    place = f"/{secrets.token_urlsafe(16)}/{quote(path.name)}"
+    with ThreadingHTTPServer(("127.0.0.1", 0), partial(_OneFile, path, place, origin)) as server:
+        server.daemon_threads = True
+        thread = threading.Thread(target=server.serve_forever, daemon=True)
+        thread.start()
+        try:
+            yield f"http://127.0.0.1:{server.server_port}{place}"
+        finally:
+            server.shutdown()
+
+
+class _OneFile(BaseHTTPRequestHandler):
+    """Answers requests for one file."""
+
+    def __init__(self, path: Path, place: str, origin: str, *connection: Any) -> None:
+        self._path, self._place, self._origin = path, place, origin
+        super().__init__(*connection)
+
+    def do_GET(self) -> None:
+        """Send the file."""
+        if not is_welcome(self.headers.get("Host")):
+            self.send_error(HTTPStatus.FORBIDDEN)
+        elif self.path != self._place:
+            self.send_error(HTTPStatus.NOT_FOUND)
+        else:
+            # The page may close before the whole file is sent.
+            with suppress(ConnectionError), self._path.open("rb") as file:
+                self.send_response(HTTPStatus.OK)
+                self.send_header("Content-Type", "application/octet-stream")
+                self.send_header("Content-Length", str(os.fstat(file.fileno()).st_size))
+                self.send_header("Access-Control-Allow-Origin", self._origin)
+                self.end_headers()
+                shutil.copyfileobj(file, self.wfile)
+
+    def log_message(self, *_: Any) -> None:
+        """Say nothing of each request."""
+
+
+@contextmanager
+def _running(command: Sequence[str], said: IO[bytes] | None = None) -> Iterator[subprocess.Popen[bytes]]:
     """Run a command until the end of the block, then end it with all that it started."""
     process = subprocess.Popen(command, stdout=said, stderr=said, start_new_session=True)
     try:
         yield process
     finally:
-        _end(process)
+        end(process)
 
 
-def _end(process: subprocess.Popen[bytes]) -> None:
+def end(process: subprocess.Popen[bytes]) -> None:
     """End a command that was started in its own session, with all processes that it started."""
     if hasattr(os, "killpg"):
         # Rerun's command is a script that starts the viewer itself.

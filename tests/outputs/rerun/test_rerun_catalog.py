@@ -15,7 +15,7 @@ from commands import ROSE2_LOGS, WAIT_S, started, wait_for
 from saved_maps import save_run
 
 from rose2_logs.errors import LogError, OutputError
-from rose2_logs.outputs.rerun.catalog import find_recordings, serve_recordings
+from rose2_logs.outputs.rerun.catalog import _corners_m, find_recordings, serve_recordings
 from rose2_logs.workflows.analyze import RunOptions, analyze_log
 
 BIN = Path(sys.executable).parent
@@ -134,3 +134,16 @@ def test_the_viewer_opens_a_run_of_the_catalog_in_our_layout(results, tmp_path, 
         wanted = {"Rooms", "Rooms projected back", "Rooms over the run"}
         wait_for(lambda: wanted <= {view.name for view in viewer.get_state().views})
         assert not [report for view in viewer.get_state().views for report in view.reports]
+
+
+def test_damaged_results_next_to_a_recording_are_named_and_served(office_results, tmp_path, caplog):
+    """Their recording is whole; only where the first view looks is not known."""
+    folder = shutil.copytree(office_results, tmp_path / "damaged")
+    (folder / "office.rrd").touch()
+    whole = _corners_m([office_results / "office.rrd"])
+    assert (_corners_m([office_results / "office.rrd", folder / "office.rrd"])[1] == whole[1]).all()
+    assert not caplog.records
+    (folder / "rooms.parquet").unlink()
+    assert (_corners_m([office_results / "office.rrd", folder / "office.rrd"])[1] == whole[1]).all()
+    (record,) = caplog.records
+    assert "rooms.parquet: there is no such file" in record.getMessage()

@@ -12,6 +12,7 @@ from rose2_logs.segmentation.baselines.stage import BASELINES, segment_by_baseli
 from rose2_logs.segmentation.pipeline import METHODS, analyze
 
 PARAMETERS = Parameters()
+EVERY_ROOM_TOO_SMALL = {"room_min_area_m2": 1000.0, "room_max_area_m2": 1000.0}
 every_method = pytest.mark.parametrize("method", BASELINES)
 MOVES = {
     "quarter turn": (np.rot90, lambda image: np.rot90(image, -1)),
@@ -88,11 +89,9 @@ def test_noise_gives_no_error(method):
 def test_parameters_of_a_method_are_its_own():
     free, _ = two_rooms()
     for method in BASELINES:
-        changed = PARAMETERS.replaced({method: {"room_min_area_m2": 1000.0}})
+        changed = PARAMETERS.replaced({method: EVERY_ROOM_TOO_SMALL})
         assert segment(method, free, changed).max() == 0
-        others = PARAMETERS.replaced(
-            {other: {"room_min_area_m2": 1000.0} for other in BASELINES if other != method}
-        )
+        others = PARAMETERS.replaced({other: EVERY_ROOM_TOO_SMALL for other in BASELINES if other != method})
         assert (segment(method, free, others) == segment(method, free)).all()
 
 

@@ -1,0 +1,162 @@
+"""What happens to a command itself: full disks, missing folders, limits, closed outputs, odd names."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from commands import ROSE2_LOGS, WAIT_S, started, wait_for
+from finished_runs import SAMPLE_LOGS
+from saved_maps import save_run
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="needs a shell and limits of POSIX")
+QUICK = ("--no-rrd", "--no-mcap")
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory) -> Path:
+    return save_run(tmp_path_factory.mktemp("log") / "maps", (180, 240))
+
+
+def run(shell: str, *command: object, **environment: str) -> subprocess.CompletedProcess[str]:
+    """Run a command from a shell that first does something to itself; there is no internal error."""
+    words = [*ROSE2_LOGS, *map(str, command)]
+    done = subprocess.run(
+        ["bash", "-c", shell, "-", *words],
+        capture_output=True, text=True, check=False, env=os.environ | environment,
+    )  # fmt: skip
+    assert "internal error" not in done.stderr, done.stderr
+    assert "Traceback" not in done.stderr, done.stderr
+    return done
+
+
+def errors(text: str) -> list[str]:
+    return [line for line in text.splitlines() if line.startswith("error: ")]
+
+
+def is_whole(folder: Path) -> bool:
+    """Whether the folder holds every file that its summary names, and nothing unfinished."""
+    summary = json.loads((folder / "summary.json").read_text())
+    return {path.name for path in folder.iterdir()} == {"summary.json", *summary["files"]}
+
+
+@pytest.mark.parametrize(
+    ("shell", "environment"),
+    [
+        ("ulimit -n 64; exec \"$@\"", {}),
+        ("ulimit -v 6000000; exec \"$@\"", {}),
+        ('exec "$@"', {"TMPDIR": "/there/is/no/such/folder"}),
+        ('exec "$@"', {"LC_ALL": "C", "LANG": "C", "PYTHONIOENCODING": ""}),
+        ('exec "$@" >&-', {}),
+        ('exec "$@" >&- 2>&-', {}),
+        ('set -o pipefail; "$@" | head -c 1 >/dev/null; true', {}),
+    ],
+    ids=["few files", "little memory", "no TMPDIR", "C locale", "no stdout", "no outputs", "head"],
+)  # fmt: skip
+def test_results_are_whole_all_the_same(log: Path, tmp_path: Path, shell: str, environment: dict[str, str]):
+    named = shutil.copytree(log, tmp_path / "mapy č 3")
+    before = sorted(path.name for path in named.iterdir())
+    done = run(shell, "analyze", named, "-o", tmp_path / "out", *QUICK, "--workers", 2, **environment)
+    assert (done.returncode, errors(done.stderr)) == (0, [])
+    assert is_whole(tmp_path / "out" / "mapy č 3")
+    assert sorted(path.name for path in named.iterdir()) == before
+
+
+@pytest.mark.parametrize("limit", ["ulimit -v 200000", "ulimit -n 8"])
+def test_too_little_for_python_is_no_endless_wait(log: Path, tmp_path: Path, limit: str):
+    """Libraries then say so themselves, at worst with a traceback of theirs; nothing is written."""
+    words = [*ROSE2_LOGS, "analyze", str(log), "-o", str(tmp_path / "out"), *QUICK]
+    done = subprocess.run(
+        ["bash", "-c", f'{limit}; exec "$@"', "-", *words], capture_output=True, timeout=WAIT_S, check=False
+    )
+    assert done.returncode != 0
+    assert not list(tmp_path.rglob("summary.json"))
+
+
+def test_an_output_that_is_full_is_told(log: Path, tmp_path: Path):
+    if not Path("/dev/full").exists():
+        pytest.skip("there is no /dev/full")
+    done = run('exec "$@" >/dev/full', "info", log)
+    assert (done.returncode, len(errors(done.stderr))) == (2, 1)
+
+
+def test_an_output_folder_that_is_removed_is_told(tmp_path: Path):
+    """Or made again, if nothing was written to it yet."""
+    many, out = save_run(tmp_path / "maps", tuple(range(100, 240))), tmp_path / "out"
+    with started(*ROSE2_LOGS, "analyze", many, "-o", out, *QUICK) as process:
+        wait_for(lambda: list(out.rglob("*.part")))
+        shutil.rmtree(out)
+        _, err = process.communicate(timeout=WAIT_S)
+    assert "internal error" not in err
+    assert (process.returncode, len(errors(err))) in ((2, 1), (0, 0)), err
+    assert process.returncode == 2 or is_whole(out / "maps")
+    assert process.returncode == 0 or not list(tmp_path.rglob("summary.json"))
+
+
+def mounted(folder: Path, kilobytes: int) -> bool:
+    """Mount a small disk, where this user may."""
+    folder.mkdir()
+    command = ["mount", "-t", "tmpfs", "-o", f"size={kilobytes}k", "tmpfs", str(folder)]
+    return subprocess.run(command, capture_output=True, check=False).returncode == 0
+
+
+@pytest.mark.parametrize("kilobytes", [16, 80, 160, 320, 640])
+def test_a_full_disk_is_one_line_at_whatever_output(tmp_path: Path, kilobytes: int):
+    """Tables, recording, annotated log, journal; and the results are whole on a disk that is large enough."""
+    disk = tmp_path / "disk"
+    if not mounted(disk, kilobytes):
+        pytest.skip("this user may mount nothing")
+    try:
+        done = run('exec "$@"', "analyze", SAMPLE_LOGS / "office.mcap", "-o", disk, "--max-snapshots", 2)
+        assert (done.returncode, len(errors(done.stderr))) == (2, 1), done.stderr
+        assert str(disk) in done.stderr
+        assert not list(disk.rglob("summary.json"))
+    finally:
+        subprocess.run(["umount", "-l", str(disk)], check=True)
+
+
+def test_a_log_that_is_still_written_is_read_as_far_as_it_is(tmp_path: Path):
+    whole = (SAMPLE_LOGS / "office.mcap").read_bytes()
+    growing = tmp_path / "growing.mcap"
+    growing.write_bytes(whole[: len(whole) // 2])
+    command = ("analyze", growing, "-o", tmp_path / "out", *QUICK, "--max-snapshots", "3")
+    with started(*ROSE2_LOGS, *command) as process:
+        wait_for(lambda: process.poll() is not None or list((tmp_path / "out").rglob("*.part")))
+        with growing.open("ab") as file:
+            file.write(whole[len(whole) // 2 :])
+        _, err = process.communicate(timeout=WAIT_S)
+    assert (process.returncode, errors(err)) == (0, [])
+    assert "warning: " in err
+    assert is_whole(tmp_path / "out" / "growing")
+
+
+@pytest.mark.parametrize("name", ["two\nlines", "n" * 255, "n" * 230], ids=["line break", "255", "230"])
+def test_names_with_line_breaks_and_of_255_bytes(log: Path, tmp_path: Path, name: str):
+    named = shutil.copytree(log, tmp_path / name)
+    done = run('exec "$@"', "analyze", named, "-o", tmp_path / "out", *QUICK)
+    assert len(errors(done.stderr)) == (done.returncode == 2)
+    if done.returncode:
+        assert "its name is longer than" in done.stderr
+        assert len(name) > 240
+    else:
+        assert is_whole(tmp_path / "out" / name)
+
+
+def test_an_annotated_log_can_be_analyzed_again(tmp_path: Path):
+    """The maps of the robot are taken, not what was added; it is not annotated twice."""
+    options = ("--no-rrd", "--max-snapshots", 2)
+    run('exec "$@"', "analyze", SAMPLE_LOGS / "office.mcap", "-o", tmp_path / "one", *options)
+    annotated = tmp_path / "one" / "office" / "office.rose2.mcap"
+    done = run('exec "$@"', "analyze", annotated, "-o", tmp_path / "two", *options)
+    assert (done.returncode, len(errors(done.stderr))) == (2, 1)
+    assert "analyze the log it was made from" in done.stderr
+    done = run('exec "$@"', "analyze", annotated, "-o", tmp_path / "two", *options, "--no-mcap")
+    assert (done.returncode, errors(done.stderr)) == (0, [])
+    one, two = (json.loads(path.read_text()) for path in sorted(tmp_path.glob("*/*/summary.json")))
+    assert one["topic"] == two["topic"]
+    assert one["results"] == two["results"]
