@@ -36,7 +36,7 @@ CURVES: dict[str, tuple[str, Color]] = {
 
 
 def log_legend(recording: rr.RecordingStream, layers: Collection[str]) -> None:
-    """Log the strips and the text, for a recording with these layers."""
+    """Log the strips and the text, for a recording that shows these layers."""
     for path, keys, width_em in (
         (MAP_SIGNS, map_keys(layers), MAP_WIDTH_EM),
         (CURVE_NAMES, curve_keys(), CURVES_WIDTH_EM),

@@ -123,6 +123,11 @@ class World:
         ):
             self._style_lines(path, width, color)
 
+    @property
+    def has_path(self) -> bool:
+        """Whether the robot's path is known so far."""
+        return self._pose is not None
+
     def log(self, step: TrackedSnapshot, view_side_m: float) -> None:
         """Log one map, after the layers have begun its snapshot; the view is so high, at first."""
         self._log_pictures(step)
