@@ -107,7 +107,7 @@ def test_there_is_a_tab_for_them(result, tmp_path: Path):
     assert {"Rooms projected back", "Seen share, %"} < names_of_views(result.folder / "office.rrd")
     options = RunOptions(max_snapshots=2, annotated_log=False, layers=())
     plain = analyze_log(SAMPLE_LOGS / "office.mcap", tmp_path / "office", options).folder / "office.rrd"
-    assert not {"Rooms projected back", "Seen share"} & names_of_views(plain)
+    assert not {"Rooms projected back", "Seen share, %"} & names_of_views(plain)
     paths = {str(chunk.entity_path) for chunk in RrdReader(str(plain)).stream()}
     assert not any("back_projected" in path or "seen" in path for path in paths)
 
