@@ -205,7 +205,7 @@ def _curve_views(back_projected: bool) -> list[rrb.View | rrb.Container]:
     ]
     if back_projected:
         views.append(_curves("Seen share, %", (f"{SEEN_SHARE}/**",)))
-    return [*views, _curves("Rooms", ("/run/rooms",)), _curves("Change", ("/run/variation_bits",))]
+    return [*views, _curves("Room count", ("/run/rooms",)), _curves("Change", ("/run/variation_bits",))]
 
 
 def _curves(
