@@ -64,7 +64,8 @@ def shots(folder: Path) -> dict[str, Path]:
         for tab, panel, text in zip(TABS, cycle(PANELS), cycle(TEXTS), strict=False)
     }
     over = {"over time": Shot(folder / "time.png", tabs=(LANES_TAB,), log_time_s=FIRST_MAP_S)}
-    taken = along | others | over
+    # While the curves that a recording opens with are still in front.
+    taken = along | over | others
     problems = take(record(folder), list(taken.values()), port=free_port(), settle_s=LOOK_S)
     assert not problems
     return {name: shot.picture for name, shot in taken.items()}
