@@ -12,13 +12,17 @@ from rose2_logs.config.run_options import RECORDING_LAYERS
 from rose2_logs.model.occupancy import FloatArray
 from rose2_logs.outputs.rerun.back_projected import BACK_PROJECTED, SEEN_SHARE
 from rose2_logs.outputs.rerun.lanes import FINAL_IOU, FINAL_SHARE, KNOWN_FINAL_SHARE, LANES, SHIFTS
+from rose2_logs.outputs.rerun.layers import Instant
+from rose2_logs.outputs.rerun.legend import CURVE_NAMES, LEGEND_TEXT, MAP_SIGNS
 from rose2_logs.outputs.rerun.world import (
     BORDERS,
     CLEAN,
+    DARK,
     DOORWAYS,
     FACES,
     FILLS,
     LINES,
+    PAPER,
     PATH,
     PREDICTED,
     ROBOT,
@@ -29,17 +33,18 @@ from rose2_logs.outputs.rerun.world import (
     VORONOI,
 )
 
-COVERAGE_UNIT = 1e-4
-"""Step of the coverage timeline, which counts in whole numbers."""
 EYE_HEIGHT = 1.02
 """Height of the eye over the side of the map that fills the view: the viewer sees 1.04 times its height."""
-MAP_ASPECT = 1.3
+MAP_ASPECT = 1.25
 """Width over height of the view of the map in a window of usual shape."""
 SWITCHED = (BORDERS, CLEAN, SCORE, SEGMENTS, LINES, FACES, VORONOI)
 """Layers of the map's view that are off at first and can be switched on."""
-TIMELINES = ("message_log_time", "ros2_timestamp", "snapshot", "coverage")
+PLAY_S = 20.0
+"""Time that playing the run takes, whatever its length."""
+SIDE_SHARE, CURVES_SHARE, SIGNS_SHARE, NAMES_SHARE = 0.4, 0.36, 0.05, 0.13
+"""Shares of the window on a screen from 1280 x 720 on: of its width for what is beside the map, of its height
+for the curves there; of the map's height, and of the curves', for the strip of their legend."""
 Overrides = list[rrb.EntityBehavior | rrb.VisibleTimeRanges]
-PAPER, DARK = (236, 236, 236), (12, 12, 16)
 
 
 def make_blueprint(
@@ -48,8 +53,11 @@ def make_blueprint(
     layers: Collection[str] = RECORDING_LAYERS,
     *,
     back_projected: bool = False,
+    first_percent: int = 0,
 ) -> rrb.Blueprint:
-    """Map from above and a tab per stage of the method; next to it curves, room lanes, events, summary.
+    """Map from above and a tab per stage of the method; next to it curves, summary, room lanes, events.
+
+    A recording opens on its last map and stands there; when played, it begins at the first.
 
     Parameters
     ----------
@@ -59,6 +67,8 @@ def make_blueprint(
         The optional layers that the recording has; tabs without any are left out.
     back_projected : bool
         Whether it has the back-projected rooms.
+    first_percent : int
+        Coverage of the first map, where playing begins.
     """
     stages = (
         ("Rooms", (), ()),
@@ -85,23 +95,16 @@ def make_blueprint(
         )
     return rrb.Blueprint(
         rrb.Horizontal(
-            rrb.Tabs(*views, active_tab=0),
             rrb.Vertical(
-                _curves(
-                    "Agreement with the final layout",
-                    ("/run/coverage", FINAL_SHARE, KNOWN_FINAL_SHARE, FINAL_IOU, SHIFTS),
-                    (0.0, 1.05),
-                ),
-                rrb.Tabs(
-                    _room_lanes(),
-                    _curves("Area, m²", ("/run/area/**",), legend=False),
-                    *([_curves("Seen share", (f"{SEEN_SHARE}/**",), legend=False)] if back_projected else []),
-                    _curves("Count", ("/run/rooms",)),
-                    _curves("Change", ("/run/variation_bits",)),
-                    active_tab=0,
-                ),
+                rrb.Tabs(*views, active_tab=0),
+                _strip(MAP_SIGNS),
+                row_shares=[1 - SIGNS_SHARE, SIGNS_SHARE],
+            ),
+            rrb.Vertical(
+                rrb.Tabs(*_curve_views(back_projected), active_tab=0),
                 rrb.Tabs(
                     rrb.TextDocumentView(name="Summary", origin="/summary"),
+                    rrb.StateTimelineView(name="Room history", origin=LANES, time_view=_axis()),
                     rrb.TextLogView(
                         name="Events",
                         origin="/events",
@@ -109,13 +112,20 @@ def make_blueprint(
                             timeline_columns=["snapshot"], text_log_columns=["loglevel", "body"]
                         ),
                     ),
+                    rrb.TextDocumentView(name="Legend", origin=LEGEND_TEXT),
                     active_tab=0,
                 ),
-                row_shares=[3, 5, 4],
+                row_shares=[CURVES_SHARE, 1 - CURVES_SHARE],
             ),
-            column_shares=[7, 3],
+            column_shares=[1 - SIDE_SHARE, SIDE_SHARE],
         ),
-        rrb.TimePanel(timeline="coverage", state="collapsed"),
+        # A viewer that follows shows the end of a file, all of which is there.
+        rrb.TimePanel(
+            timeline="coverage_percent",
+            state="collapsed",
+            play_state="following",
+            fps=max(100 - first_percent, 1) / PLAY_S,
+        ),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
         auto_views=False,
@@ -151,7 +161,9 @@ def _map_view(
 def _up_to_now() -> rrb.VisibleTimeRanges:
     before = rr.encodings.TimeRangeBoundary.infinite()
     now = rr.encodings.TimeRangeBoundary.cursor_relative(seq=0)
-    return rrb.VisibleTimeRanges([rrb.VisibleTimeRange(name, start=before, end=now) for name in TIMELINES])
+    return rrb.VisibleTimeRanges(
+        [rrb.VisibleTimeRange(name, start=before, end=now) for name in Instant._fields]
+    )
 
 
 def view_side_m(low_m: FloatArray, high_m: FloatArray, aspect: float = MAP_ASPECT) -> float:
@@ -178,8 +190,26 @@ def _axis() -> rrb.archetypes.TimeAxis:
     return rrb.archetypes.TimeAxis(link="Independent", view_range=whole_run)
 
 
+def _curve_views(back_projected: bool) -> list[rrb.View | rrb.Container]:
+    """Views of everything that is a curve, what matters most first."""
+    agreement = "Agreement with the final layout"
+    paths = ("/run/coverage", FINAL_SHARE, KNOWN_FINAL_SHARE, FINAL_IOU, SHIFTS)
+    views: list[rrb.View | rrb.Container] = [
+        rrb.Vertical(
+            _strip(CURVE_NAMES),
+            _curves(f"{agreement}, %", paths, (0.0, 105.0), titlebar=False),
+            row_shares=[NAMES_SHARE, 1 - NAMES_SHARE],
+            name=agreement,
+        ),
+        _curves("Area, m²", ("/run/area/**",)),
+    ]
+    if back_projected:
+        views.append(_curves("Seen share, %", (f"{SEEN_SHARE}/**",)))
+    return [*views, _curves("Room count", ("/run/rooms",)), _curves("Change", ("/run/variation_bits",))]
+
+
 def _curves(
-    name: str, paths: Iterable[str], span: tuple[float, float] | None = None, legend: bool = True
+    name: str, paths: Iterable[str], span: tuple[float, float] | None = None, *, titlebar: bool = True
 ) -> rrb.TimeSeriesView:
     return rrb.TimeSeriesView(
         name=name,
@@ -187,9 +217,12 @@ def _curves(
         contents=list(paths),
         axis_x=_axis(),
         axis_y=None if span is None else rrb.ScalarAxis(range=span),
-        plot_legend=rrb.PlotLegend(visible=legend, corner=rrb.Corner2D.LeftTop),
+        # It would hide much of a small plot.
+        plot_legend=rrb.PlotLegend(visible=False),
+        titlebar=titlebar,
     )
 
 
-def _room_lanes() -> rrb.StateTimelineView:
-    return rrb.StateTimelineView(name="Rooms over the run", origin=LANES, time_view=_axis())
+def _strip(path: str) -> rrb.Spatial2DView:
+    """Show a strip of a legend, without a title of its own."""
+    return rrb.Spatial2DView(name="Signs", origin=path, titlebar=False, background=PAPER)

@@ -14,13 +14,16 @@ from rose2_logs.drawing.event_text import event_text
 from rose2_logs.drawing.extent import Extent
 from rose2_logs.drawing.palette import track_color
 from rose2_logs.errors import OutputError
+from rose2_logs.model.room_names import room_name
 from rose2_logs.outputs.rerun import viewer as rerun_viewer
 from rose2_logs.outputs.rerun.back_projected import BackProjectedWorld
-from rose2_logs.outputs.rerun.blueprint import COVERAGE_UNIT, make_blueprint, view_side_m
+from rose2_logs.outputs.rerun.blueprint import make_blueprint, view_side_m
 from rose2_logs.outputs.rerun.columns import Entry, Scalar
 from rose2_logs.outputs.rerun.disk import abandon, require_space
-from rose2_logs.outputs.rerun.lanes import FINAL_IOU, FINAL_SHARE, KNOWN_FINAL_SHARE, SHIFTS, TrackLanes
-from rose2_logs.outputs.rerun.layers import CHUNK_BYTES, Layers
+from rose2_logs.outputs.rerun.lanes import SHIFTS, TrackLanes
+from rose2_logs.outputs.rerun.layers import CHUNK_BYTES, Layers, whole_percent
+from rose2_logs.outputs.rerun.legend import CURVES, log_legend
+from rose2_logs.outputs.rerun.names import NameOf
 from rose2_logs.outputs.rerun.summary import summary_text
 from rose2_logs.outputs.rerun.world import World
 from rose2_logs.runs.history import RunSummary
@@ -33,27 +36,23 @@ from rose2_logs.tracking.tracked_snapshot import RoomEvent, TrackedSnapshot, map
 logger = logging.getLogger(__name__)
 
 FLUSH_TIMEOUT_S = 60.0
-CURVES = {
-    "/run/coverage": ("coverage", (90, 190, 90)),
-    FINAL_SHARE: ("rooms as in the end", (250, 160, 50)),
-    KNOWN_FINAL_SHARE: ("the same of the known part", (170, 120, 220)),
-    FINAL_IOU: ("overlap with the final layout", (90, 150, 250)),
+COUNTS = {
     "/run/rooms": ("rooms", (190, 130, 250)),
     "/run/variation_bits": ("variation of information, bits", (250, 100, 100)),
 }
-"""Curves of the whole run: what they are called and their colors."""
-SHIFT_COLOR = (255, 80, 80)
+"""Further curves of the whole run: what they are called and their colors."""
 
 
 class RerunRecording(Sink):
     """Sink that writes a ``.rrd`` with its layout, or shows the run in an open viewer, or both.
 
     Timelines are ``message_log_time`` and ``ros2_timestamp`` (as in Rerun's own MCAP importer), ``snapshot``,
-    and ``coverage``, the greatest so far, in steps of 1e-4; a part of the run that begins anew goes on where
-    the one before ends, so that its 50 % stand at 150 %. Rooms stand under ``/world/rooms/TRACK``, their
-    areas under ``/run/area/TRACK``; they are cleared when their track is lost. What has not changed since the
-    snapshot before is not logged again. The lanes of the tracks and the convergence, which only the last map
-    tells, follow at the end; before them the back-projected rooms, in a second pass, if there is one.
+    and ``coverage_percent``, the greatest so far, rounded down; a part of the run that begins anew goes on
+    where the one before ends, so that its 50 % stand at 150 %. Rooms stand under ``/world/rooms/TRACK``,
+    their areas under ``/run/area/TRACK``; they are cleared when their track is lost. What has not changed
+    since the snapshot before is not logged again. The lanes of the tracks and the convergence, which only
+    the last map tells, follow at the end; before them the back-projected rooms, in a second pass, if there
+    is one.
 
     Parameters
     ----------
@@ -63,6 +62,8 @@ class RerunRecording(Sink):
         Also show the run in a Rerun viewer, which is started where none is open.
     layers : collection of str
         Which of `RECORDING_LAYERS` to write.
+    name_of : callable
+        Name of a room by its track.
 
     Raises
     ------
@@ -76,11 +77,13 @@ class RerunRecording(Sink):
         *,
         live: bool = False,
         layers: Collection[str] = RECORDING_LAYERS,
+        name_of: NameOf = room_name,
     ) -> None:
         self._path = path
         self._part = part_of(path) if path else None
         self._live = live
         self._wanted = layers
+        self._name_of = name_of
         self._recording: rr.RecordingStream | None = None
         self._viewer: subprocess.Popen[bytes] | None = None
         self._viewer_answers = live
@@ -89,7 +92,7 @@ class RerunRecording(Sink):
         self._known: set[int] = set()
         self._back_projected: BackProjectedWorld | None = None
         self._extent = Extent()
-        self._maps = 0
+        self._maps, self._first_percent = 0, 0
         self._parts: list[int | None] = []
 
     def begin(self, info: RunInfo) -> None:
@@ -114,22 +117,23 @@ class RerunRecording(Sink):
         self._stream.set_sinks(*sinks)
         self._stream.set_log_time_enabled(False)
         self._stream.set_log_tick_enabled(False)
-        self._world = World(self._layers, self._stream, self._wanted)
-        self._lanes = TrackLanes(self._stream)
-        for path, (name, color) in CURVES.items():
-            self._stream.log(path, rr.SeriesLines(names=name, colors=[color], widths=2), static=True)
-        jumps = rr.SeriesPoints(
-            names="the map shifted", colors=[SHIFT_COLOR], markers="cross", marker_sizes=8
-        )
-        self._stream.log(SHIFTS, jumps, static=True)
+        self._world = World(self._layers, self._stream, self._wanted, self._name_of)
+        self._lanes = TrackLanes(self._stream, self._name_of)
+        for path, (name, color) in (CURVES | COUNTS).items():
+            style = (
+                rr.SeriesPoints(names=name, colors=[color], markers="cross", marker_sizes=8)
+                if path == SHIFTS
+                else rr.SeriesLines(names=name, colors=[color], widths=2)
+            )
+            self._stream.log(path, style, static=True)
 
     def write(self, step: TrackedSnapshot) -> None:
         """Log one snapshot at all its times."""
         snapshot = step.snapshot
         if step.part not in self._parts:
             self._parts.append(step.part)
-        coverage = self._steps(step.coverage, step.part)
-        self._layers.begin(snapshot.log_time_ns, snapshot.stamp_ns, snapshot.index, coverage)
+        coverage_percent = self._percent(step.coverage, step.part)
+        self._layers.begin(snapshot.log_time_ns, snapshot.stamp_ns, snapshot.index, coverage_percent)
         self._extent.add(step)
         self._world.log(step, view_side_m(self._extent.low_m, self._extent.high_m))
         self._lanes.add(self._layers.now, step.track_ids)
@@ -138,6 +142,8 @@ class RerunRecording(Sink):
             if event.kind != "continued":
                 text = f"{percent(step.coverage, ' %')}: {event_text(event)}"
                 self._layers.add("/events", Entry(text, _event_level(event)))
+        if self._maps == 0:
+            self._first_percent = coverage_percent
         if self._live and self._maps == 0:
             # A live viewer shows the layout from the beginning; a file alone gets the final one.
             self._send_blueprint()
@@ -148,9 +154,9 @@ class RerunRecording(Sink):
         """Log what one map shows of the last map's rooms, after all maps, in their order again."""
         if self._back_projected is None:
             self._layers.flush()
-            self._back_projected = BackProjectedWorld(self._new_layers(), self._stream)
+            self._back_projected = BackProjectedWorld(self._new_layers(), self._stream, self._name_of)
         view_m = view_side_m(self._extent.low_m, self._extent.high_m)
-        self._back_projected.log(found, self._steps(found.coverage, found.part), view_m)
+        self._back_projected.log(found, self._percent(found.coverage, found.part), view_m)
         self._flush()
 
     def finish(self, summary: RunSummary) -> None:
@@ -159,7 +165,7 @@ class RerunRecording(Sink):
         if self._back_projected is not None:
             self._back_projected.flush()
         self._lanes.log(summary.convergence)
-        text = rr.TextDocument(summary_text(self._info, summary), media_type="text/markdown")
+        text = rr.TextDocument(summary_text(self._info, summary, self._name_of), media_type="text/markdown")
         self._stream.log("/summary", text, static=True)
         if self._maps:
             self._send_blueprint()
@@ -179,20 +185,23 @@ class RerunRecording(Sink):
         if self._part is not None:
             self._part.unlink(missing_ok=True)
 
-    def _steps(self, coverage: float, part: int | None) -> int:
+    def _percent(self, coverage: float, part: int | None) -> int:
         """Place on the coverage timeline."""
-        return round((self._parts.index(part) + coverage) / COVERAGE_UNIT)
+        return 100 * self._parts.index(part) + whole_percent(coverage)
 
     def _new_layers(self) -> Layers:
         # A live viewer shows each snapshot at once.
         return Layers(self._stream, 0 if self._live else CHUNK_BYTES)
 
     def _send_blueprint(self) -> None:
+        shown = [layer for layer in self._wanted if layer != "path" or self._world.has_path]
+        log_legend(self._stream, shown)
         blueprint = make_blueprint(
             self._extent.low_m,
             self._extent.high_m,
             self._wanted,
             back_projected=self._back_projected is not None,
+            first_percent=self._first_percent,
         )
         self._stream.send_blueprint(blueprint)
 
@@ -213,10 +222,10 @@ class RerunRecording(Sink):
             logger.warning("the Rerun viewer does not answer any more; the run goes on without it")
 
     def _log_curves(self, step: TrackedSnapshot) -> None:
-        self._layers.add("/run/coverage", Scalar(step.coverage))
+        self._layers.add("/run/coverage", Scalar(100 * step.coverage))
         self._layers.add("/run/rooms", Scalar(len(step.track_ids)))
         if map_motion(step.events) is not None:
-            self._layers.add(SHIFTS, Scalar(step.coverage))
+            self._layers.add(SHIFTS, Scalar(100 * step.coverage))
         if step.change is not None and step.change.variation_bits is not None:
             self._layers.add("/run/variation_bits", Scalar(step.change.variation_bits))
         for track in sorted(self._shown - set(step.track_ids)):
@@ -225,11 +234,12 @@ class RerunRecording(Sink):
         for track, area in zip(step.track_ids, step.analysis.rooms.areas_m2.tolist(), strict=True):
             if track not in self._known:
                 self._known.add(track)
-                name = rr.SeriesLines(colors=[track_color(track)], names=f"room {track}")
+                name = rr.SeriesLines(colors=[track_color(track)], names=self._name_of(track))
                 self._stream.log(f"/run/area/{track}", name, static=True)
             self._layers.add(f"/run/area/{track}", Scalar(area))
 
 
 def _event_level(event: RoomEvent) -> str:
-    is_warning = event.kind in ("part_begun", "split", "merged", "lost", "shifted")
+    # Rooms split and merge in any run; a map that begins anew or shifts is what SLAM may have got wrong.
+    is_warning = event.kind in ("part_begun", "shifted")
     return str(rr.TextLogLevel.WARN if is_warning else rr.TextLogLevel.INFO)
