@@ -10,7 +10,7 @@ from functools import cached_property
 import shapely
 
 from rose2_logs.comparison.final_layout import FinalLayout
-from rose2_logs.comparison.placement import Placement, fitting_scale, place
+from rose2_logs.comparison.placement import Placement, fits, fitting_scale, place
 from rose2_logs.comparison.room_changes import RoomChange, RoomStatus, compare_rooms
 from rose2_logs.comparison.wall_changes import WallComparison, compare_walls
 
@@ -56,12 +56,7 @@ class LayoutComparison:
     @property
     def same_building(self) -> bool:
         """Whether the two seem to show the same building."""
-        placement, parameters = self.placement, self.a.map.parameters.comparison
-        in_parts = (
-            placement.agreement >= parameters.parts_min_agreement
-            and placement.common_share >= parameters.parts_min_common_share
-        )
-        return placement.score >= parameters.same_building_min_score or in_parts
+        return fits(self.placement, self.a.map.parameters.comparison)
 
     @property
     def ambiguous(self) -> bool:

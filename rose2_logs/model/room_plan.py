@@ -15,6 +15,7 @@ from rose2_logs.model.borders import Border, unsure_of
 from rose2_logs.model.labels import known_window
 from rose2_logs.model.occupancy import UNKNOWN, BoolArray, FloatArray, GridGeometry, OccupancySnapshot
 from rose2_logs.model.outlines import outline
+from rose2_logs.model.room_names import room_name
 from rose2_logs.model.room_quality import RoomQuality, is_unsure
 from rose2_logs.model.rooms import Doorway
 
@@ -25,7 +26,7 @@ RAY_WIDTH_M = 0.5
 WALL_JOIN_M = 0.1
 """Segments up to twice this far apart are one wall, whose two faces and rows of cells gave several."""
 WALL_EDGE_M = 0.025
-"""The outline of a wall is this far outside its segments, which run along the middles of cells: half of one."""
+"""The outline of a wall is this far from its segments, which run along the middles of cells."""
 WALL_DETAIL_M = 0.03
 """Steps up to this high in the outline of a wall are straightened: less than a cell."""
 ROUNDING_CELLS = 0.25
@@ -52,6 +53,8 @@ class PlanRoom:
         Share of its outline supported by walls, see `RoomQuality`; None where it was not measured.
     frontier_m : float or None
         Its open frontier.
+    given_name : str
+        Name that it was given, empty for none.
     """
 
     number: int
@@ -61,11 +64,12 @@ class PlanRoom:
     neighbors: tuple[int, ...]
     wall_support: float | None = None
     frontier_m: float | None = None
+    given_name: str = ""
 
     @property
     def name(self) -> str:
         """What it is called."""
-        return f"Room {self.number}"
+        return room_name(self.number, self.given_name)
 
     @property
     def is_unsure(self) -> bool:

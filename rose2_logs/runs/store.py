@@ -10,6 +10,7 @@ from typing import Self
 
 import numpy as np
 
+from rose2_logs.config.kinds import KindParameters
 from rose2_logs.config.parameters import OccupancyParameters
 from rose2_logs.runs import tables
 from rose2_logs.runs.history import RunHistory, RunSummary
@@ -44,13 +45,23 @@ class RunStore:
         Output folder, created if needed.
     parameters : OccupancyParameters
         Which cells are free and which occupied.
+    kinds : KindParameters, optional
+        For the guess of kinds of rooms.
     back_project : bool
         Whether to write the table of the back-projected rooms, too.
     """
 
-    def __init__(self, folder: Path, parameters: OccupancyParameters, *, back_project: bool = False) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        parameters: OccupancyParameters,
+        kinds: KindParameters | None = None,
+        *,
+        back_project: bool = False,
+    ) -> None:
         self._folder = folder
         self._parameters = parameters
+        self._kinds = kinds or KindParameters()
         self._names = (*TABLES, BACK_PROJECTED) if back_project else TABLES
         self._stack = ExitStack()
         self._tables: dict[str, ParquetTable] = {}
@@ -76,7 +87,7 @@ class RunStore:
         key = snapshot_key(step)
         rows: dict[str, list[Row]] = {
             ALONG: [tables.snapshot_row(step, history.snapshot_refs[step.snapshot.index])],
-            "rooms": tables.room_rows(step),
+            "rooms": tables.room_rows(step, self._kinds),
             "events": tables.event_rows(step),
             "doorways": tables.doorway_rows(step),
             "borders": tables.border_rows(step),
@@ -126,7 +137,7 @@ class RunStore:
             self._tables["snapshots"].add([row | final])
         for track, of_track in sorted(summary.histories.tracks.items()):
             in_last_map = track in summary.histories.in_last_map
-            row = tables.track_row(track, of_track, convergence, in_last_map=in_last_map)
+            row = tables.track_row(track, of_track, convergence, self._kinds, in_last_map=in_last_map)
             self._tables["tracks"].add([row])
         for name in ("snapshots", "tracks"):
             self._tables[name].close()

@@ -18,6 +18,7 @@ from rose2_logs.io.poses import RobotPath
 from rose2_logs.model.analysis import SnapshotAnalysis
 from rose2_logs.model.explored import coarser_for_its_size
 from rose2_logs.model.occupancy import OccupancySnapshot, free_area_m2, is_same_to_analysis
+from rose2_logs.model.room_names import RoomNames
 from rose2_logs.runs.journal import Found, JournaledWorkers
 from rose2_logs.segmentation.pipeline import analyze
 from rose2_logs.system.warnings import log_warning
@@ -64,6 +65,8 @@ class TrackedStream:
         The map topic.
     path : RobotPath, optional
         Where the robot was, to be part of the steps.
+    names : RoomNames, optional
+        What rooms are called.
 
     Attributes
     ----------
@@ -85,6 +88,7 @@ class TrackedStream:
         source: str = "the maps",
         topic: str | None = None,
         path: RobotPath | None = None,
+        names: RoomNames | None = None,
     ) -> None:
         self.invalid = 0
         self.unchanged = 0
@@ -95,6 +99,7 @@ class TrackedStream:
         self._occupancy = parameters.occupancy
         self._source, self._topic = source, topic
         self._path = path
+        self._names = names
         self._tracker = RoomTracker(parameters.tracking, parameters.occupancy)
         self._layout = LayoutFollower()
         self._has_told_coarser = False
@@ -108,6 +113,7 @@ class TrackedStream:
         *,
         with_path: bool = False,
         base_frame: str | None = None,
+        names: RoomNames | None = None,
     ) -> TrackedStream:
         """Follow the rooms through an open log.
 
@@ -121,6 +127,8 @@ class TrackedStream:
             Whether to read where the robot was.
         base_frame : str, optional
             Frame of the robot's base, where it is none of the usual ones.
+        names : RoomNames, optional
+            As for the class.
 
         Raises
         ------
@@ -139,6 +147,7 @@ class TrackedStream:
             source=str(reader.info.path),
             topic=reader.topic,
             path=reader.robot_path(last.geometry.frame_id, base_frame) if with_path else None,
+            names=names,
         )
         stream.last_log_time_ns = last.log_time_ns
         return stream
@@ -168,8 +177,9 @@ class TrackedStream:
         change = self._layout.update(analysis.rooms, track_ids, map_motion(events))
         coverage = self._coverage(analysis.free_area_m2)
         poses = None if self._path is None else self._path.until(snapshot.log_time_ns)
+        names = () if self._names is None else self._names.of(track_ids, analysis.polygons)
         quality = analysis.quality
-        return TrackedSnapshot(snapshot, analysis, coverage, track_ids, events, quality, change, poses)
+        return TrackedSnapshot(snapshot, analysis, coverage, track_ids, events, quality, change, poses, names)
 
     def _coverage(self, free_m2: float) -> float:
         final_m2 = self._final_free_m2

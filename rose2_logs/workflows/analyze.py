@@ -21,6 +21,7 @@ from rose2_logs.model.analysis import left_out_note
 from rose2_logs.outputs.mcap.viewer_layouts import bag_metadata_path, foxglove_path, rviz_path
 from rose2_logs.runs.history import RunHistory, RunSummary
 from rose2_logs.runs.journal import JournaledWorkers
+from rose2_logs.runs.names import names_in, tell_unused
 from rose2_logs.runs.output_folder import OutputFolder
 from rose2_logs.runs.provenance import fingerprint, software_versions
 from rose2_logs.runs.sink import RunInfo, Sink, abandoned_on_error, as_sinks
@@ -206,14 +207,18 @@ def _follow(
     """Take the log's maps one by one to the history, the store and the sinks, and finish these."""
     parameters = options.parameters
     history = RunHistory(parameters, back_project=options.back_project)
+    names = None
+    if options.names is not None:
+        names = names_in(reader.last(), Path(options.names), parameters, parameters.occupancy)
     stream = TrackedStream.of_log(
         reader,
         workers,
         parameters,
         with_path="path" in options.shown_layers,
         base_frame=options.base_frame,
+        names=names,
     )
-    store = RunStore(folder, parameters.occupancy, back_project=options.back_project)
+    store = RunStore(folder, parameters.occupancy, parameters.kinds, back_project=options.back_project)
     with store, abandoned_on_error(sinks):
         for sink in sinks:
             sink.begin(info)
@@ -230,6 +235,9 @@ def _follow(
         note = left_out_note(history.totals.outside_m2_last, history.totals.free_m2_last)
         if note is not None:
             logger.warning("%s: in the last map, %s", info.origin or info.log_path, note)
+        if options.names is not None and names is not None:
+            called = [history.histories.tracks[track].name for track in history.histories.in_last_map]
+            tell_unused(Path(options.names), names.unused(called, history.histories.in_last_map))
         summary = store.finish(history)
         for sink in sinks:
             sink.finish(summary)

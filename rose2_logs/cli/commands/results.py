@@ -140,7 +140,7 @@ def export(
             "--format",
             "-f",
             metavar="FORMAT",
-            help="qgis (layers), geojson (GIS), dxf (CAD), svg, map_server (Nav2) or graph (networkx); may be repeated.",
+            help="qgis (layers), geojson, dxf (CAD), svg, map_server (Nav2) or graph (networkx); may be repeated.",
             rich_help_panel=WHAT,
         ),
     ],
