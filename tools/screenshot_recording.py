@@ -19,8 +19,6 @@ from typing import Any
 
 from rerun.experimental import ViewerClient
 
-from rose2_logs.outputs.rerun.blueprint import COVERAGE_UNIT
-
 PORT = 9899
 LOAD_TIMEOUT_S = 60.0
 SETTLE_S = 1.0
@@ -80,8 +78,8 @@ def take(recording: Path, shots: Sequence[Shot], port: int = PORT, settle_s: flo
             elif shot.snapshot is not None:
                 viewer.set_time("snapshot", sequence=shot.snapshot, play_state="paused")
             else:
-                step = round(shot.coverage / COVERAGE_UNIT)
-                viewer.set_time("coverage", sequence=step, play_state="paused")
+                place = round(100 * shot.coverage)
+                viewer.set_time("coverage_percent", sequence=place, play_state="paused")
             shot.picture.write_bytes(_drawn(viewer, views[0] if shot.is_view else None, settle_s))
             problems += _reports(viewer)
         problems += [

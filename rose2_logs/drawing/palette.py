@@ -15,12 +15,14 @@ VALUES = (0.90, 0.98, 0.78)
 FORMING, SHAPED, SETTLED = "forming", "shape right", "settled"
 STATE_TINTS = {FORMING: 0.3, SHAPED: 0.65, SETTLED: 1.0}
 """States of a room's history, and the share of its color, on white, that each is shown with."""
+TEMPORARY, TEMPORARY_COLOR = "not in the last map", (150, 150, 150)
+"""State of a room that was gone in the end: nothing tells what it should have become."""
 
 
 def state_colors(track: int) -> dict[str, Color]:
-    """Colors of a track while its room forms, once its shape was right, and once its area has settled."""
+    """Color of each state of a track: its room forms, its shape is right, its area has settled; or gray."""
     red, green, blue = track_color(track)
-    return {
+    tints: dict[str, Color] = {
         state: (
             round(255 - (255 - red) * tint),
             round(255 - (255 - green) * tint),
@@ -28,6 +30,7 @@ def state_colors(track: int) -> dict[str, Color]:
         )
         for state, tint in STATE_TINTS.items()
     }
+    return tints | {TEMPORARY: TEMPORARY_COLOR}
 
 
 def track_color(track: int) -> Color:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -16,9 +16,54 @@ INSIDE_SHARE = 0.5
 """A named outline is a room where they share this much of the smaller of both: most of it."""
 
 
+NameOf = Callable[[int], str]
+"""The name of a room by its track, or by its number in a single map."""
+
+
 def room_name(number: int, given: str = "") -> str:
-    """What a room is called in all outputs: the name that it was given, or its number."""
+    """Name a room in any output: by the name that it was given, or by its number.
+
+    Examples
+    --------
+    >>> room_name(7), room_name(7, "Kitchen")
+    ('Room 7', 'Kitchen')
+    """
     return given or f"Room {number}"
+
+
+def short_name(number: int, name_of: NameOf = room_name) -> str:
+    """Return what stands in a narrow place: the number of a room that nobody has named.
+
+    Examples
+    --------
+    >>> short_name(7, room_name), short_name(7, {7: "Kitchen"}.__getitem__)
+    ('7', 'Kitchen')
+    """
+    name = name_of(number)
+    return str(number) if name == room_name(number) else name
+
+
+class TrackNames:
+    """The names of the tracks of a run as they are known so far.
+
+    Examples
+    --------
+    >>> names = TrackNames()
+    >>> names.add((7, 8), ("Kitchen", ""))
+    >>> names(7), names(8)
+    ('Kitchen', 'Room 8')
+    """
+
+    def __init__(self) -> None:
+        self._given: dict[int, str] = {}
+
+    def add(self, tracks: Sequence[int], names: Sequence[str]) -> None:
+        """Take the names that rooms of a map were given, empty for none."""
+        self._given.update({track: name for track, name in zip(tracks, names, strict=False) if name})
+
+    def __call__(self, track: int) -> str:
+        """Name of a track."""
+        return room_name(track, self._given.get(track, ""))
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,6 +6,7 @@ import numpy as np
 import rerun as rr
 
 from rose2_logs.drawing.palette import track_color
+from rose2_logs.model.room_names import NameOf, room_name, short_name
 from rose2_logs.model.rooms import RoomMap
 from rose2_logs.outputs.rerun.columns import Label, Scalar, Strips
 from rose2_logs.outputs.rerun.layers import Layers
@@ -40,19 +41,22 @@ class BackProjectedWorld:
         A separate stream, because this pass begins at the first map again.
     recording : RecordingStream
         For what stays the same over the run.
+    name_of : callable
+        Name of a room by its track.
     """
 
-    def __init__(self, layers: Layers, recording: rr.RecordingStream) -> None:
+    def __init__(self, layers: Layers, recording: rr.RecordingStream, name_of: NameOf = room_name) -> None:
         self._layers = layers
+        self._name_of = name_of
         self._recording = recording
         self._known: set[int] = set()
         self._named: set[int] = set()
         recording.log(OUTLINES, line_style(OUTLINE_POINTS, None), static=True)
 
-    def log(self, found: BackProjectedSnapshot, coverage: int, view_side_m: float) -> None:
-        """Log one map, in the order of the run, at its steps of coverage, for a view of that size."""
+    def log(self, found: BackProjectedSnapshot, coverage_percent: int, view_side_m: float) -> None:
+        """Log one map, in the order of the run, at its percent of coverage, for a view of that size."""
         snapshot = found.snapshot
-        self._layers.begin(snapshot.log_time_ns, snapshot.stamp_ns, snapshot.index, coverage)
+        self._layers.begin(snapshot.log_time_ns, snapshot.stamp_ns, snapshot.index, coverage_percent)
         pictures = MapPictures(snapshot)
         self._layers.show(
             BACK_PROJECTED, pictures.rooms(found.rooms.labels, found.track_ids, LAYER * LAYER_STEP_M)
@@ -73,10 +77,11 @@ class BackProjectedWorld:
                 self._known.add(track)
                 self._begin_track(track)
             share = area / last if last > 0 else 0.0
-            self._layers.add(f"{SEEN_SHARE}/{track}", Scalar(share))
+            self._layers.add(f"{SEEN_SHARE}/{track}", Scalar(100 * share))
             if area > 0:
                 shown.add(track)
-                label = room_label(track, last, view_side_m, text=percent(min(share, 1.0)))
+                name = short_name(track, self._name_of)
+                label = room_label(name, last, view_side_m, text=percent(min(share, 1.0)))
                 self._layers.show(f"{NAMES}/{track}", Label(tuple(points[room]), label))
         for track in sorted(self._named - shown):
             self._layers.clear(f"{NAMES}/{track}")
@@ -89,7 +94,7 @@ class BackProjectedWorld:
     def _begin_track(self, track: int) -> None:
         """Log what stays the same for a room."""
         self._recording.log(f"{NAMES}/{track}", label_style(), static=True)
-        curve = rr.SeriesLines(colors=[track_color(track)], names=f"room {track}")
+        curve = rr.SeriesLines(colors=[track_color(track)], names=self._name_of(track))
         self._recording.log(f"{SEEN_SHARE}/{track}", curve, static=True)
 
 

@@ -12,6 +12,8 @@ from rose2_logs.config.run_options import RECORDING_LAYERS
 from rose2_logs.model.occupancy import FloatArray
 from rose2_logs.outputs.rerun.back_projected import BACK_PROJECTED, SEEN_SHARE
 from rose2_logs.outputs.rerun.lanes import FINAL_IOU, FINAL_SHARE, KNOWN_FINAL_SHARE, LANES, SHIFTS
+from rose2_logs.outputs.rerun.layers import Instant
+from rose2_logs.outputs.rerun.legend import LEGEND, LEGEND_TEXT
 from rose2_logs.outputs.rerun.world import (
     BORDERS,
     CLEAN,
@@ -29,15 +31,17 @@ from rose2_logs.outputs.rerun.world import (
     VORONOI,
 )
 
-COVERAGE_UNIT = 1e-4
-"""Step of the coverage timeline, which counts in whole numbers."""
 EYE_HEIGHT = 1.02
 """Height of the eye over the side of the map that fills the view: the viewer sees 1.04 times its height."""
-MAP_ASPECT = 1.3
+MAP_ASPECT = 1.4
 """Width over height of the view of the map in a window of usual shape."""
 SWITCHED = (BORDERS, CLEAN, SCORE, SEGMENTS, LINES, FACES, VORONOI)
 """Layers of the map's view that are off at first and can be switched on."""
-TIMELINES = ("message_log_time", "ros2_timestamp", "snapshot", "coverage")
+PLAY_S = 20.0
+"""Time that playing the run takes, whatever its length."""
+SIDE_SHARE, LEGEND_SHARE, CURVES_SHARE = 0.32, 0.05, 0.36
+"""Shares of the window: of its width for what is beside the map; of its height for the strip of the legend,
+and for the curves."""
 Overrides = list[rrb.EntityBehavior | rrb.VisibleTimeRanges]
 PAPER, DARK = (236, 236, 236), (12, 12, 16)
 
@@ -48,8 +52,11 @@ def make_blueprint(
     layers: Collection[str] = RECORDING_LAYERS,
     *,
     back_projected: bool = False,
+    first_percent: int = 0,
 ) -> rrb.Blueprint:
-    """Map from above and a tab per stage of the method; next to it curves, room lanes, events, summary.
+    """Map from above and a tab per stage of the method; next to it curves, summary, room lanes, events.
+
+    A recording opens on its last map and stands there; when played, it begins at the first.
 
     Parameters
     ----------
@@ -59,6 +66,8 @@ def make_blueprint(
         The optional layers that the recording has; tabs without any are left out.
     back_projected : bool
         Whether it has the back-projected rooms.
+    first_percent : int
+        Coverage of the first map, where playing begins.
     """
     stages = (
         ("Rooms", (), ()),
@@ -85,23 +94,16 @@ def make_blueprint(
         )
     return rrb.Blueprint(
         rrb.Horizontal(
-            rrb.Tabs(*views, active_tab=0),
             rrb.Vertical(
-                _curves(
-                    "Agreement with the final layout",
-                    ("/run/coverage", FINAL_SHARE, KNOWN_FINAL_SHARE, FINAL_IOU, SHIFTS),
-                    (0.0, 1.05),
-                ),
-                rrb.Tabs(
-                    _room_lanes(),
-                    _curves("Area, m²", ("/run/area/**",), legend=False),
-                    *([_curves("Seen share", (f"{SEEN_SHARE}/**",), legend=False)] if back_projected else []),
-                    _curves("Count", ("/run/rooms",)),
-                    _curves("Change", ("/run/variation_bits",)),
-                    active_tab=0,
-                ),
+                rrb.Tabs(*views, active_tab=0),
+                _legend_strip(),
+                row_shares=[1 - LEGEND_SHARE, LEGEND_SHARE],
+            ),
+            rrb.Vertical(
+                rrb.Tabs(*_curve_views(back_projected), active_tab=0),
                 rrb.Tabs(
                     rrb.TextDocumentView(name="Summary", origin="/summary"),
+                    rrb.StateTimelineView(name="Room history", origin=LANES, time_view=_axis()),
                     rrb.TextLogView(
                         name="Events",
                         origin="/events",
@@ -109,13 +111,20 @@ def make_blueprint(
                             timeline_columns=["snapshot"], text_log_columns=["loglevel", "body"]
                         ),
                     ),
+                    rrb.TextDocumentView(name="Legend", origin=LEGEND_TEXT),
                     active_tab=0,
                 ),
-                row_shares=[3, 5, 4],
+                row_shares=[CURVES_SHARE, 1 - CURVES_SHARE],
             ),
-            column_shares=[7, 3],
+            column_shares=[1 - SIDE_SHARE, SIDE_SHARE],
         ),
-        rrb.TimePanel(timeline="coverage", state="collapsed"),
+        # A viewer that follows shows the end of a file, all of which is there.
+        rrb.TimePanel(
+            timeline="coverage_percent",
+            state="collapsed",
+            play_state="following",
+            fps=max(100 - first_percent, 1) / PLAY_S,
+        ),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
         auto_views=False,
@@ -151,7 +160,9 @@ def _map_view(
 def _up_to_now() -> rrb.VisibleTimeRanges:
     before = rr.encodings.TimeRangeBoundary.infinite()
     now = rr.encodings.TimeRangeBoundary.cursor_relative(seq=0)
-    return rrb.VisibleTimeRanges([rrb.VisibleTimeRange(name, start=before, end=now) for name in TIMELINES])
+    return rrb.VisibleTimeRanges(
+        [rrb.VisibleTimeRange(name, start=before, end=now) for name in Instant._fields]
+    )
 
 
 def view_side_m(low_m: FloatArray, high_m: FloatArray, aspect: float = MAP_ASPECT) -> float:
@@ -178,6 +189,21 @@ def _axis() -> rrb.archetypes.TimeAxis:
     return rrb.archetypes.TimeAxis(link="Independent", view_range=whole_run)
 
 
+def _curve_views(back_projected: bool) -> list[rrb.View]:
+    """Views of everything that is a curve, what matters most first."""
+    views: list[rrb.View] = [
+        _curves(
+            "Agreement with the final layout",
+            ("/run/coverage", FINAL_SHARE, KNOWN_FINAL_SHARE, FINAL_IOU, SHIFTS),
+            (0.0, 105.0),
+        ),
+        _curves("Area, m²", ("/run/area/**",), legend=False),
+    ]
+    if back_projected:
+        views.append(_curves("Seen share, %", (f"{SEEN_SHARE}/**",), legend=False))
+    return [*views, _curves("Rooms", ("/run/rooms",)), _curves("Change", ("/run/variation_bits",))]
+
+
 def _curves(
     name: str, paths: Iterable[str], span: tuple[float, float] | None = None, legend: bool = True
 ) -> rrb.TimeSeriesView:
@@ -187,9 +213,10 @@ def _curves(
         contents=list(paths),
         axis_x=_axis(),
         axis_y=None if span is None else rrb.ScalarAxis(range=span),
-        plot_legend=rrb.PlotLegend(visible=legend, corner=rrb.Corner2D.LeftTop),
+        # In the end everything agrees, at the top: this corner is empty.
+        plot_legend=rrb.PlotLegend(visible=legend, corner=rrb.Corner2D.RightBottom),
     )
 
 
-def _room_lanes() -> rrb.StateTimelineView:
-    return rrb.StateTimelineView(name="Rooms over the run", origin=LANES, time_view=_axis())
+def _legend_strip() -> rrb.Spatial2DView:
+    return rrb.Spatial2DView(name="Signs", origin=LEGEND, titlebar=False, background=PAPER)

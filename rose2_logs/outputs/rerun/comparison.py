@@ -21,7 +21,7 @@ from rose2_logs.model.labels import known_window
 from rose2_logs.model.occupancy import UNKNOWN, FloatArray
 from rose2_logs.model.outlines import outer_rings
 from rose2_logs.outputs.rerun.blueprint import PAPER, eye_above
-from rose2_logs.outputs.rerun.world import OUTLINE_POINTS, OUTLINE_SHADE, lifted
+from rose2_logs.outputs.rerun.world import LABEL_COLOR, OUTLINE_POINTS, OUTLINE_SHADE, lifted
 from rose2_logs.system.files import replacing
 from rose2_logs.tracking.registration import RigidMotion
 
@@ -189,7 +189,7 @@ def _names(shapes: list[BaseGeometry], texts: list[str]) -> rr.Points3D:
         labels=[text for _, text in drawn],
         show_labels=True,
         radii=rr.components.Radius.ui_points(1.0),
-        colors=[(255, 255, 255)],
+        colors=[LABEL_COLOR],
     )
 
 

@@ -7,7 +7,8 @@ from array import array
 import numpy as np
 import rerun as rr
 
-from rose2_logs.drawing.palette import FORMING, SETTLED, SHAPED, state_colors
+from rose2_logs.drawing.palette import FORMING, SETTLED, SHAPED, TEMPORARY, state_colors
+from rose2_logs.model.room_names import NameOf, room_name
 from rose2_logs.outputs.rerun.layers import Instant, time_columns
 from rose2_logs.tracking.convergence import Convergence
 from rose2_logs.tracking.track_history import SnapshotRef
@@ -27,10 +28,13 @@ class TrackLanes:
     ----------
     recording : RecordingStream
         Where to.
+    name_of : callable
+        Name of a room by its track.
     """
 
-    def __init__(self, recording: rr.RecordingStream) -> None:
+    def __init__(self, recording: rr.RecordingStream, name_of: NameOf = room_name) -> None:
         self._recording = recording
+        self._name_of = name_of
         # The times of each map, one after the other: as objects they would take several times as much.
         self._times = array("q")
         # For each track the indices of instants at which it appears and is gone, in turns.
@@ -52,14 +56,19 @@ class TrackLanes:
         ]
         number = {instant.snapshot: index for index, instant in enumerate(instants)}
         for track, turns in sorted(self._turns.items()):
-            changes = self._changes(track, turns, number, convergence)
-            path = f"{LANES}/{track:03d}"
-            tints = state_colors(track)
-            self._recording.log(
-                path,
-                rr.StateConfiguration(values=list(tints), colors=list(tints.values())),
-                static=True,
+            changes = (
+                self._changes(track, turns, number, convergence)
+                if track in self._shown
+                else self._presence(turns)
             )
+            path = f"{LANES}/{track}"
+            tints = state_colors(track)
+            looks = rr.StateConfiguration(
+                values=list(tints),
+                labels=[f"{self._name_of(track)}: {state}" for state in tints],
+                colors=list(tints.values()),
+            )
+            self._recording.log(path, looks, static=True)
             times = time_columns([instants[index] for index in changes])
             states = rr.StateChange.columns(state=list(changes.values()))
             self._recording.send_columns(path, times, states)
@@ -71,12 +80,17 @@ class TrackLanes:
             known = [(at, figures.get(at.snapshot)) for at in instants]
             points = [(at, value) for at, value in known if value is not None]
             if points:
-                values = rr.Scalars.columns(scalars=np.array([value for _, value in points]))
+                values = rr.Scalars.columns(scalars=np.array([100 * value for _, value in points]))
                 self._recording.send_columns(path, time_columns([at for at, _ in points]), values)
 
     @property
     def _maps(self) -> int:
         return len(self._times) // len(Instant._fields)
+
+    @staticmethod
+    def _presence(turns: list[int]) -> dict[int, str]:
+        """State of a room that was gone in the end: only that it was there, from each index on."""
+        return {index: LOST if place % 2 else TEMPORARY for place, index in enumerate(turns)}
 
     def _changes(
         self, track: int, turns: list[int], number: dict[int, int], convergence: Convergence

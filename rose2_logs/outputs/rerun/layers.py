@@ -6,6 +6,7 @@ lists all chunks at the file's end. So rows wait until those of an entity are wo
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from operator import attrgetter
@@ -25,12 +26,17 @@ WAITING_BYTES = 1 << 24
 
 
 class Instant(NamedTuple):
-    """Position of a snapshot on each timeline: nanoseconds, its number, steps of `COVERAGE_UNIT`."""
+    """Position of a snapshot on each timeline: nanoseconds, its number, whole percent."""
 
     message_log_time: int
     ros2_timestamp: int
     snapshot: int
-    coverage: int
+    coverage_percent: int
+
+
+def whole_percent(coverage: float) -> int:
+    """Return the place of a coverage on its timeline: rounded down, so that only the whole is 100."""
+    return math.floor(100 * coverage)
 
 
 @dataclass
@@ -78,14 +84,16 @@ class Layers:
         self._now = Instant(0, 0, 0, 0)
         self._latest_stamp_ns: int | None = None
 
-    def begin(self, log_time_ns: int, stamp_ns: int, snapshot: int, coverage: int) -> None:
+    def begin(self, log_time_ns: int, stamp_ns: int, snapshot: int, coverage_percent: int) -> None:
         """Start a snapshot: everything is logged at these times from now on."""
         latest_ns = stamp_ns if self._latest_stamp_ns is None else self._latest_stamp_ns
         goes_back = stamp_ns < latest_ns
         if goes_back or self._stamps_went_back:
             self._stretch += 1
         self._stamps_went_back, self._latest_stamp_ns = goes_back, max(stamp_ns, latest_ns)
-        self._now = Instant(log_time_ns, stamp_ns, snapshot, max(coverage, self._now.coverage))
+        self._now = Instant(
+            log_time_ns, stamp_ns, snapshot, max(coverage_percent, self._now.coverage_percent)
+        )
 
     @property
     def now(self) -> Instant:
@@ -121,7 +129,7 @@ class Layers:
         self._recording.set_time("message_log_time", timestamp=np.datetime64(now.message_log_time, "ns"))
         self._recording.set_time("ros2_timestamp", timestamp=np.datetime64(now.ros2_timestamp, "ns"))
         self._recording.set_time("snapshot", sequence=now.snapshot)
-        self._recording.set_time("coverage", sequence=now.coverage)
+        self._recording.set_time("coverage_percent", sequence=now.coverage_percent)
         self._recording.log(path, rr.Clear(recursive=True))
 
     def count_below(self, path: str) -> int:
@@ -151,7 +159,7 @@ def time_columns(instants: Sequence[Instant]) -> list[rr.TimeColumn]:
         rr.TimeColumn(name, timestamp=columns[name].astype("datetime64[ns]"))
         for name in ("message_log_time", "ros2_timestamp")
     ]
-    return times + [rr.TimeColumn(name, sequence=columns[name]) for name in ("snapshot", "coverage")]
+    return times + [rr.TimeColumn(name, sequence=columns[name]) for name in ("snapshot", "coverage_percent")]
 
 
 # Computed once: what `dataclasses.fields` would return for each layer.

@@ -13,13 +13,15 @@ from rose2_logs.drawing.event_text import event_text
 from rose2_logs.drawing.extent import Extent
 from rose2_logs.drawing.palette import track_color
 from rose2_logs.errors import OutputError
+from rose2_logs.model.room_names import NameOf, room_name
 from rose2_logs.outputs.rerun import viewer as rerun_viewer
 from rose2_logs.outputs.rerun.back_projected import BackProjectedWorld
-from rose2_logs.outputs.rerun.blueprint import COVERAGE_UNIT, make_blueprint, view_side_m
+from rose2_logs.outputs.rerun.blueprint import make_blueprint, view_side_m
 from rose2_logs.outputs.rerun.columns import Entry, Scalar
 from rose2_logs.outputs.rerun.disk import abandon, require_space
 from rose2_logs.outputs.rerun.lanes import FINAL_IOU, FINAL_SHARE, KNOWN_FINAL_SHARE, SHIFTS, TrackLanes
-from rose2_logs.outputs.rerun.layers import CHUNK_BYTES, Layers
+from rose2_logs.outputs.rerun.layers import CHUNK_BYTES, Layers, whole_percent
+from rose2_logs.outputs.rerun.legend import log_legend
 from rose2_logs.outputs.rerun.summary import summary_text
 from rose2_logs.outputs.rerun.world import World
 from rose2_logs.runs.history import RunSummary
@@ -33,10 +35,10 @@ logger = logging.getLogger(__name__)
 
 FLUSH_TIMEOUT_S = 60.0
 CURVES = {
-    "/run/coverage": ("coverage", (90, 190, 90)),
-    FINAL_SHARE: ("rooms as in the end", (250, 160, 50)),
-    KNOWN_FINAL_SHARE: ("the same of the known part", (170, 120, 220)),
-    FINAL_IOU: ("overlap with the final layout", (90, 150, 250)),
+    "/run/coverage": ("coverage, %", (90, 190, 90)),
+    FINAL_SHARE: ("same rooms, %", (250, 160, 50)),
+    KNOWN_FINAL_SHARE: ("same, where known, %", (170, 120, 220)),
+    FINAL_IOU: ("overlap, %", (90, 150, 250)),
     "/run/rooms": ("rooms", (190, 130, 250)),
     "/run/variation_bits": ("variation of information, bits", (250, 100, 100)),
 }
@@ -48,7 +50,7 @@ class RerunRecording(Sink):
     """Sink that writes a ``.rrd`` with its layout, or shows the run in an open viewer, or both.
 
     Timelines are ``message_log_time`` and ``ros2_timestamp`` (as in Rerun's own MCAP importer), ``snapshot``,
-    and ``coverage``, the greatest so far, in steps of 1e-4. Rooms stand under ``/world/rooms/TRACK``, their
+    and ``coverage_percent``, the greatest so far, rounded down. Rooms stand under ``/world/rooms/TRACK``, their
     areas under ``/run/area/TRACK``; they are cleared when their track is lost. What has not changed since the
     snapshot before is not logged again. The lanes of the tracks and the convergence, which only the last map
     tells, follow at the end; before them the back-projected rooms, in a second pass, if there is one.
@@ -61,6 +63,8 @@ class RerunRecording(Sink):
         Also show the run in a Rerun viewer, which is started where none is open.
     layers : collection of str
         Which of `RECORDING_LAYERS` to write.
+    name_of : callable
+        Name of a room by its track.
 
     Raises
     ------
@@ -74,11 +78,13 @@ class RerunRecording(Sink):
         *,
         live: bool = False,
         layers: Collection[str] = RECORDING_LAYERS,
+        name_of: NameOf = room_name,
     ) -> None:
         self._path = path
         self._part = part_of(path) if path else None
         self._live = live
         self._wanted = layers
+        self._name_of = name_of
         self._recording: rr.RecordingStream | None = None
         self._viewer_answers = live
         self._is_lost = False
@@ -86,7 +92,7 @@ class RerunRecording(Sink):
         self._known: set[int] = set()
         self._back_projected: BackProjectedWorld | None = None
         self._extent = Extent()
-        self._maps = 0
+        self._maps, self._first_percent = 0, 0
 
     def begin(self, info: RunInfo) -> None:
         """Open the file, or a viewer, and log what stays the same."""
@@ -109,8 +115,9 @@ class RerunRecording(Sink):
         self._stream.set_sinks(*sinks)
         self._stream.set_log_time_enabled(False)
         self._stream.set_log_tick_enabled(False)
-        self._world = World(self._layers, self._stream, self._wanted)
-        self._lanes = TrackLanes(self._stream)
+        self._world = World(self._layers, self._stream, self._wanted, self._name_of)
+        self._lanes = TrackLanes(self._stream, self._name_of)
+        log_legend(self._stream, self._wanted)
         for path, (name, color) in CURVES.items():
             self._stream.log(path, rr.SeriesLines(names=name, colors=[color], widths=2), static=True)
         jumps = rr.SeriesPoints(
@@ -121,8 +128,8 @@ class RerunRecording(Sink):
     def write(self, step: TrackedSnapshot) -> None:
         """Log one snapshot at all its times."""
         snapshot = step.snapshot
-        coverage = _steps(step.coverage)
-        self._layers.begin(snapshot.log_time_ns, snapshot.stamp_ns, snapshot.index, coverage)
+        coverage_percent = whole_percent(step.coverage)
+        self._layers.begin(snapshot.log_time_ns, snapshot.stamp_ns, snapshot.index, coverage_percent)
         self._extent.add(step)
         self._world.log(step, view_side_m(self._extent.low_m, self._extent.high_m))
         self._lanes.add(self._layers.now, step.track_ids)
@@ -131,6 +138,8 @@ class RerunRecording(Sink):
             if event.kind != "continued":
                 text = f"{percent(step.coverage, ' %')}: {event_text(event)}"
                 self._layers.add("/events", Entry(text, _event_level(event)))
+        if self._maps == 0:
+            self._first_percent = coverage_percent
         if self._live and self._maps == 0:
             # A live viewer shows the layout from the beginning; a file alone gets the final one.
             self._send_blueprint()
@@ -141,9 +150,9 @@ class RerunRecording(Sink):
         """Log what one map shows of the last map's rooms, after all maps, in their order again."""
         if self._back_projected is None:
             self._layers.flush()
-            self._back_projected = BackProjectedWorld(self._new_layers(), self._stream)
+            self._back_projected = BackProjectedWorld(self._new_layers(), self._stream, self._name_of)
         view_m = view_side_m(self._extent.low_m, self._extent.high_m)
-        self._back_projected.log(found, _steps(found.coverage), view_m)
+        self._back_projected.log(found, whole_percent(found.coverage), view_m)
         self._flush()
 
     def finish(self, summary: RunSummary) -> None:
@@ -179,6 +188,7 @@ class RerunRecording(Sink):
             self._extent.high_m,
             self._wanted,
             back_projected=self._back_projected is not None,
+            first_percent=self._first_percent,
         )
         self._stream.send_blueprint(blueprint)
 
@@ -199,10 +209,10 @@ class RerunRecording(Sink):
             logger.warning("the Rerun viewer does not answer any more; the run goes on without it")
 
     def _log_curves(self, step: TrackedSnapshot) -> None:
-        self._layers.add("/run/coverage", Scalar(step.coverage))
+        self._layers.add("/run/coverage", Scalar(100 * step.coverage))
         self._layers.add("/run/rooms", Scalar(len(step.track_ids)))
         if map_motion(step.events) is not None:
-            self._layers.add(SHIFTS, Scalar(step.coverage))
+            self._layers.add(SHIFTS, Scalar(100 * step.coverage))
         if step.change is not None and step.change.variation_bits is not None:
             self._layers.add("/run/variation_bits", Scalar(step.change.variation_bits))
         for track in sorted(self._shown - set(step.track_ids)):
@@ -211,16 +221,11 @@ class RerunRecording(Sink):
         for track, area in zip(step.track_ids, step.analysis.rooms.areas_m2.tolist(), strict=True):
             if track not in self._known:
                 self._known.add(track)
-                name = rr.SeriesLines(colors=[track_color(track)], names=f"room {track}")
+                name = rr.SeriesLines(colors=[track_color(track)], names=self._name_of(track))
                 self._stream.log(f"/run/area/{track}", name, static=True)
             self._layers.add(f"/run/area/{track}", Scalar(area))
 
 
-def _steps(coverage: float) -> int:
-    """Place on the coverage timeline."""
-    return round(coverage / COVERAGE_UNIT)
-
-
 def _event_level(event: RoomEvent) -> str:
-    is_warning = event.kind in ("split", "merged", "lost", "shifted")
-    return str(rr.TextLogLevel.WARN if is_warning else rr.TextLogLevel.INFO)
+    # Rooms split and merge in any run; a map that shifts as a whole is what SLAM may have got wrong.
+    return str(rr.TextLogLevel.WARN if event.kind == "shifted" else rr.TextLogLevel.INFO)

@@ -6,7 +6,6 @@ import math
 import re
 
 from rose2_logs.model.room_quality import UNSURE_SIGN, is_unsure
-from rose2_logs.outputs.rerun.blueprint import COVERAGE_UNIT
 from rose2_logs.runs.history import RunSummary
 from rose2_logs.runs.sink import RunInfo
 from rose2_logs.system.text import counted, percent
@@ -70,7 +69,6 @@ def summary_text(info: RunInfo, summary: RunSummary) -> str:
         "Percent of coverage: when the room was first seen; when its shape, including the unseen part, first "
         "overlapped its final shape by 0.8; since when its area has been within 10 % of the final one. "
         "Walls: share of its outline that is supported by walls. "
-        f"On the timeline `coverage`, {1 / COVERAGE_UNIT:.0f} is 100 %."
     )
     about = {
         "log": info.origin or info.log_path.name,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Sequence
 
 import numpy as np
@@ -12,6 +13,7 @@ from rose2_logs.drawing.hatching import hatch_unseen
 from rose2_logs.drawing.palette import track_color
 from rose2_logs.model.borders import UNSURE_BORDER_BELOW
 from rose2_logs.model.occupancy import FloatArray
+from rose2_logs.model.room_names import NameOf, room_name, short_name
 from rose2_logs.model.room_quality import UNSURE_SIGN, is_unsure
 from rose2_logs.outputs.rerun.columns import Label, Strips
 from rose2_logs.outputs.rerun.layers import Layers
@@ -27,6 +29,9 @@ OUTLINE_POINTS, DOOR_POINTS, PATH_POINTS, LINE_POINTS, THIN_POINTS = 2.0, 4.0, 2
 DOOR_COLOR, PATH_COLOR, ROBOT_COLOR = (230, 90, 20), (20, 90, 200), (200, 20, 60)
 LINE_COLOR, VORONOI_COLOR, DIRECTION_COLOR = (60, 110, 230), (150, 20, 150), (255, 190, 40)
 UNCLUSTERED_COLOR = (130, 130, 130)
+LABEL_COLOR, SPECTRUM_LABEL_COLOR = (12, 12, 16), (255, 255, 255)
+"""Letters on the box that the viewer draws behind them, pale in its light theme, half dark in its dark one: on
+the pale map only near black can be read in both, on the dark spectrum white."""
 STRONG_EDGE, WEAK_EDGE = (20, 20, 90), (80, 165, 235)
 """Edges that walls cover all along, and not at all; distinct also for those who do not see red and green."""
 SURE_BORDER, UNSURE_BORDER = (20, 20, 90), (190, 40, 230)
@@ -39,7 +44,6 @@ ROBOT_LENGTH_M, ROBOT_WIDTH_M = 0.7, 0.45
 """Size of the arrowhead that stands for the robot, about that of a mobile base."""
 MARKS = (0.8, 0.98)
 """Where the marks of the directions begin and end, from the center of the spectrum's picture to its rim."""
-DIRECTION_NAME = "walls at {angle:.1f}°"
 BORDER_NAME = "{one} | {other}: {strength}"
 NAMED_SHARE = 0.004
 """Rooms with less of the area of a square view get a number only: number and area are about 65 of the usual
@@ -80,11 +84,20 @@ class World:
     recording : RecordingStream
         For what stays the same over the run.
     wanted : collection of str
-        Those of `sink.RECORDING_LAYERS` that are to be written.
+        Those of `RECORDING_LAYERS` that are to be written.
+    name_of : callable
+        Name of a room by its track.
     """
 
-    def __init__(self, layers: Layers, recording: rr.RecordingStream, wanted: Collection[str]) -> None:
+    def __init__(
+        self,
+        layers: Layers,
+        recording: rr.RecordingStream,
+        wanted: Collection[str],
+        name_of: NameOf = room_name,
+    ) -> None:
         self._layers = layers
+        self._name_of = name_of
         self._recording = recording
         self._wanted = wanted
         self._shown: set[int] = set()
@@ -149,11 +162,11 @@ class World:
         lengths = np.full(len(marks), 2, np.int32)
         self._layers.show(f"{SPECTRUM}/directions", Strips(points.astype(np.float32), lengths))
         for number, (angle, place) in enumerate(zip(directions_rad, begins, strict=True)):
-            text = DIRECTION_NAME.format(angle=np.degrees(angle))
+            text = direction_name(angle)
             label = Label((float(place[0]), float(place[1]), 2 * LAYER_STEP_M), text)
             if number not in self._named:
                 self._named.add(number)
-                self._style_label(f"{SPECTRUM}/names/{number}")
+                self._style_label(f"{SPECTRUM}/names/{number}", SPECTRUM_LABEL_COLOR)
             self._layers.show(f"{SPECTRUM}/names/{number}", label)
         for number in range(len(directions_rad), self._layers.count_below(f"{SPECTRUM}/names")):
             self._layers.clear(f"{SPECTRUM}/names/{number}")
@@ -172,7 +185,8 @@ class World:
             x, y, z = points[number]
             wall_share, _ = quality_of(step, number)
             area_m2 = float(rooms.areas_m2[number])
-            text = room_label(track, area_m2, view_side_m, unsure=is_unsure(wall_share))
+            name = short_name(track, self._name_of)
+            text = room_label(name, area_m2, view_side_m, unsure=is_unsure(wall_share))
             self._layers.show(f"{ROOMS}/{track}/label", Label((x, y, z), text))
 
     def _begin_track(self, track: int) -> None:
@@ -199,7 +213,11 @@ class World:
                 self._style_label(path)
             x, y, z = lifted(door.ends_m.mean(0)[None], len(HEIGHTS))[0].tolist()
             one, other = sorted(step.track_ids[room - 1] for room in door.rooms)
-            text = BORDER_NAME.format(one=one, other=other, strength=percent(strength[door.rooms]))
+            text = BORDER_NAME.format(
+                one=short_name(one, self._name_of),
+                other=short_name(other, self._name_of),
+                strength=percent(strength[door.rooms]),
+            )
             self._layers.show(path, Label((x, y, z), text))
         for number in range(len(unsure), self._layers.count_below(f"{BORDERS}/unsure")):
             self._layers.clear(f"{BORDERS}/unsure/{number}")
@@ -241,8 +259,8 @@ class World:
     def _style_lines(self, path: str, width: float, color: Color | None) -> None:
         self._recording.log(path, line_style(width, color), static=True)
 
-    def _style_label(self, path: str) -> None:
-        self._recording.log(path, label_style(), static=True)
+    def _style_label(self, path: str, color: Color = LABEL_COLOR) -> None:
+        self._recording.log(path, label_style(color), static=True)
 
 
 def line_style(width: float, color: Color | None) -> rr.LineStrips3D:
@@ -252,25 +270,30 @@ def line_style(width: float, color: Color | None) -> rr.LineStrips3D:
     )
 
 
-def label_style() -> rr.Points3D:
-    """How names are shown."""
+def label_style(color: Color = LABEL_COLOR) -> rr.Points3D:
+    """How names are shown: by default for a pale ground."""
     return rr.Points3D.from_fields(
-        colors=[(255, 255, 255)], radii=rr.components.Radius.ui_points(0.5), show_labels=True
+        colors=[color], radii=rr.components.Radius.ui_points(0.5), show_labels=True
     )
 
 
+def direction_name(angle_rad: float) -> str:
+    """Name a direction of walls, which is the same after half a turn: from 0.0 to 179.9 degrees."""
+    return f"walls at {round(math.degrees(angle_rad), 1) % 180:.1f}°"
+
+
 def room_label(
-    track: int, area_m2: float, view_side_m: float, *, unsure: bool = False, text: str | None = None
+    name: str, area_m2: float, view_side_m: float, *, unsure: bool = False, text: str | None = None
 ) -> str:
-    """Name a room: number and area in one line, the number alone if these would cover its neighbors.
+    """Label a room: its short name and area in one line, the name alone if these would cover its neighbors.
 
     The viewer cuts labels of several lines down to the first one where there are many. `text` stands in place
     of the area where that is not what matters.
     """
-    number = f"{track}{UNSURE_SIGN if unsure else ''}"
+    label = f"{name}{UNSURE_SIGN if unsure else ''}"
     if area_m2 < NAMED_SHARE * view_side_m**2:
-        return number
-    return f"{number}: {text or f'{area_m2:.0f} m²'}"
+        return label
+    return f"{label}: {text or f'{area_m2:.0f} m²'}"
 
 
 def _height_m(path: str) -> float:
