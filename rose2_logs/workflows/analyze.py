@@ -214,7 +214,7 @@ def _follow(
         reader,
         workers,
         parameters,
-        with_path="path" in options.shown_layers,
+        with_path="path" in options.shown_layers or options.annotated_log,
         base_frame=options.base_frame,
         names=names,
     )
