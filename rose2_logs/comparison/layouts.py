@@ -65,6 +65,29 @@ class LayoutComparison:
         return self.placement.runner_up_score >= share * self.placement.score
 
     @property
+    def doubts(self) -> list[str]:
+        """What makes the comparison doubtful, in sentences; empty where nothing does."""
+        if self.same_building:
+            if not self.ambiguous:
+                return []
+            return [
+                "the building fits about as well in another way, as when it looks the same turned by half a "
+                "circle: B may be misaligned with A"
+            ]
+        doubts = [
+            "these do not seem to be two runs in one building: hardly any walls agree, and what is changes "
+            "below means little"
+        ]
+        if self.scale is not None:
+            cell_a_m, cell_b_m = self.a.map.resolution_m, self.b.map.resolution_m
+            doubts.append(
+                f"B would fit if it were {self.scale:.2f} times as large: is the size of a cell right? With "
+                f"{cell_b_m * self.scale:.4f} m instead of {cell_b_m:.4f} m in B, or "
+                f"{cell_a_m / self.scale:.4f} m instead of {cell_a_m:.4f} m in A, they show one building"
+            )
+        return doubts
+
+    @property
     def room_counts(self) -> dict[RoomStatus, int]:
         """Number of entries of each status that occurs."""
         return dict(Counter(change.status for change in self.rooms))

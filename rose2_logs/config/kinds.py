@@ -18,7 +18,7 @@ class KindParameters(ParameterBlock):
     block: ClassVar[str] = "kinds"
 
     corridor_min_elongation: float = number(
-        4.0,
+        3.5,
         "1",
         "Least length over width of a corridor; rooms seldom reach 3. Of the rectangle of the same area "
         "and perimeter, so that corridors with bends count too.",
@@ -35,9 +35,9 @@ class KindParameters(ParameterBlock):
         3.0, "m^2", "Greatest area of a closet: less than the smallest bedroom or bathroom.", 0.0, 1e6
     )
     detail_m: float = number(
-        0.3,
+        0.5,
         "m",
-        "Smaller steps of an outline do not count for its perimeter: furniture, door frames.",
+        "Notches and juts of an outline up to twice as wide do not count: furniture, doors.",
         0.0,
         10.0,
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import shapely
 from shapely.geometry.base import BaseGeometry
 
 from rose2_logs.config.kinds import KindParameters
@@ -31,13 +32,22 @@ def guess_kind(shape: BaseGeometry, parameters: KindParameters) -> str:
     """
     if shape.is_empty:
         return ""
-    length_m, width_m = _sides_m(shape.simplify(parameters.detail_m))
+    length_m, width_m = _sides_m(_smooth(shape, parameters.detail_m))
     is_long = length_m >= parameters.corridor_min_elongation * width_m
     if is_long and width_m <= parameters.corridor_max_width_m:
         return "corridor"
     if shape.area >= parameters.hall_min_m2:
         return "hall"
     return "closet" if shape.area <= parameters.closet_max_m2 else "room"
+
+
+def _smooth(shape: BaseGeometry, detail_m: float) -> BaseGeometry:
+    """Fill holes and notches of a shape, and take away what juts out, up to twice a detail in width."""
+    whole = shapely.union_all([shapely.Polygon(part.exterior) for part in shapely.get_parts(shape)])
+    filled = whole.buffer(detail_m, join_style="mitre").buffer(-detail_m, join_style="mitre")
+    smooth = filled.buffer(-detail_m, join_style="mitre").buffer(detail_m, join_style="mitre")
+    # A shape that is nowhere wider than that stays.
+    return smooth.simplify(detail_m) if smooth.area > filled.area / 2 else filled
 
 
 def _sides_m(shape: BaseGeometry) -> tuple[float, float]:

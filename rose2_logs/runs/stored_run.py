@@ -22,6 +22,7 @@ from rose2_logs.io.discovery import ANNOTATED_ENDING
 from rose2_logs.model.analysis import Walls
 from rose2_logs.model.borders import Border
 from rose2_logs.model.occupancy import GridGeometry, OccupancySnapshot
+from rose2_logs.model.room_names import room_name
 from rose2_logs.model.room_plan import PlanMap, PlanRoom, RoomPlan
 from rose2_logs.model.rooms import Doorway
 from rose2_logs.runs.names import names_in, tell_unused
@@ -126,6 +127,10 @@ class StoredRun:
         """Names that rooms were given, by track."""
         rows = self.table("tracks", ["track", "name"]).to_pylist()
         return {row["track"]: row["name"] for row in rows if row["name"]}
+
+    def name_of(self, track: int) -> str:
+        """Return what a room is called."""
+        return room_name(track, self.names.get(track, ""))
 
     def rename(self, path: Path) -> None:
         """Call rooms by other names than the run has stored; those that it names not keep theirs.

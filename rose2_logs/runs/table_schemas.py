@@ -353,6 +353,8 @@ ROOM_CHANGES = _table(
         ),
         "tracks_a": (pa.list_(pa.int32()), "tracks of the rooms of A, ascending; none for a new room"),
         "tracks_b": (pa.list_(pa.int32()), "tracks of the rooms of B, ascending; none for a missing room"),
+        "names_a": (pa.list_(pa.string()), "what these rooms are called in A"),
+        "names_b": (pa.list_(pa.string()), "what these rooms are called in B"),
         "iou": (pa.float64(), "intersection over union of A's and B's shapes, share"),
         "explored_iou": (
             pa.float64(),

@@ -18,6 +18,7 @@ from rose2_logs.io import open_log
 from rose2_logs.io.discovery import stem_of
 from rose2_logs.io.log import LogReader
 from rose2_logs.model.analysis import left_out_note
+from rose2_logs.model.room_names import TrackNames
 from rose2_logs.outputs.mcap.viewer_layouts import bag_metadata_path, foxglove_path, rviz_path
 from rose2_logs.runs.history import RunHistory, RunSummary
 from rose2_logs.runs.journal import JournaledWorkers
@@ -155,9 +156,10 @@ def _analyze_log(
         prepared = output.prepared(_facts(info, options), overwrite=options.overwrite, resume=options.resume)
         with prepared as (work, journal):
             planned = _planned_files(work, path, options)
-            outputs = [*sinks, *_make_sinks(planned, options, reader)]
+            called = TrackNames()
+            outputs = [*sinks, *_make_sinks(planned, options, reader, called)]
             workers = JournaledWorkers(processes, journal) if options.journal else processes
-            summary = _follow(reader, workers, work, info, options, outputs, on_snapshot)
+            summary = _follow(reader, workers, work, info, options, outputs, called, on_snapshot)
             if options.origin is not None:
                 warnings.rename(str(path), options.origin)
             seconds = time.perf_counter() - start
@@ -202,6 +204,7 @@ def _follow(
     info: RunInfo,
     options: RunOptions,
     sinks: Sequence[Sink],
+    called: TrackNames,
     on_snapshot: OnSnapshot | None,
 ) -> RunSummary:
     """Take the log's maps one by one to the history, the store and the sinks, and finish these."""
@@ -225,6 +228,7 @@ def _follow(
         for step in stream:
             history.add(step)
             store.write(step, history)
+            called.add(step.track_ids, step.names)
             for sink in sinks:
                 sink.write(step)
             _tell_progress(step, history, stream, on_snapshot)
@@ -236,8 +240,9 @@ def _follow(
         if note is not None:
             logger.warning("%s: in the last map, %s", info.origin or info.log_path, note)
         if options.names is not None and names is not None:
-            called = [history.histories.tracks[track].name for track in history.histories.in_last_map]
-            tell_unused(Path(options.names), names.unused(called, history.histories.in_last_map))
+            last = history.histories.in_last_map
+            used = [history.histories.tracks[track].name for track in last]
+            tell_unused(Path(options.names), names.unused(used, last))
         summary = store.finish(history)
         for sink in sinks:
             sink.finish(summary)
@@ -306,13 +311,18 @@ def _planned_files(folder: Path, log: Path, options: RunOptions) -> dict[str, Pa
     return files | {"summary": folder / SUMMARY}
 
 
-def _make_sinks(planned: dict[str, Path], options: RunOptions, reader: LogReader) -> list[Sink]:
+def _make_sinks(
+    planned: dict[str, Path], options: RunOptions, reader: LogReader, called: TrackNames
+) -> list[Sink]:
     # Imported here: each brings a large library that the others do not need.
     sinks: list[Sink] = []
     if options.recording or options.live:
         from rose2_logs.outputs.rerun.recording import RerunRecording
 
-        sinks.append(RerunRecording(planned.get("recording"), live=options.live, layers=options.layers))
+        recording = RerunRecording(
+            planned.get("recording"), live=options.live, layers=options.layers, name_of=called
+        )
+        sinks.append(recording)
     if options.annotated_log:
         from rose2_logs.outputs.mcap.annotated import AnnotatedMcap
 

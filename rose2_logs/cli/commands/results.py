@@ -47,6 +47,19 @@ Overwrite = Annotated[
 ]
 
 
+Names = Annotated[
+    Path | None,
+    typer.Option(
+        "--names",
+        metavar="FILE",
+        help="Other names for rooms, as for analyze: a table (CSV) with the columns name "
+        "and track, or name, x and y in meters of the last map; or GeoJSON with named outlines.",
+        show_default=False,
+        rich_help_panel=WHAT,
+    ),
+]
+
+
 def report(
     folder: Annotated[
         Path,
@@ -72,12 +85,13 @@ def report(
             rich_help_panel=WHAT,
         ),
     ] = PANELS,
+    names: Names = None,
     overwrite: Overwrite = False,
 ) -> None:
     """Write the results of a run as one HTML page with pictures, curves and tables. It needs no network."""
     from rose2_logs.outputs.report.overview import write_reports
 
-    written = write_reports(folder, out, panels=panels, overwrite=overwrite)
+    written = write_reports(folder, out, panels=panels, overwrite=overwrite, names=names)
     for page in written.pages:
         print_file(page)
     for error in written.failed:
@@ -120,6 +134,7 @@ def figure(
             rich_help_panel=WHAT,
         ),
     ] = FIGURE_WIDTH_PX,
+    names: Names = None,
     overwrite: Overwrite = False,
 ) -> None:
     """Draw the layout of one map for print: rooms, predicted parts, doorways, scale bar."""
@@ -127,7 +142,7 @@ def figure(
 
     choice = _choice(snapshot, coverage, last)
     picture = write_figure(
-        folder, out, *choice, back_projected=back_projected, width_px=width, overwrite=overwrite
+        folder, out, *choice, back_projected=back_projected, width_px=width, overwrite=overwrite, names=names
     )
     print_file(picture)
 
@@ -140,7 +155,7 @@ def export(
             "--format",
             "-f",
             metavar="FORMAT",
-            help="qgis (layers), geojson, dxf (CAD), svg, map_server (Nav2) or graph (networkx); may be repeated.",
+            help="geojson, qgis (layers), dxf (CAD), svg, map_server (Nav2), graph (networkx); repeatable.",
             rich_help_panel=WHAT,
         ),
     ],
@@ -158,13 +173,14 @@ def export(
             rich_help_panel=WHAT,
         ),
     ] = None,
+    names: Names = None,
     overwrite: Overwrite = False,
 ) -> None:
     """Write the floor plan of one map for other programs: GIS, CAD, Nav2, networkx."""
     from rose2_logs.workflows.figure import export_plan
 
     choice = _choice(snapshot, coverage, last)
-    for file in export_plan(folder, formats, out, *choice, overwrite=overwrite):
+    for file in export_plan(folder, formats, out, *choice, overwrite=overwrite, names=names):
         print_file(file)
 
 

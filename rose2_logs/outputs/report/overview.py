@@ -12,7 +12,7 @@ from urllib.parse import quote
 from rose2_logs.drawing.pixels import as_pixels
 from rose2_logs.drawing.plan import PANEL, draw_plan
 from rose2_logs.drawing.svg import png_uri
-from rose2_logs.errors import LogError
+from rose2_logs.errors import LogError, ParameterError
 from rose2_logs.outputs.report import PANELS
 from rose2_logs.outputs.report.facts import is_last
 from rose2_logs.outputs.report.page import REPORT_NAME, render, write_page, write_report
@@ -61,7 +61,12 @@ class _Listed:
 
 
 def write_reports(
-    folder: Path, out: Path | None = None, *, panels: int = PANELS, overwrite: bool = False
+    folder: Path,
+    out: Path | None = None,
+    *,
+    panels: int = PANELS,
+    overwrite: bool = False,
+    names: Path | None = None,
 ) -> ReportsWritten:
     """Write the report of a log, or of all logs below a folder with a page that lists them.
 
@@ -71,8 +76,8 @@ def write_reports(
         What `analyze_log` or a batch has written.
     out : path, optional
         The page of one log; of several the folder for their pages. By default each goes next to its results.
-    panels, overwrite
-        As for `write_report`.
+    panels, overwrite, names
+        As for `write_report`; names are for the rooms of one log.
 
     Returns
     -------
@@ -87,15 +92,18 @@ def write_reports(
     """
     found = find_results(folder)
     if found == [folder]:
-        return ReportsWritten((write_report(folder, out, panels=panels, overwrite=overwrite),), ())
+        page = write_report(folder, out, panels=panels, overwrite=overwrite, names=names)
+        return ReportsWritten((page,), ())
+    if names is not None:
+        raise ParameterError(f"{folder}: holds the results of {len(found)} logs; names are for those of one")
     base = folder if out is None else out
-    names = [each.relative_to(folder).as_posix() for each in found]
-    pages = [base / (f"{name}/{REPORT_NAME}" if out is None else f"{name}.html") for name in names]
+    below = [each.relative_to(folder).as_posix() for each in found]
+    pages = [base / (f"{name}/{REPORT_NAME}" if out is None else f"{name}.html") for name in below]
     listing = base / REPORT_NAME
     refuse_existing([listing, *pages], overwrite=overwrite)
     written: list[_Listed] = []
     failed: list[LogError] = []
-    for results_folder, name, page in zip(found, names, pages, strict=True):
+    for results_folder, name, page in zip(found, below, pages, strict=True):
         try:
             write_report(results_folder, page, panels=panels, overwrite=overwrite)
             results, shown = Run(results_folder), name.removeprefix(BATCH_FOLDER)

@@ -19,7 +19,7 @@ from rose2_logs.outputs.report import PANELS, facts, tables
 from rose2_logs.outputs.report.charts import run_charts, run_marks
 from rose2_logs.outputs.report.seen import seen_rooms
 from rose2_logs.outputs.report.words import duration
-from rose2_logs.runs.run import Run
+from rose2_logs.runs.run import Run, named_run
 from rose2_logs.system.files import refuse_existing, replacing
 from rose2_logs.system.text import percent
 
@@ -37,7 +37,12 @@ class Panel:
 
 
 def write_report(
-    folder: Path, out: Path | None = None, *, panels: int = PANELS, overwrite: bool = False
+    folder: Path,
+    out: Path | None = None,
+    *,
+    panels: int = PANELS,
+    overwrite: bool = False,
+    names: Path | None = None,
 ) -> Path:
     """Write the report of a run.
 
@@ -51,6 +56,8 @@ def write_report(
         Small pictures of the layout along the run.
     overwrite : bool
         Whether an earlier page may be replaced.
+    names : path, optional
+        Other names for rooms, see `Run.rename`.
 
     Returns
     -------
@@ -66,7 +73,7 @@ def write_report(
     """
     out = folder / REPORT_NAME if out is None else out
     refuse_existing([out], overwrite=overwrite)
-    results = Run(folder)
+    results = named_run(folder, names)
     text = render(
         "report.html.j2", **_content(results, panels, is_beside=out.parent.resolve() == folder.resolve())
     )
@@ -100,7 +107,7 @@ def render(template: str, **content: Any) -> str:
     return environment.get_template(template).render(version=__version__, **content)
 
 
-def _drawn(svg: str) -> str:
+def drawn(svg: str) -> str:
     """Put a picture into the page unchanged: SVG in which all names are already escaped."""
     from markupsafe import Markup
 
@@ -109,7 +116,7 @@ def _drawn(svg: str) -> str:
 
 def _content(results: Run, panels: int, *, is_beside: bool) -> dict[str, Any]:
     plan = results.plan(results.choose())
-    drawn_panels = [Panel(_drawn(svg), *caption) for svg, *caption in _panels(results, plan, panels)]
+    drawn_panels = [Panel(drawn(svg), *caption) for svg, *caption in _panels(results, plan, panels)]
     is_run = len(results.columns["snapshot"]) > 1
     parameters = tables.parameter_table(results)
     seen = seen_rooms(results)
@@ -118,19 +125,19 @@ def _content(results: Run, panels: int, *, is_beside: bool) -> dict[str, Any]:
         "subtitle": facts.subtitle(results),
         "tiles": facts.tiles(results, plan),
         "notes": facts.notes(results, plan),
-        "plan": _drawn(as_svg(draw_plan(plan, FIGURE), is_inline=True)),
+        "plan": drawn(as_svg(draw_plan(plan, FIGURE), is_inline=True)),
         "panels": drawn_panels,
         "maps": len(results.columns["snapshot"]),
         "charts": [
-            (chart, _drawn(chart.over_coverage), _drawn(chart.over_time))
+            (chart, drawn(chart.over_coverage), drawn(chart.over_time))
             for chart in (run_charts(results) if is_run else ())
         ],
         "seen": seen,
-        "seen_lanes": None if seen is None else _drawn(seen.lanes),
+        "seen_lanes": None if seen is None else drawn(seen.lanes),
         "marks": {kind for _, _, kind in run_marks(results)},
         "rooms": tables.room_table(results, plan),
         "doorways": tables.doorway_table(results, plan),
-        "unsure_borders": tables.unsure_border_table(plan),
+        "unsure_borders": tables.unsure_border_table(results, plan),
         "sure_from": percent(UNSURE_BORDER_BELOW),
         "events": tables.event_table(results),
         "parameters": parameters,
