@@ -116,6 +116,12 @@ class LayoutComparison:
         return sum(w * o for w, o in zip(weights, overlaps, strict=True)) / total if total > 0 else 0.0
 
 
+def compare_placed(a: FinalLayout, b: FinalLayout, placement: Placement) -> LayoutComparison:
+    """Find what differs between two layouts that lie over each other."""
+    rooms = compare_rooms(a, b, placement.motion)
+    return LayoutComparison(a, b, placement, rooms, compare_walls(a, b, placement.motion))
+
+
 def compare_layouts(a: FinalLayout, b: FinalLayout) -> LayoutComparison | None:
     """Align two layouts and find what differs.
 
@@ -127,8 +133,7 @@ def compare_layouts(a: FinalLayout, b: FinalLayout) -> LayoutComparison | None:
     placement = place(b.map, a.map)
     if placement is None:
         return None
-    rooms = compare_rooms(a, b, placement.motion)
-    comparison = LayoutComparison(a, b, placement, rooms, compare_walls(a, b, placement.motion))
+    comparison = compare_placed(a, b, placement)
     if comparison.same_building:
         return comparison
     return dataclasses.replace(comparison, scale=fitting_scale(b.map, a.map))

@@ -13,7 +13,7 @@ LEFT, RIGHT = shapely.box(0, 0, 4, 3), shapely.box(4, 0, 8, 3)
 
 
 def test_points_and_outlines_name_the_rooms_that_hold_them():
-    """A track's name comes first; a room that holds several is called by all; what lies outside names none."""
+    """A track's name comes first; a room that holds several is called by all of them."""
     points = (shapely.Point(1, 1), shapely.Point(3, 2), shapely.Point(50, 1), shapely.box(4.2, 0.2, 7, 2.8))
     names = RoomNames({}, points, ("Kitchen", "Pantry", "Nowhere", "Hall"))
     found = names.of((1, 2), (LEFT, RIGHT))

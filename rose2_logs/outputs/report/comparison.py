@@ -12,7 +12,7 @@ from rose2_logs.drawing.drawing import Drawing
 from rose2_logs.outputs.report.facts import Note, Tile
 from rose2_logs.outputs.report.page import drawn, render
 from rose2_logs.outputs.report.words import MISSING, Cell, Column, Table, css, number, share
-from rose2_logs.system.text import counted, percent
+from rose2_logs.system.text import percent
 
 
 def comparison_page(comparison: LayoutComparison, drawing: Drawing) -> str:
@@ -125,9 +125,3 @@ def _wall_table(comparison: LayoutComparison) -> Table:
         Column("y, m", "of its middle, in A's frame"),
     )
     return Table("Walls that differ", columns, tuple(rows))
-
-
-def compared(comparison: LayoutComparison) -> str:
-    """Say in a line how much two layouts have in common."""
-    rooms = counted(len(comparison.b.tracks), "room")
-    return f"{rooms}; floor overlaps {percent(comparison.floor_iou)}; {changed_rooms(comparison)}"
