@@ -333,7 +333,7 @@ class RunOptions:
     names: str | None = option(
         None,
         "Names of rooms: a table (CSV) with the columns name and track, or name, x and y in meters of the "
-        "last map; or GeoJSON with named outlines, which is laid over that map. All outputs have them.",
+        "last map; or GeoJSON or DXF with named outlines, which is laid over it. All outputs have them.",
         panel=OUTPUTS,
         commands=("analyze",),
         metavar="FILE",

@@ -13,9 +13,10 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from rose2_logs.errors import ParameterError
+from rose2_logs.io.dxf_plan import read_dxf_plan
 from rose2_logs.model.room_names import RoomNames
 
-PLAN_ENDINGS = (".geojson", ".json")
+PLAN_ENDINGS = (".geojson", ".json", ".dxf")
 """Files with outlines; all others are tables."""
 HELP = "a table of names needs a first line with the columns name and track, or name, x and y"
 NO_PLAN = (ValueError, LookupError, TypeError, AttributeError, RecursionError, shapely.errors.ShapelyError)
@@ -36,7 +37,7 @@ def read_room_names(path: Path) -> RoomNames:
     ----------
     path : path
         A table (CSV) with the columns ``name`` and ``track``, or ``name``, ``x`` and ``y`` in meters of the
-        map's frame; or GeoJSON with polygons that have the property ``name``.
+        map's frame; or GeoJSON with polygons that have the property ``name``; or DXF, see `read_dxf_plan`.
 
     Raises
     ------
@@ -46,14 +47,28 @@ def read_room_names(path: Path) -> RoomNames:
     try:
         if path.stat().st_size > MOST_BYTES:
             raise ParameterError(f"{path}: is too large for names of rooms")
+        if path.suffix.lower() == ".dxf":
+            return _known(path, _drawing(path))
         text = path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         why = error.strerror if isinstance(error, OSError) else "it is no text in UTF-8"
         raise ParameterError(f"{path}: names of rooms cannot be read: {why}") from error
     names = _plan(path, text) if is_plan(path) else _table(path, text)
+    return _known(path, names)
+
+
+def _known(path: Path, names: RoomNames) -> RoomNames:
     if not names.by_track and not names.places:
         raise ParameterError(f"{path}: holds no name of a room")
     return names
+
+
+def _drawing(path: Path) -> RoomNames:
+    try:
+        return read_dxf_plan(path)
+    except (ValueError, LookupError, TypeError, AttributeError, shapely.errors.ShapelyError) as error:
+        why = " ".join(str(error).split()) or type(error).__name__
+        raise ParameterError(f"{path}: is no DXF of outlines with names: {why[:120]}") from error
 
 
 def _table(path: Path, text: str) -> RoomNames:

@@ -62,6 +62,7 @@ def test_a_plan_names_outlines(tmp_path: Path):
         ("a.csv", b"name,x,y\nKitchen,1\n", "line 2: y is ''"),
         ("a.csv", b"name,x,y\n", "holds no name"),
         ("a.csv", b"\xff\xfe\x00", "no text in UTF-8"),
+        ("a.dxf", b"no drawing\n", "is no DXF of outlines"),
         ("a.geojson", b"{", "is no GeoJSON of outlines"),
         ("a.geojson", b"[1]", "is no GeoJSON of outlines"),
         ("a.geojson", b'{"features": []}', "holds no name"),

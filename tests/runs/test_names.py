@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 from pathlib import Path
 
+import ezdxf
 import numpy as np
 import pytest
 import shapely
 
 from rose2_logs.errors import ParameterError
+from rose2_logs.outputs.exports.formats import write_plan
 from rose2_logs.outputs.exports.geojson import plan_geojson
 from rose2_logs.runs.run import Run, named_run
 
@@ -38,6 +41,20 @@ def test_a_plan_in_a_frame_of_its_own_names_each_room(run: Run, tmp_path: Path):
     assert {room.number: room.name for room in named[-1].plan().rooms} == {
         room.number: f"No. {room.number}" for room in run[-1].plan().rooms
     }
+
+
+def test_a_drawing_names_rooms_by_the_texts_in_their_outlines(run: Run, tmp_path: Path):
+    """That which is exported, with other texts, in millimeters; areas below the names are no names."""
+    plan = run[-1].plan()
+    named = tuple(dataclasses.replace(room, given_name=f"No. {room.number}") for room in plan.rooms)
+    (file,) = write_plan(dataclasses.replace(plan, rooms=named), ["dxf"], tmp_path, "drawn")
+    document = ezdxf.readfile(file)
+    for entity in document.modelspace():
+        entity.scale_uniform(1000)
+    document.units = ezdxf.units.MM
+    document.saveas(file)
+    names = {room.number: room.name for room in named_run(run.folder, file)[-1].plan().rooms}
+    assert names == {room.number: room.name for room in named}
 
 
 def test_a_plan_of_another_building_is_refused(run: Run, tmp_path: Path):

@@ -53,7 +53,7 @@ Names = Annotated[
         "--names",
         metavar="FILE",
         help="Other names for rooms, as for analyze: a table (CSV) with the columns name "
-        "and track, or name, x and y in meters of the last map; or GeoJSON with named outlines.",
+        "and track, or name, x and y in meters of the last map; or GeoJSON or DXF with named outlines.",
         show_default=False,
         rich_help_panel=WHAT,
     ),

@@ -78,7 +78,7 @@ class _Listed:
 
 @dataclass(frozen=True)
 class _Building:
-    """Runs of one building on the page that lists them: the one that others are compared with, their table."""
+    """Runs of one building on the page that lists them: what they are compared with, their table."""
 
     reference: str
     table: Table
