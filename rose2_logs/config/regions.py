@@ -62,6 +62,20 @@ class RegionParameters(ParameterBlock):
     room_min_log_odds: float = number(
         0.0, "log odds", "Regions are rooms rather than outside from even odds on.", -20, 20
     )
+    small_room_max_m2: float = number(
+        5.0,
+        "m2",
+        "Regions below are looked at once more: rooms of their own, or part of a neighbor? Closets and "
+        "toilets are smaller.",
+        0.0,
+    )
+    small_room_min_log_odds: float = number(
+        -0.5,
+        "log odds",
+        "Small regions are rooms of their own from these odds on; 0.35 to 0.4 was best on maps left out.",
+        -20,
+        20,
+    )
     outside_max_share: float = number(
         0.5, "share", "Where more than this share of a map would be outside, nothing is.", 0, 1
     )

@@ -154,6 +154,92 @@ def test_villas_are_grown_in_one_piece(seed):
     assert label(plan.rooms > 0, np.ones((3, 3)))[1] == 1
 
 
+WORKPLACES = ("offices", "faculty", "depot", "arena", "shop")
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("kind", WORKPLACES)
+def test_rooms_of_workplaces_are_in_one_piece(kind, seed):
+    """Rooms are connected, large enough to stand in, and marked as what the maker made them."""
+    from fit_grouping.buildings import workplaces
+    from fit_grouping.buildings.plans import ROOM_MIN_M2
+    from fit_grouping.buildings.raster import CELL_M
+    from scipy.ndimage import label
+
+    plan = getattr(workplaces, kind)(np.random.default_rng(seed))
+    plan.tidy()
+    numbers = np.unique(plan.rooms[plan.rooms > 0]).tolist()
+    assert plan.kind == kind
+    for kinds in (plan.corridors, plan.halls, plan.public, plan.lobbies, plan.labs):
+        assert kinds <= set(numbers)
+    assert bool(plan.corridors) == (kind in ("offices", "faculty"))
+    for number in numbers:
+        assert label(plan.rooms == number)[1] == 1
+        assert np.count_nonzero(plan.rooms == number) * CELL_M**2 >= ROOM_MIN_M2
+    for ground in (plan.yard, plan.strip):
+        assert ground is None or not (plan.rooms[ground > 0] > 0).any()
+
+
+@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("kind", WORKPLACES)
+def test_true_rooms_of_workplaces_are_free_floor(kind, seed, monkeypatch):
+    """Rooms are seen within the building only: what is free around it has no room."""
+    from fit_grouping.buildings import make_buildings, sensing, workplaces
+
+    kept = {}
+
+    def sensed(rng, rooms, other, gray):
+        kept["rooms"], kept["gray"] = rooms, gray
+        return rooms, other, gray
+
+    monkeypatch.setattr(sensing, "_warped", sensed)
+    monkeypatch.setattr(make_buildings, "make_plan", getattr(workplaces, kind))
+    made = make_buildings.simulate(seed)
+    assert made.kind.startswith(kind + "/")
+    window = sensing._known_window(kept["gray"], kept["rooms"])
+    for truth in made.truths:
+        assert (made.gray[truth > 0] == sensing.FREE).all()
+        assert not truth[kept["rooms"][window] == 0].any()
+
+
+def test_ground_that_is_driven_on_is_free_and_no_room():
+    """The robot that drives around an arena sees floor there, which belongs to no room."""
+    from fit_grouping.buildings.plans import Plan
+    from fit_grouping.buildings.raster import CELL_M
+    from fit_grouping.buildings.sensing import FREE, make_map
+    from fit_grouping.buildings.walls import build_walls
+
+    plan = Plan.empty("arena", 120, 100)
+    plan.hall(plan.inner)
+    plan.yard = (plan.rooms == 0).astype(np.uint8)
+    plan.strip = np.zeros_like(plan.yard)
+    plan.strip[10:20, 60:180] = 1
+    walled = build_walls(np.random.default_rng(5), plan)
+    made = make_map(np.random.default_rng(5), walled, np.zeros_like(walled.walls), "office")
+    outside = (made.gray == FREE) & (made.truths[0] == 0)
+    assert np.count_nonzero(outside) * CELL_M**2 > 10
+    assert made.truths[0].max() == 1
+
+
+@pytest.mark.parametrize("kind", ["cabinets", "double"])
+def test_a_front_of_cabinets_or_a_double_door_parts_and_lets_through(kind, monkeypatch):
+    from fit_grouping.buildings import walls
+    from fit_grouping.buildings.plans import Plan
+    from scipy.ndimage import label
+
+    rooms = np.zeros((140, 320), np.int32)
+    rooms[20:60, 20:300], rooms[60:120, 20:300] = 1, 2
+    monkeypatch.setattr(walls, "_opening_kind", lambda *_: kind)
+    plan = Plan("offices", rooms, corridors={1, 2} if kind == "double" else {1}, labs={2})
+    walled = walls.build_walls(np.random.default_rng(1), plan)
+    assert walled.neighbors[1] == [2]
+    assert (walled.other == rooms).all()
+    pieces = label((walled.walls == 0) & (rooms > 0))[0]
+    assert pieces[40, 160] == pieces[100, 160] > 0
+    border = walled.walls[60, 25:295] > 0
+    assert 0.05 < border.mean() < 0.97
+
+
 @pytest.fixture
 def slanting_rooms():
     """Two rooms on one side each of a line at 35 degrees through a square of 8 m."""
@@ -300,15 +386,17 @@ def run(script, *arguments):
 def check_fitted(work, cases):
     """The folder for the package is whole, and the analysis runs with what was fitted without each fold."""
     from rose2_logs.segmentation.regions.features import REGION_FEATURES
-    from rose2_logs.segmentation.regions.fitted import JOINS, MANIFEST, NETWORK, OUTSIDE, sha256_of
+    from rose2_logs.segmentation.regions.fitted import FILES, JOINS, MANIFEST, OUTSIDE, OWN_ROOMS, sha256_of
+    from rose2_logs.segmentation.regions.own_rooms import OWN_ROOM_FEATURES
     from rose2_logs.segmentation.regions.strengths import read_trees
 
     ships = work / "seed0/all"
     manifest = json.loads((ships / MANIFEST).read_text(encoding="utf-8"))
-    assert manifest["sha256"] == {name: sha256_of(ships / name) for name in (NETWORK, JOINS, OUTSIDE)}
+    assert manifest["sha256"] == {name: sha256_of(ships / name) for name in FILES}
     assert manifest["real maps"] == 3
     assert len(read_trees(ships / JOINS).feature) == 8
     read_trees(ships / OUTSIDE, REGION_FEATURES)
+    read_trees(ships / OWN_ROOMS, OWN_ROOM_FEATURES)
     assert "| mean of the seeds |" in run("left_out_figures.py", work, "--cases", cases, "--seeds", 1)
     assert len(list((work / "seed0/predictions/homes").glob("*.png"))) == 3
 

@@ -27,13 +27,23 @@ from fit_grouping.fit_tree import Example, TreeParameters, columns_of, examples_
 from fit_grouping.keeping import kept
 from fit_grouping.maps_with_truth import FOLDS, load_benchmark
 from fit_grouping.outside import fit_outside
+from fit_grouping.own_rooms import fit_own_rooms
 from fit_grouping.preparing import PreparedMap, answered, prepared_benchmark, prepared_simulated
 from fit_grouping.sampling import Samples, by_hand
 from fit_grouping.tree_files import write_trees
 from rose2_logs.config.regions import RegionParameters
 from rose2_logs.segmentation.regions.features import REGION_FEATURES, SHAPE_FEATURES
-from rose2_logs.segmentation.regions.fitted import JOINS, MANIFEST, NETWORK, OUTSIDE, sha256_of
+from rose2_logs.segmentation.regions.fitted import (
+    FILES,
+    JOINS,
+    MANIFEST,
+    NETWORK,
+    OUTSIDE,
+    OWN_ROOMS,
+    sha256_of,
+)
 from rose2_logs.segmentation.regions.joining import join_regions
+from rose2_logs.segmentation.regions.own_rooms import OWN_ROOM_FEATURES
 from rose2_logs.segmentation.regions.strengths import BoostedTrees, FittedStrength
 
 HERE = Path(__file__).parent
@@ -136,15 +146,17 @@ def fit_seed(
         trees = fit_on([parts[k] for k in seen] + made_parts, parameters, seed)
         write_trees(folder / JOINS, trees)
         examples = [real[k] for k in seen] + made
-        rule = fit_outside(examples, regions_of(examples, trees), seed)
-        write_trees(folder / OUTSIDE, rule, REGION_FEATURES)
+        regions = regions_of(examples, trees)
+        write_trees(folder / OUTSIDE, fit_outside(examples, regions, seed), REGION_FEATURES)
+        own_rooms = fit_own_rooms(examples, regions, FittedStrength.of_joins(trees, REGIONS), REGIONS, seed)
+        write_trees(folder / OWN_ROOMS, own_rooms, OWN_ROOM_FEATURES)
         network = everything if fold == ALL else networks[fold]
         (folder / NETWORK).write_bytes(network.read_bytes())
 
 
 def write_manifest(folder: Path, facts: dict[str, object]) -> None:
     """Name the files of a folder and how they were made."""
-    hashes = {name: sha256_of(folder / name) for name in (NETWORK, JOINS, OUTSIDE)}
+    hashes = {name: sha256_of(folder / name) for name in FILES}
     text = json.dumps({"sha256": hashes, **facts}, indent=2)
     (folder / MANIFEST).write_text(text + "\n", encoding="utf-8")
 

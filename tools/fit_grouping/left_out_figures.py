@@ -35,7 +35,7 @@ from rose2_logs.segmentation.regions import fitted
 def fitted_from(folder: Path) -> Iterator[None]:
     """Let the analysis take what was fitted from another folder."""
     shipped = fitted.FOLDER
-    readers = (fitted.answering_network, fitted.join_trees, fitted.outside_trees)
+    readers = (fitted.answering_network, fitted.join_trees, fitted.outside_trees, fitted.own_room_trees)
     try:
         fitted.FOLDER = folder
         for read in readers:

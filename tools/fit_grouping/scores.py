@@ -50,6 +50,25 @@ def best_iou_sym(tables: Iterable[FloatArray], region_of_atom: NDArray[np.intege
     return max(iou_sym(grouped(table, region_of_atom)) for table in tables)
 
 
+def best_ious(tables: Iterable[FloatArray], region_of_atom: NDArray[np.integer]) -> FloatArray:
+    """Greatest IoU of each region (R,) with a true room of any truth.
+
+    Parameters
+    ----------
+    tables : iterable of (A + 1, T + 1) float
+        Row 0 is no atom.
+    region_of_atom : (A,) int
+        Region 0.. of each atom.
+    """
+    best = np.zeros(int(region_of_atom.max(initial=-1)) + 1)
+    for table in tables:
+        regions = grouped(table, region_of_atom + 1)
+        overlap, sizes = regions[1:, 1:], regions[1:].sum(1)
+        whole = sizes[:, None] + regions[:, 1:].sum(0) - overlap
+        best = np.maximum(best, (overlap / np.maximum(whole, 1)).max(1, initial=0.0))
+    return best
+
+
 def perfect_grouping(table: FloatArray) -> NDArray[np.intp]:
     """True room of each atom (A,), 0 for none: the one that holds most of its cells."""
     room: NDArray[np.intp] = table[1:].argmax(1)

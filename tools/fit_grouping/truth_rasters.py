@@ -22,6 +22,8 @@ from rose2_logs.segmentation.regions.plan_raster import (
 
 WORN_SHARE = 0.45
 """Share of the crops that are worn or furnished."""
+STRETCHED_SHARE, STRETCH_MIN, STRETCH_MAX = 0.6, 0.8, 1.25
+"""Share of the crops that are stretched, each axis by itself: rooms of other proportions."""
 DIFFERENT_WEIGHT = (3.0, 2.0, 1.5)
 """Pairs in different rooms are rarer than others, the nearer the more so."""
 
@@ -52,7 +54,7 @@ class TruthRaster:
 def random_crop(
     rng: np.random.Generator, one: TruthRaster, size: int
 ) -> tuple[FloatImage, FloatImage, FloatImage]:
-    """Cut a square of a map around a cell of a room, mirrored, turned by quarters, worn at times.
+    """Cut a square of a map around a cell of a room, turned, mirrored, at times stretched or worn.
 
     Returns
     -------
@@ -61,24 +63,31 @@ def random_crop(
     """
     rows, columns = np.nonzero(one.truths[0])
     at = rng.integers(len(rows))
-    low = np.array([rows[at], columns[at]]) - (rng.uniform(0.15, 0.85, 2) * size).astype(int)
+    stretch = rng.uniform(STRETCH_MIN, STRETCH_MAX, 2) if rng.random() < STRETCHED_SHARE else np.ones(2)
+    sides = np.ceil(size / stretch).astype(int)
+    low = np.array([rows[at], columns[at]]) - (rng.uniform(0.15, 0.85, 2) * sides).astype(int)
     turns, mirror = int(rng.integers(4)), bool(rng.integers(2))
-    images: list[Labels] = []
-    layers: list[NDArray[np.integer[Any]]] = [one.raster.wall, one.raster.free, *one.truths]
-    for image in layers:
-        window = _window(image, low, size).astype(np.int32)
-        images.append(np.rot90(window[:, ::-1] if mirror else window, turns))
-    wall, free = shares_of(images[0]), shares_of(images[1])
+
+    def seen(image: NDArray[Any], blend: bool) -> NDArray[Any]:
+        window = _window(image, low, sides)
+        if window.shape != (size, size):
+            shrinks = window.shape[0] >= size and window.shape[1] >= size
+            how = (cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR) if blend else cv2.INTER_NEAREST
+            window = cv2.resize(window, (size, size), interpolation=how)
+        return np.rot90(window[:, ::-1] if mirror else window, turns)
+
+    wall, free = (seen(shares_of(steps), True) for steps in (one.raster.wall, one.raster.free))
+    truths: list[Labels] = [seen(truth, False).astype(np.int32) for truth in one.truths]
     if rng.random() < WORN_SHARE:
         wall, free = _worn(rng, wall, free)
-    targets, weights = network_targets(free > 0.3, images[2:])
+    targets, weights = network_targets(free > 0.3, truths)
     return network_input(wall, free), targets, weights
 
 
-def _window(image: NDArray[np.integer[Any]], low: NDArray[np.int64], size: int) -> NDArray[np.integer[Any]]:
-    out = np.zeros((size, size), image.dtype)
+def _window(image: NDArray[Any], low: NDArray[np.int64], sides: NDArray[np.int64]) -> NDArray[Any]:
+    out = np.zeros(tuple(sides), image.dtype)
     (r0, c0), (h, w) = low, image.shape
-    ra, rb, ca, cb = max(r0, 0), min(r0 + size, h), max(c0, 0), min(c0 + size, w)
+    ra, rb, ca, cb = max(r0, 0), min(r0 + sides[0], h), max(c0, 0), min(c0 + sides[1], w)
     if ra < rb and ca < cb:
         out[ra - r0 : rb - r0, ca - c0 : cb - c0] = image[ra:rb, ca:cb]
     return out

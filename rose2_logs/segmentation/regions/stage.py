@@ -19,6 +19,7 @@ from rose2_logs.segmentation.regions.borders import border_strengths
 from rose2_logs.segmentation.regions.graph import STRONG_SCORE, RegionGraph, build_graph
 from rose2_logs.segmentation.regions.joining import Joins, Strength, join_regions
 from rose2_logs.segmentation.regions.outside import edge_shares, leftovers_joined, outside_of, room_numbers
+from rose2_logs.segmentation.regions.own_rooms import small_region_joins
 from rose2_logs.segmentation.regions.plan_frame import Labels, PlanFrame, grown_labels
 from rose2_logs.segmentation.regions.plan_raster import PlanRaster
 from rose2_logs.segmentation.regions.strengths import FittedStrength
@@ -118,7 +119,13 @@ class RegionTree:
 
     @cached_property
     def _to_even_odds(self) -> Joins:
-        return join_regions(self.graph, self.strength, EVEN_ODDS)
+        joins = join_regions(self.graph, self.strength, EVEN_ODDS)
+        region = joins.regions(EVEN_ODDS)
+        regions, _ = self.graph.joined(region)
+        outside = self._outside_of(regions, region)
+        return joins.then(
+            small_region_joins(regions, outside, self.strength, fitted.own_room_trees(), self.parameters)
+        )
 
     @cached_property
     def _to_the_end(self) -> Joins:
@@ -131,9 +138,12 @@ class RegionTree:
         """Which atoms (N,) are outside, whatever the detail: regions at even odds tell it best."""
         region = self._to_even_odds.regions(EVEN_ODDS)
         regions, _ = self.graph.joined(region)
+        return self._outside_of(regions, region)[region]
+
+    def _outside_of(self, regions: RegionGraph, region: NDArray[np.int64]) -> BoolArray:
         edge_share = np.bincount(region, self.edge_share).astype(float)
         is_room = FittedStrength.of_rooms(fitted.outside_trees(), self.parameters)
-        return outside_of(regions, edge_share, is_room, self.parameters)[region]
+        return outside_of(regions, edge_share, is_room, self.parameters)
 
     def rooms(self, detail: float) -> RegionsResult:
         """Join the atoms as far as a detail asks for, log odds; 0 for even odds, more for more rooms."""

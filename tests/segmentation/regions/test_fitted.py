@@ -5,6 +5,7 @@ import pytest
 
 from rose2_logs.segmentation.regions import fitted
 from rose2_logs.segmentation.regions.features import FEATURES, REGION_FEATURES, SHAPE_FEATURES
+from rose2_logs.segmentation.regions.own_rooms import OWN_ROOM_FEATURES
 from rose2_logs.segmentation.regions.plan_raster import OUTPUTS, PlanRaster
 
 NETWORK_MAX_BYTES = 1_500_000
@@ -12,7 +13,7 @@ NETWORK_MAX_BYTES = 1_500_000
 
 def test_files_are_those_of_the_manifest():
     listed = fitted.manifest()["sha256"]
-    assert set(listed) == {fitted.NETWORK, fitted.JOINS, fitted.OUTSIDE}
+    assert set(listed) == set(fitted.FILES)
     for name, expected in listed.items():
         assert fitted.sha256_of(fitted.FOLDER / name) == expected, name
 
@@ -41,8 +42,12 @@ def test_network_answers_at_any_size_with_rounded_probabilities():
 
 @pytest.mark.parametrize(
     ("trees", "names"),
-    [(fitted.join_trees, FEATURES), (fitted.outside_trees, REGION_FEATURES)],
-    ids=["joins", "outside"],
+    [
+        (fitted.join_trees, FEATURES),
+        (fitted.outside_trees, REGION_FEATURES),
+        (fitted.own_room_trees, OWN_ROOM_FEATURES),
+    ],
+    ids=["joins", "outside", "own rooms"],
 )
 def test_trees_ask_only_for_features_there_are(trees, names):
     found = trees()

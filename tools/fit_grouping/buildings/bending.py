@@ -19,9 +19,12 @@ KINDS = {"none": 0.62, "slant": 0.14, "arc": 0.06, "bend": 0.18}
 OTHER_KINDS = {
     "villa": {"none": 0.93, "slant": 0.04, "arc": 0.0, "bend": 0.03},
     "hall": {"none": 0.5, "slant": 0.14, "arc": 0.16, "bend": 0.2},
+    "depot": {"none": 1.0},
+    "arena": {"none": 1.0},
     "passage": {"none": 0.74, "slant": 0.1, "arc": 0.08, "bend": 0.08},
 }
-"""The same for kinds of plans that differ: wings of villas are turned anyway, halls may lie in an arc."""
+"""The same for kinds of plans that differ: wings of villas are turned anyway, halls may lie in an arc,
+and the grounds of depots and arenas are not bent with them."""
 
 
 def bent(rng: Generator, walled: WalledPlan, furniture: Mask) -> tuple[WalledPlan, Mask]:

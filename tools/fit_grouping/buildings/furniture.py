@@ -12,9 +12,11 @@ from scipy.ndimage import find_objects
 
 from fit_grouping.buildings.raster import CELL_M, Generator, Mask, between, cells, chance
 from fit_grouping.buildings.walls import WalledPlan
+from fit_grouping.buildings.workrooms import furnish_workroom
 
-STYLES = ("none", "survey", "home", "office", "dense")
-"""Ways to furnish: not at all, dots and boxes as drawn by hand, as in homes, as in offices, and cluttered."""
+STYLES = ("none", "survey", "home", "office", "dense", "work")
+"""Ways to furnish: not at all, dots and boxes as drawn by hand, as in homes, as in offices, cluttered, and
+with rows of desks, screens and cabinets."""
 HALLS = {
     "rows": 0.2,
     "pillars": 0.1,
@@ -26,6 +28,12 @@ HALLS = {
     "empty": 0.06,
 }
 """What halls are full of, and how often."""
+OTHER_HALLS = {
+    "depot": {"pallets": 0.35, "rows": 0.25, "pillars": 0.1, "boxes": 0.1, "mixed": 0.1, "islands": 0.1},
+    "shop": {"islands": 0.5, "rows": 0.3, "mixed": 0.1, "stands": 0.1},
+    "faculty": {"rows": 0.35, "pillars": 0.2, "tables": 0.2, "mixed": 0.15, "empty": 0.1},
+}
+"""The same for kinds of plans that differ."""
 KEEP_CLEAR_M = 0.55
 """Furniture stays this far from openings, most of the time."""
 FRONTS = {"home": 0.35, "office": 1.3, "dense": 1.4}
@@ -120,6 +128,8 @@ class Furnisher:
             self._hall(drawn, area_m2)
         elif self.style == "survey":
             self._survey_room(drawn)
+        elif self.style == "work":
+            furnish_workroom(self.rng, drawn)
         else:
             self._room(drawn, area_m2)
 
@@ -136,7 +146,10 @@ class Furnisher:
 
     def _hall(self, drawn: Mask, area_m2: float) -> None:
         rng = self.rng
-        kind = rng.choice(list(HALLS), p=list(HALLS.values()))
+        shares = OTHER_HALLS.get(self.walled.plan.kind, HALLS)
+        kind = rng.choice(list(shares), p=list(shares.values()))
+        if kind == "islands":
+            self._islands(drawn, area_m2)
         if kind == "stands":
             self._stands(drawn, area_m2)
         if kind == "pallets":
@@ -179,6 +192,17 @@ class Furnisher:
                 cv2.fillPoly(drawn, [corners], 1)
             else:  # a frame with one side or two left open
                 cv2.polylines(drawn, [corners[: rng.integers(2, 5)]], chance(rng, 0.3), 1, thick)
+
+    def _islands(self, drawn: Mask, area_m2: float) -> None:
+        """Shelves, racks and counters of a shop, along the axes, and tables of dots between them."""
+        rng = self.rng
+        per_island_m2 = rng.uniform(7, 20)
+        wide_m = rng.uniform(0.6, 1.1)
+        for _ in range(rng.poisson(min(area_m2, 700) / per_island_m2)):
+            long, deep = rng.uniform(0.7, 4.5) / CELL_M, wide_m * rng.uniform(0.8, 1.2) / CELL_M
+            box = (self._spot(drawn), (long, deep), 90.0 * rng.integers(2))
+            cv2.polylines(drawn, [cv2.boxPoints(box).astype(np.int32)], True, 1, int(rng.integers(1, 3)))
+        self._noise(drawn, min(area_m2, 300) / 15 * rng.random())
 
     def _pallets(self, drawn: Mask) -> None:
         """Pallets and racks in a grid over a part of the hall: outlines with feet, posts beyond."""

@@ -25,13 +25,18 @@ from fit_grouping.buildings.walls import build_walls
 from rose2_logs.system.files import replacing
 
 FURNISHING = {
-    "villa": ([0.06, 0.02, 0.77, 0.0, 0.15]),
-    "home": ([0.12, 0.08, 0.6, 0.0, 0.2]),
-    "office": ([0.13, 0.2, 0.0, 0.45, 0.22]),
-    "cubicles": ([0.25, 0.55, 0.0, 0.2, 0.0]),
-    "campus": ([0.2, 0.05, 0.0, 0.58, 0.17]),
-    "passage": ([0.5, 0.0, 0.0, 0.4, 0.1]),
-    "hall": ([0.1, 0.0, 0.0, 0.6, 0.3]),
+    "villa": [0.06, 0.02, 0.77, 0.0, 0.15, 0.0],
+    "home": [0.12, 0.08, 0.6, 0.0, 0.2, 0.0],
+    "office": [0.13, 0.2, 0.0, 0.45, 0.22, 0.0],
+    "cubicles": [0.25, 0.55, 0.0, 0.2, 0.0, 0.0],
+    "campus": [0.2, 0.05, 0.0, 0.58, 0.17, 0.0],
+    "passage": [0.5, 0.0, 0.0, 0.4, 0.1, 0.0],
+    "offices": [0.04, 0.0, 0.0, 0.14, 0.12, 0.7],
+    "faculty": [0.06, 0.0, 0.0, 0.2, 0.14, 0.6],
+    "depot": [0.05, 0.0, 0.0, 0.6, 0.35, 0.0],
+    "arena": [0.1, 0.0, 0.55, 0.15, 0.2, 0.0],
+    "shop": [0.0, 0.0, 0.0, 0.6, 0.4, 0.0],
+    "hall": [0.1, 0.0, 0.0, 0.6, 0.3, 0.0],
 }
 """Shares of the furnishing styles for each kind of plan, in the order of `furniture.STYLES`."""
 
@@ -46,6 +51,8 @@ def simulate(seed: int) -> SimulatedMap:
         walled = build_walls(rng, plan)
         style = str(rng.choice(STYLES, p=FURNISHING[plan.kind]))
         furniture = Furnisher(rng, walled, style).furnish()
+        if plan.things is not None:
+            furniture |= plan.things
         walled, furniture = bent(rng, walled, furniture)
         made = make_map(rng, walled, furniture, style)
         if made is not None:

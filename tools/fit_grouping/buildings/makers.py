@@ -9,18 +9,31 @@ import numpy as np
 from fit_grouping.buildings.plans import Plan, campus, chamfers, cubicles, hall, home, office, passage
 from fit_grouping.buildings.raster import Generator
 from fit_grouping.buildings.villas import villa
+from fit_grouping.buildings.workplaces import arena, depot, faculty, offices, shop
 
 MAKERS: tuple[tuple[Callable[[Generator], Plan], float], ...] = (
-    (villa, 0.25),
-    (home, 0.15),
-    (office, 0.25),
-    (cubicles, 0.06),
-    (campus, 0.12),
-    (passage, 0.05),
-    (hall, 0.12),
+    (villa, 0.19),
+    (home, 0.11),
+    (office, 0.08),
+    (cubicles, 0.03),
+    (campus, 0.04),
+    (passage, 0.03),
+    (hall, 0.04),
+    (offices, 0.24),
+    (faculty, 0.13),
+    (depot, 0.04),
+    (arena, 0.04),
+    (shop, 0.03),
 )
 """Makers of plans and their shares."""
-TIDY_CORNERS = {"villa": (0.0, 0.0), "passage": (0.0, 0.0), "hall": (0.5, 0.0)}
+TIDY_CORNERS = {
+    "villa": (0.0, 0.0),
+    "passage": (0.0, 0.0),
+    "hall": (0.5, 0.0),
+    "depot": (0.2, 0.0),
+    "shop": (0.5, 0.0),
+    "arena": (0.1, 0.1),
+}
 """How many corners are cut off a building of a kind and how many of its rooms are cut in two, on average."""
 USUAL_CORNERS = (0.35, 0.15)
 

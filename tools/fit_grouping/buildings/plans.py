@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from skimage.measure import label
 
-from fit_grouping.buildings.raster import CELL_M, Generator, Labels, between, cells, chance
+from fit_grouping.buildings.raster import CELL_M, Generator, Labels, Mask, between, cells, chance
 
 Rectangle = tuple[int, int, int, int]
 """x0, y0, x1, y1 in cells."""
@@ -35,8 +35,26 @@ class Plan:
         Room of each cell, walls not yet taken off; 0 outside.
     corridors, halls, public : set of int
         Rooms of these kinds; public ones open widely to each other.
+    lobbies : set of int
+        Rooms that open on corridors along most of a wall.
+    labs : set of int
+        Rooms that a row of cabinets and pieces of wall parts from a corridor.
     open_fronts : float
         Share of doors that are openings of most of the wall.
+    frayed : float
+        Share of the walls between rooms of which gaps, dots or cabinets are seen.
+    gates : float
+        Openings to the outside, on average.
+    glazed : bool
+        Whether whole outer walls let rays through.
+    margin_m : float
+        Ground around the building.
+    things : (H, W) uint8 or None
+        1 where something stands that the maker placed itself.
+    yard : (H, W) uint8 or None
+        1 on ground outside that the robot drives on.
+    strip : (H, W) uint8 or None
+        1 on ground outside that is free in the map however it was seen.
     """
 
     kind: str
@@ -44,18 +62,28 @@ class Plan:
     corridors: set[int] = field(default_factory=set)
     halls: set[int] = field(default_factory=set)
     public: set[int] = field(default_factory=set)
+    lobbies: set[int] = field(default_factory=set)
+    labs: set[int] = field(default_factory=set)
     open_fronts: float = 0.05
+    frayed: float = 0.0
+    gates: float = 0.0
+    glazed: bool = False
+    margin_m: float = MARGIN_M
+    things: Mask | None = None
+    yard: Mask | None = None
+    strip: Mask | None = None
 
     @classmethod
-    def empty(cls, kind: str, width: int, height: int) -> Plan:
+    def empty(cls, kind: str, width: int, height: int, margin_m: float = MARGIN_M) -> Plan:
         """Nothing but ground, with a margin around."""
-        margin = cells(MARGIN_M)
-        return cls(kind, np.zeros((height + 2 * margin, width + 2 * margin), np.int32))
+        margin = cells(margin_m)
+        rooms = np.zeros((height + 2 * margin, width + 2 * margin), np.int32)
+        return cls(kind, rooms, margin_m=margin_m)
 
     @property
     def inner(self) -> Rectangle:
         """The ground without its margin."""
-        margin = cells(MARGIN_M)
+        margin = cells(self.margin_m)
         height, width = self.rooms.shape
         return margin, margin, width - margin, height - margin
 
@@ -82,7 +110,7 @@ class Plan:
     def merge(self, one: int, other: int) -> None:
         """Make two rooms one."""
         self.rooms[self.rooms == other] = one
-        for kinds in (self.corridors, self.halls, self.public):
+        for kinds in (self.corridors, self.halls, self.public, self.lobbies, self.labs):
             if other in kinds:
                 kinds.discard(other)
                 kinds.add(one)
@@ -105,9 +133,10 @@ class Plan:
         number = np.arange(count)
         number[(size < ROOM_MIN_M2) | narrow] = 0
         number[0] = 0
-        self.corridors = {int(n) for n in number if n and was[n] in self.corridors}
-        self.halls = {int(n) for n in number if n and was[n] in self.halls}
-        self.public = {int(n) for n in number if n and was[n] in self.public}
+        for kinds in (self.corridors, self.halls, self.public, self.lobbies, self.labs):
+            now = {int(n) for n in number if n and was[n] in kinds}
+            kinds.clear()
+            kinds.update(now)
         self.rooms = number[pieces].astype(np.int32)
 
 
@@ -303,7 +332,7 @@ def home(rng: Generator) -> Plan:
     return plan
 
 
-def _segments(rng: Generator, area: Rectangle, width: int, depth: int) -> list[Rectangle]:
+def corridor_segments(rng: Generator, area: Rectangle, width: int, depth: int) -> list[Rectangle]:
     """Corridors of an office: along the middle, an L, a T, a U, an H, a ring or a comb."""
     x0, y0, x1, y1 = area
     across = y0 + round((y1 - y0 - width) * rng.uniform(0.35, 0.65))
@@ -357,7 +386,7 @@ def office(rng: Generator) -> Plan:
     flip = plan.rooms.shape[0] > plan.rooms.shape[1]
     frame = (area[1], area[0], area[3], area[2]) if flip else area
     turned: Callable[[Rectangle], Rectangle] = lambda r: (r[1], r[0], r[3], r[2]) if flip else r  # noqa: E731
-    segments = [turned(s) for s in _segments(rng, frame, width, depth)]
+    segments = [turned(s) for s in corridor_segments(rng, frame, width, depth)]
     parted = chance(rng, 0.2)
     numbers = []
     for x0, y0, x1, y1 in segments:
@@ -393,11 +422,11 @@ def office(rng: Generator) -> Plan:
     united_rooms(rng, plan, 0.02)
     plan.open_fronts = rng.choice([0.02, 0.1, 0.3, 0.6])
     if not parted:
-        _unite_touching(plan, set(numbers))
+        unite_touching(plan, set(numbers))
     return plan
 
 
-def _unite_touching(plan: Plan, numbers: set[int]) -> None:
+def unite_touching(plan: Plan, numbers: set[int]) -> None:
     """Make all corridors that touch one room, but for those behind a door of their own."""
     changed = True
     while changed:

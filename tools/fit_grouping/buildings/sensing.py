@@ -27,6 +27,21 @@ THOROUGH_HOMES, THOROUGH = 0.75, 0.45
 """Share of the maps for which robots looked into every corner."""
 HOME_DAMAGE = 0.5
 """Faint walls and gaps in homes, relative to elsewhere."""
+WORKPLACES = frozenset({"offices", "faculty"})
+"""Kinds of plans that are mapped from their corridors, often while they are still explored."""
+SEEN_FROM_DOORS = (0.0, 0.2, 0.5, 0.85)
+"""Share of the rooms of a workplace that are seen through their doors only."""
+IN_PROGRESS, PROGRESS, PROGRESS_VIEWS_MIN = 0.45, (0.25, 0.9), 6
+"""How often the exploration of a workplace is still in progress, the share of the views that it has,
+and how many at least."""
+BEAMS_APART = (1, 1, 2, 3, 4)
+"""Every which ray of a view a workplace's lidar has: few leave fans of single rays in far rooms."""
+FRONT_TRANSMISSION = (0.02, 0.25)
+"""Share of the rays that pass whole fronts: single ones, as through blinds and between posts."""
+YARD_VIEWS = (3, 12)
+"""Views from the ground outside."""
+DRAWN_SHARE = {"villa": 0.05, "offices": 0.05, "faculty": 0.05, "depot": 0.15, "arena": 0.03}
+"""Share of drawings among the maps of a kind; 0.12 elsewhere."""
 ROOM_SEEN_MIN_M2 = 0.5
 """Rooms of which less was seen are none in the truth."""
 
@@ -59,7 +74,7 @@ def _rays(reach: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
 class Sensor:
     """Gathers evidence of views, like the log odds of a SLAM map."""
 
-    def __init__(self, rng: Generator, solid: Mask, glass: Mask, reach: int) -> None:
+    def __init__(self, rng: Generator, solid: Mask, glass: Mask, reach: int, every: int = 1) -> None:
         self.rng, self.reach = rng, reach
         self.pad = reach + 4
         self.solid = np.pad(solid, self.pad)
@@ -67,6 +82,7 @@ class Sensor:
         self.transmission = rng.uniform(0.05, 0.8)
         """Share of the rays that pass glass."""
         self.stride = self.solid.shape[1]
+        self.every = every
         self.evidence = np.zeros(self.solid.shape, np.float32)
         self.ragged = chance(rng, 0.6)
         """Whether rays that meet nothing are lost at any length."""
@@ -77,11 +93,12 @@ class Sensor:
     def look(self, row: int, column: int) -> None:
         """Add one view."""
         rng, reach = self.rng, self.reach
-        along_y, along_x = _rays(reach)
+        along_y, along_x = (along[:: self.every] for along in _rays(reach))
+        rays = len(along_y)
         y = (along_y + np.float32(row + self.pad + 0.5)).astype(np.int32)
         x = (along_x + np.float32(column + self.pad + 0.5)).astype(np.int32)
         index = y * self.stride + x
-        passes = rng.random(RAYS_PER_VIEW) < self.transmission
+        passes = rng.random(rays) < self.transmission
         solid = np.empty(index.shape, np.uint8)
         solid[passes] = self.unglazed.ravel()[index[passes]]
         solid[~passes] = self.solid.ravel()[index[~passes]]
@@ -111,7 +128,7 @@ def make_map(rng: Generator, walled: WalledPlan, furniture: Mask, furnishing: st
     """Map a furnished building in a random way; None where nothing was seen."""
     rooms = walled.plan.rooms
     solid = (walled.walls | furniture | _outdoors(rng, rooms)).astype(np.uint8)
-    drawn_share = 0.75 if furnishing == "survey" else 0.05 if walled.plan.kind == "villa" else 0.12
+    drawn_share = 0.75 if furnishing == "survey" else DRAWN_SHARE.get(walled.plan.kind, 0.12)
     if chance(rng, drawn_share):
         kind, gray = "drawing", _drawing(rng, walled, furniture)
     else:
@@ -119,6 +136,8 @@ def make_map(rng: Generator, walled: WalledPlan, furniture: Mask, furnishing: st
         if seen is None:
             return None
         gray = seen
+    if walled.plan.strip is not None:
+        gray[(walled.plan.strip > 0) & (gray == UNKNOWN) & (solid == 0)] = FREE
     gray = _damaged(rng, gray, HOME_DAMAGE if walled.plan.kind in HOMES else 1.0)
     rooms, other, gray = _warped(rng, rooms, walled.other, gray)
     window = _known_window(gray, rooms)
@@ -156,7 +175,11 @@ def _sensed(rng: Generator, walled: WalledPlan, solid: Mask) -> tuple[str, NDArr
     rooms, neighbors = walled.plan.rooms, walled.neighbors
     reach_m = float(rng.choice(REACHES_M, p=HOME_REACHES if walled.plan.kind in HOMES else USUAL_REACHES))
     numbers = list(neighbors)
-    start = numbers[rng.integers(len(numbers))]
+    if walled.plan.kind in WORKPLACES and walled.plan.corridors:
+        ways = [n for n in numbers if n in walled.plan.corridors] or numbers
+        start = ways[rng.integers(len(ways))]
+    else:
+        start = numbers[rng.integers(len(numbers))]
     share = 1.0 if chance(rng, 0.75 if walled.plan.kind in HOMES else 0.62) else rng.uniform(0.15, 0.9)
     order, queue, met = [], [start], {start}
     while queue:
@@ -176,7 +199,9 @@ def _sensed(rng: Generator, walled: WalledPlan, solid: Mask) -> tuple[str, NDArr
     rows, columns = rows[place], columns[place]
     bounds = np.searchsorted(rooms[rows, columns], [*order, *[n + 1 for n in order]])
     # Share of the rooms that are seen through their doors only.
-    skip = rng.choice([0.0, 0.06, 0.3, 0.6], p=[0.7, 0.24, 0.06, 0.0] if walled.plan.kind in HOMES else None)
+    work = walled.plan.kind in WORKPLACES
+    usual = [0.7, 0.24, 0.06, 0.0] if walled.plan.kind in HOMES else None
+    skip = rng.choice(SEEN_FROM_DOORS) if work else rng.choice([0.0, 0.06, 0.3, 0.6], p=usual)
     views = []
     per_view_m2 = rng.uniform(6, 16)
     thorough = chance(rng, THOROUGH_HOMES if walled.plan.kind in HOMES else THOROUGH)
@@ -195,19 +220,37 @@ def _sensed(rng: Generator, walled: WalledPlan, solid: Mask) -> tuple[str, NDArr
         return kind, None
     if len(views) > VIEWS_MAX:
         views = [views[i] for i in rng.choice(len(views), VIEWS_MAX, replace=False)]
-    sensor = Sensor(rng, solid, walled.glass, cells(reach_m))
+    if work and chance(rng, IN_PROGRESS):
+        count = max(PROGRESS_VIEWS_MIN, round(len(views) * rng.uniform(*PROGRESS)))
+        kind, views = "progress", _nearest(rng, views, count)
+    if walled.plan.yard is not None:
+        at_yard = np.argwhere((walled.plan.yard > 0) & away)
+        if len(at_yard):
+            chosen = rng.integers(0, len(at_yard), rng.integers(*YARD_VIEWS))
+            views += [(int(row), int(column)) for row, column in at_yard[chosen]]
+    every = int(rng.choice(BEAMS_APART)) if work else 1
+    sensor = Sensor(rng, solid, walled.glass, cells(reach_m), every)
+    if walled.plan.glazed:
+        sensor.transmission = rng.uniform(*FRONT_TRANSMISSION)
     for row, column in views:
         sensor.look(row, column)
     free, occupied = sensor.map()
     if chance(rng, 0.7):  # rays leave gaps far out that a real map's many scans fill
         free = cv2.morphologyEx(free.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8)) > 0
     if chance(rng, 0.6):
-        size = int(rng.choice([2, 3]))
+        size = int(rng.choice([2, 3, 4], p=[0.45, 0.45, 0.1]))
         occupied = cv2.dilate(occupied.astype(np.uint8), np.ones((size, size), np.uint8)) > 0
     gray = np.full(rooms.shape, UNKNOWN, np.uint8)
     gray[free] = FREE
     gray[occupied] = OCCUPIED
     return kind, gray
+
+
+def _nearest(rng: Generator, views: list[tuple[int, int]], count: int) -> list[tuple[int, int]]:
+    """The views around one of them: as far as an exploration has come."""
+    places = np.array(views)
+    away = np.hypot(*(places - places[rng.integers(len(places))]).T)
+    return [views[i] for i in np.argsort(away, kind="stable")[:count]]
 
 
 def _spread(

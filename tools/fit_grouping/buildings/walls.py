@@ -26,6 +26,14 @@ STUB_MIN_M = 0.2
 SHOULDER_MIN_M = 0.4
 """Rooms without a jamb between them are parted where one is wider by this."""
 LOOK_ALONG_M = 8.0
+DOUBLE_DOOR_M, DOUBLE_LEAF_SHARE = (1.5, 2.6), 0.6
+"""Width of the double doors that part corridors, and how often a leaf of them stands half open."""
+CABINET_M, CABINET_GAP_M, CABINET_DEEP_M = (1.0, 3.2), (0.6, 2.4), (0.25, 0.6)
+"""Cabinets and pieces of wall between a lab and a corridor, and the gaps between them."""
+FRAYED_GAP_M, FRAYED_PIECE_M, FRAYED_DOT_STEP_M = (0.15, 0.7), (0.2, 1.6), (0.1, 0.22)
+"""What is seen of a frayed wall: gaps between pieces, or dots too near to each other to walk through."""
+GATE_M = (0.9, 3.5)
+"""Width of openings to the outside: doors to gates."""
 PUBLIC_AGAIN = 0.4
 """Probability of one more opening between living rooms that are joined already."""
 WINDOWS, HOME_WINDOWS = 2.0, 2.5
@@ -177,7 +185,12 @@ def _leaf(rng: Generator, walls: Mask, stretch: Stretch, low: int, high: int) ->
 def _opening_kind(rng: Generator, plan: Plan, a: int, b: int) -> str:
     """Door, wide opening, one with a jamb at one side, one that leaves stubs, or no jamb at all."""
     if a in plan.corridors and b in plan.corridors and not (a in plan.public and b in plan.public):
-        return str(rng.choice(["door", "wide", "stub", "open"], p=[0.4, 0.25, 0.25, 0.1]))
+        return str(rng.choice(["door", "double", "wide", "stub", "open"], p=[0.25, 0.3, 0.15, 0.2, 0.1]))
+    ways = plan.corridors | plan.lobbies | plan.halls
+    if (a in plan.labs and b in ways) or (b in plan.labs and a in ways):
+        return str(rng.choice(["cabinets", "wide", "one side"], p=[0.6, 0.2, 0.2]))
+    if (a in plan.lobbies and b in ways) or (b in plan.lobbies and a in ways):
+        return str(rng.choice(["wide", "stub", "one side", "open"], p=[0.28, 0.26, 0.2, 0.26]))
     if a in plan.public and b in plan.public:
         return str(rng.choice(["door", "wide", "one side", "stub", "open"], p=[0.26, 0.26, 0.16, 0.16, 0.16]))
     if chance(rng, plan.open_fronts):
@@ -195,6 +208,9 @@ def _opening(rng: Generator, kind: str, stretch: Stretch, thickness: int, usual_
         last = stretch.length - width - thickness
         stub = int(rng.integers(0, last + 1)) if chance(rng, 0.5) else int(rng.choice([thickness, last]))
         low = max(thickness // 2 + 1, stub)
+    elif kind == "double":
+        width = min(between(rng, *DOUBLE_DOOR_M), room_for)
+        low = (stretch.length - width) // 2
     elif kind == "wide":
         width = min(max(round(room_for * rng.uniform(0.3, 0.85)), cells(1.0)), cells(WIDE_MAX_M))
         low = thickness + int(rng.integers(0, room_for - width + 1))
@@ -262,7 +278,7 @@ def build_walls(rng: Generator, plan: Plan) -> WalledPlan:
     reached, taste = _Groups(neighbors), _Groups(neighbors)
     place_min = cells(DOOR_PLACE_MIN_M)
     pairs = [p for p, parts in runs.items() if p[0] > 0 and sum(r.length for r in parts) >= place_min]
-    ways = plan.corridors | plan.halls | plan.public
+    ways = plan.corridors | plan.halls | plan.public | plan.lobbies
     order = sorted(pairs, key=lambda p: (not (p[0] in ways or p[1] in ways)) + rng.uniform(0, 0.9))
     usual_m = rng.uniform(0.75, 1.1)
     leaves = rng.choice([0.0, 0.15, 0.4])
@@ -277,6 +293,8 @@ def build_walls(rng: Generator, plan: Plan) -> WalledPlan:
         )
         joined = reached.of(a) == reached.of(b)
         if joined and not both_corridors and not chance(rng, again):
+            if not (a in ways or b in ways) and chance(rng, plan.frayed):
+                _fray(rng, walls, straight_stretch(rng, runs[a, b]), thickness)
             continue
         stretch = straight_stretch(rng, runs[a, b])
         if stretch.length - 2 * thickness < cells(0.6):
@@ -285,7 +303,17 @@ def build_walls(rng: Generator, plan: Plan) -> WalledPlan:
         low, high = _opening(rng, kind, stretch, thickness, usual_m)
         if kind == "open" and (both_corridors or only_taste_parts(rooms, stretch)):
             taste.unite(a, b)
-        _clear(walls, stretch, low, high, thickness)
+        if not (a in ways or b in ways) and chance(rng, plan.frayed):
+            _fray(rng, walls, stretch, thickness)
+        if kind == "cabinets":
+            _cabinets(rng, walls, stretch, thickness)
+        else:
+            _clear(walls, stretch, low, high, thickness)
+        if kind == "double":
+            middle = (low + high) // 2
+            for half in ((low, middle), (middle, high)):
+                if chance(rng, DOUBLE_LEAF_SHARE):
+                    _leaf(rng, walls, stretch, *half)
         if kind == "door" and high - low < cells(1.3) and chance(rng, leaves):
             _leaf(rng, walls, stretch, low, high)
         reached.unite(a, b)
@@ -297,13 +325,87 @@ def build_walls(rng: Generator, plan: Plan) -> WalledPlan:
             if stretch.length > cells(1.6):
                 middle = stretch.length // 2
                 _clear(walls, stretch, middle - cells(0.45), middle + cells(0.45), thickness)
+    _gates(rng, walls, runs, plan.gates, thickness)
     mean, longest_m = (1.5, 0.8) if plan.kind in HOMES else (rng.choice([3, 14]), 1.5)
     _stubs(rng, walls, thickness, rng.poisson(mean), longest_m)
-    glass = _glass(rng, walls, inner_side, HOME_WINDOWS if plan.kind in HOMES else WINDOWS)
+    if plan.glazed:
+        glass = _fronts(rng, inner_side)
+    else:
+        glass = _glass(rng, walls, inner_side, HOME_WINDOWS if plan.kind in HOMES else WINDOWS)
     number = np.zeros(int(rooms.max()) + 1, np.int32)
     for room in neighbors:
         number[room] = taste.of(room)
     return WalledPlan(plan, walls, glass, neighbors, number[rooms])
+
+
+def _cabinets(rng: Generator, walls: Mask, stretch: Stretch, thickness: int) -> None:
+    """Clear a border but for cabinets and pieces of wall with gaps between them."""
+    _clear(walls, stretch, thickness, stretch.length - thickness, thickness)
+    at = thickness + between(rng, *CABINET_GAP_M)
+    hollow = chance(rng, 0.5)
+    side = rng.choice([-1, 1])
+    while at < stretch.length - thickness:
+        end = min(at + between(rng, *CABINET_M), stretch.length - thickness)
+        deep = side * between(rng, *CABINET_DEEP_M) if chance(rng, 0.7) else thickness - 1
+        ends = [(at, 0), (end, 0), (end, deep), (at, deep)]
+        corners = np.round([stretch.point(*point) for point in ends]).astype(np.int32)
+        if hollow:
+            cv2.polylines(walls, [corners], True, 1, 1)
+        else:
+            cv2.fillPoly(walls, [corners], 1)
+        at = end + between(rng, *CABINET_GAP_M)
+
+
+def _fray(rng: Generator, walls: Mask, stretch: Stretch, thickness: int) -> None:
+    """Leave of a wall dots, pieces, or the cabinets before it."""
+    first, last = thickness, stretch.length - thickness
+    way = rng.choice(["dots", "pieces", "cabinets"])
+    if way == "pieces":
+        at = first
+        while at < last:
+            end = min(at + between(rng, *FRAYED_GAP_M), last)
+            _clear(walls, stretch, at, end, thickness)
+            at = end + between(rng, *FRAYED_PIECE_M)
+        return
+    _clear(walls, stretch, first, last, thickness)
+    at = first
+    while at < last:
+        if way == "dots":
+            x, y = stretch.point(at, rng.normal(0, 1.0))
+            cv2.circle(walls, (round(x), round(y)), int(rng.integers(0, 2)), 1, -1)
+            at += between(rng, *FRAYED_DOT_STEP_M)
+            continue
+        end = min(at + between(rng, *FRAYED_PIECE_M), last)
+        low, high = -between(rng, 0.05, 0.5), between(rng, 0.05, 0.5)
+        ends = [(at, low), (end, low), (end, high), (at, high)]
+        corners = np.round([stretch.point(*point) for point in ends]).astype(np.int32)
+        cv2.fillPoly(walls, [corners], 1)
+        at = end + between(rng, 0.05, FRAYED_GAP_M[1])
+
+
+def _gates(
+    rng: Generator, walls: Mask, runs: dict[tuple[int, int], list[Run]], mean: float, thickness: int
+) -> None:
+    """Cut openings to the outside."""
+    outer = [parts for (low_room, _), parts in runs.items() if low_room == 0]
+    for _ in range(rng.poisson(mean) if outer else 0):
+        stretch = straight_stretch(rng, outer[rng.integers(len(outer))])
+        width = between(rng, *GATE_M)
+        if stretch.length > width + 2 * thickness:
+            low = int(rng.integers(thickness, stretch.length - width - thickness + 1))
+            _clear(walls, stretch, low, low + width, thickness)
+
+
+def _fronts(rng: Generator, outer_walls: Mask) -> Mask:
+    """Outer walls of glass, at all sides of the building or at one or two."""
+    glass = outer_walls.copy()
+    rows, columns = np.nonzero(outer_walls)
+    if len(rows) and chance(rng, 0.5):
+        angle = rng.integers(4) * np.pi / 2
+        y, x = np.mgrid[: glass.shape[0], : glass.shape[1]]
+        ahead = np.cos(angle) * (x - columns.mean()) + np.sin(angle) * (y - rows.mean())
+        glass[ahead < 0] = 0
+    return glass
 
 
 def _stubs(rng: Generator, walls: Mask, thickness: int, count: int, longest_m: float) -> None:

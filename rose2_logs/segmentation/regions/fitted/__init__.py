@@ -10,10 +10,13 @@ from typing import Any
 
 from rose2_logs.segmentation.regions.answers import AnsweringNetwork
 from rose2_logs.segmentation.regions.features import REGION_FEATURES
+from rose2_logs.segmentation.regions.own_rooms import OWN_ROOM_FEATURES
 from rose2_logs.segmentation.regions.strengths import BoostedTrees, read_trees
 
 FOLDER = Path(__file__).parent
-NETWORK, JOINS, OUTSIDE, MANIFEST = "borders.onnx", "joins.npz", "outside.npz", "manifest.json"
+NETWORK, JOINS, OUTSIDE, OWN_ROOMS = "borders.onnx", "joins.npz", "outside.npz", "own_rooms.npz"
+FILES = (NETWORK, JOINS, OUTSIDE, OWN_ROOMS)
+MANIFEST = "manifest.json"
 
 
 @cache
@@ -32,6 +35,12 @@ def join_trees() -> BoostedTrees:
 def outside_trees() -> BoostedTrees:
     """Trees that say whether a region is a room or outside."""
     return read_trees(FOLDER / OUTSIDE, REGION_FEATURES)
+
+
+@cache
+def own_room_trees() -> BoostedTrees:
+    """Trees that say whether a small region is a room of its own."""
+    return read_trees(FOLDER / OWN_ROOMS, OWN_ROOM_FEATURES)
 
 
 def manifest() -> dict[str, Any]:
