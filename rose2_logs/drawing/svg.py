@@ -45,7 +45,7 @@ def as_svg(page: Page, *, is_inline: bool = False) -> str:
         if page.paper is None
         else f'<rect width="{width}" height="{height}" fill="{css_color(page.paper)}"/>'
     )
-    body = "\n".join([head, title + paper, *(_element(shape) for shape in page.shapes), "</svg>"])
+    body = "\n".join([head, title + paper, *filter(None, map(_element, page.shapes)), "</svg>"])
     return body if is_inline else f'<?xml version="1.0" encoding="UTF-8"?>\n{body}\n'
 
 
@@ -61,6 +61,9 @@ def png_uri(pixels: NDArray[np.uint8], *, few_colors: bool = False) -> str:
 
 
 def _element(shape: Shape) -> str:
+    """Write a shape; nothing for one without any point, whose path no browser could read."""
+    if isinstance(shape, Area | Lines) and shape.shape.is_empty:
+        return ""
     match shape:
         case Picture(pixels, matrix):
             height, width = pixels.shape[:2]
@@ -117,6 +120,8 @@ def _path(shape: BaseGeometry) -> str:
     """Path data of the rings of polygons and of lines."""
     parts = []
     for part in shapely.get_parts(np.array([shape], object)):
+        if part.is_empty:
+            continue
         if shapely.get_dimensions(part) == 2:
             rings = shapely.get_rings(part)
             parts += [f"M{_points(shapely.get_coordinates(ring)[:-1])}Z" for ring in rings]

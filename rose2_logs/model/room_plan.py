@@ -15,7 +15,6 @@ from rose2_logs.model.borders import Border, unsure_of
 from rose2_logs.model.labels import known_window
 from rose2_logs.model.occupancy import UNKNOWN, BoolArray, FloatArray, GridGeometry, OccupancySnapshot
 from rose2_logs.model.outlines import outline
-from rose2_logs.model.room_names import room_name
 from rose2_logs.model.room_quality import RoomQuality, is_unsure
 from rose2_logs.model.rooms import Doorway
 
@@ -60,7 +59,7 @@ class PlanRoom:
     @property
     def name(self) -> str:
         """What it is called."""
-        return room_name(self.number)
+        return f"Room {self.number}"
 
     @property
     def is_unsure(self) -> bool:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 
 from rose2_logs.drawing.palette import track_color
-from rose2_logs.model.room_names import room_name
 from rose2_logs.system.text import percent
 
 CLOCK_FROM_NS = 10**18
@@ -91,7 +90,7 @@ def when(seconds: float | None) -> Cell:
 
 def room(track: int) -> Cell:
     """Cell of a room, with its color."""
-    return Cell(room_name(track), float(track), css_color(track))
+    return Cell(f"Room {track}", float(track), css_color(track))
 
 
 def css_color(track: int) -> str:
