@@ -61,8 +61,9 @@ def png_uri(pixels: NDArray[np.uint8], *, few_colors: bool = False) -> str:
 
 
 def _element(shape: Shape) -> str:
-    """Write a shape; nothing for one without any point, whose path no browser could read."""
-    if isinstance(shape, Area | Lines) and shape.shape.is_empty:
+    """Write a shape; nothing for one without any line, whose path no browser could read."""
+    path = _path(shape.shape) if isinstance(shape, Area | Lines) else ""
+    if isinstance(shape, Area | Lines) and not path:
         return ""
     match shape:
         case Picture(pixels, matrix):
@@ -72,15 +73,14 @@ def _element(shape: Shape) -> str:
                 f'<image width="{width}" height="{height}" transform="matrix({parts})" '
                 f'preserveAspectRatio="none" style="image-rendering:pixelated" href="{png_uri(pixels)}"/>'
             )
-        case Area(geometry, fill, opacity, title):
+        case Area(_, fill, opacity, title):
             shown = "" if opacity == 1 else f' fill-opacity="{opacity:g}"'
             return (
-                f'<path d="{_path(geometry)}" fill="{css_color(fill)}"{shown} fill-rule="evenodd"'
-                f"{_end('path', title)}"
+                f'<path d="{path}" fill="{css_color(fill)}"{shown} fill-rule="evenodd"{_end("path", title)}'
             )
-        case Lines(geometry, color, thickness, kind, title):
+        case Lines(_, color, thickness, kind, title):
             return (
-                f'<path{_class(kind)} d="{_path(geometry)}" fill="none" stroke="{css_color(color)}" '
+                f'<path{_class(kind)} d="{path}" fill="none" stroke="{css_color(color)}" '
                 f'stroke-width="{_number(thickness)}" stroke-linejoin="round" stroke-linecap="butt"'
                 f"{_end('path', title)}"
             )
