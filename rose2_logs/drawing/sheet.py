@@ -32,8 +32,8 @@ class Key:
     ----------
     text : str
     color : Color
-    kind : {"area", "hatched", "line", "arrow", "sign"}
-        A filled box, a pale one with hatching, a thick line, an arrowhead, or a text.
+    kind : {"area", "hatched", "line", "arrow", "cross", "sign"}
+        A filled box, a pale one with hatching, a thick line, an arrowhead, a cross, or a text.
     opacity : float
         Of the box.
     sign : str
@@ -42,7 +42,7 @@ class Key:
 
     text: str
     color: Color = (25, 25, 25)
-    kind: Literal["area", "hatched", "line", "arrow", "sign"] = "area"
+    kind: Literal["area", "hatched", "line", "arrow", "cross", "sign"] = "area"
     opacity: float = 1.0
     sign: str = ""
 
@@ -57,13 +57,19 @@ class Key:
         words = Text(self.text, right + SIGN_GAP * font, y, font, "start")
         match self.kind:
             case "sign":
-                return [Text(self.sign, (x + right) / 2, y, font, is_bold=True), words]
+                return [Text(self.sign, (x + right) / 2, y, font, is_bold=True, color=self.color), words]
             case "line":
                 return [Lines(shapely.LineString([(x, y), (right, y)]), self.color, 2.5 * line), words]
             case "arrow":
                 head = np.array([[0.5, 0.0], [-0.5, 0.32], [-0.3, 0.0], [-0.5, -0.32]])
                 there = shapely.Polygon(head * 1.2 * font + ((x + right) / 2, y))
                 return [Lines(there, self.color, 1.5 * line), words]
+            case "cross":
+                ends = np.array([[[-1, -1], [1, 1]], [[-1, 1], [1, -1]]]) * 0.35 * font + ((x + right) / 2, y)
+                return [
+                    Lines(shapely.multilinestrings(shapely.linestrings(ends)), self.color, 1.5 * line),
+                    words,
+                ]
             case "hatched":
                 lines = hatching(box, SIGN_HATCH_GAP * font)
                 filled: list[Shape] = [Lines(lines, shaded(self.color, 0.8), 0.7 * line)]

@@ -50,8 +50,8 @@ def as_svg(page: Page, *, is_inline: bool = False) -> str:
         if page.paper is None
         else f'<rect width="{width}" height="{height}" fill="{css_color(page.paper)}"/>'
     )
-    shown = [_element(shape) for shape in page.shapes] if is_inline else _layered(page)
-    body = "\n".join([head, title + paper, *shown, "</svg>"])
+    shown = map(_element, page.shapes) if is_inline else _layered(page)
+    body = "\n".join([head, title + paper, *filter(None, shown), "</svg>"])
     return body if is_inline else f'<?xml version="1.0" encoding="UTF-8"?>\n{body}\n'
 
 
@@ -83,7 +83,11 @@ def png_uri(pixels: NDArray[np.uint8], *, few_colors: bool = False) -> str:
 
 
 def _element(shape: Shape, identity: str = "") -> str:
+    """Write a shape; nothing for one without any line, whose path no browser could read."""
     named = f" id={quoteattr(identity)}" if identity else ""
+    path = _path(shape.shape) if isinstance(shape, Area | Lines) else ""
+    if isinstance(shape, Area | Lines) and not path:
+        return ""
     match shape:
         case Picture(pixels, matrix):
             height, width = pixels.shape[:2]
@@ -93,15 +97,15 @@ def _element(shape: Shape, identity: str = "") -> str:
                 f'preserveAspectRatio="none" style="image-rendering:pixelated" '
                 f'xlink:href="{png_uri(pixels)}"/>'
             )
-        case Area(geometry, fill, opacity, title):
+        case Area(_, fill, opacity, title):
             shown = "" if opacity == 1 else f' fill-opacity="{opacity:g}"'
             return (
-                f'<path{named} d="{_path(geometry)}" fill="{css_color(fill)}"{shown} fill-rule="evenodd"'
+                f'<path{named} d="{path}" fill="{css_color(fill)}"{shown} fill-rule="evenodd"'
                 f"{_end('path', title)}"
             )
-        case Lines(geometry, color, thickness, kind, title):
+        case Lines(_, color, thickness, kind, title):
             return (
-                f'<path{named}{_class(kind)} d="{_path(geometry)}" fill="none" stroke="{css_color(color)}" '
+                f'<path{named}{_class(kind)} d="{path}" fill="none" stroke="{css_color(color)}" '
                 f'stroke-width="{_number(thickness)}" stroke-linejoin="round" stroke-linecap="butt"'
                 f"{_end('path', title)}"
             )
@@ -141,6 +145,8 @@ def _path(shape: BaseGeometry) -> str:
     """Path data of the rings of polygons and of lines."""
     parts = []
     for part in shapely.get_parts(np.array([shape], object)):
+        if part.is_empty:
+            continue
         if shapely.get_dimensions(part) == 2:
             rings = shapely.get_rings(part)
             parts += [f"M{_points(shapely.get_coordinates(ring)[:-1])}Z" for ring in rings]

@@ -17,9 +17,9 @@ NO_NAME = re.compile(r"[\d.,\s]*(m2|m²|sqm|qm)?", re.IGNORECASE)
 def read_dxf_plan(path: Path) -> RoomNames:
     """Read closed polylines, each named by the text in it.
 
-    A text names the smallest outline around it. Of several texts in an outline the largest counts, of these the
-    upper one; areas and numbers are no names. Lengths are converted to meters by the unit of the drawing; one
-    without a unit is in meters.
+    A text names the smallest outline around it. Of several texts in an outline the largest counts, of
+    these the upper one; areas and numbers are no names. Lengths are converted to meters by the unit of the
+    drawing; one without a unit is in meters.
 
     Raises
     ------

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
@@ -69,3 +70,27 @@ def test_a_page_is_laid_on_another(drawing: Drawing):
     reduced = large.reshape(100, 2, 200, 2, 3).mean((1, 3))
     assert np.abs(part - reduced).mean() < 3
     assert (small[:, :200] == 255).all()
+
+
+@pytest.mark.parametrize(
+    "shape",
+    [
+        shapely.LineString(),
+        shapely.Polygon(),
+        shapely.MultiLineString(),
+        shapely.GeometryCollection([shapely.Point(1, 1), shapely.LineString()]),
+        shapely.MultiLineString([[(0, 0), (1, 1)], [(2, 2), (3, 3)]]),
+        shapely.MultiPolygon([shapely.box(0, 0, 1, 1), shapely.Polygon()]),
+        shapely.GeometryCollection([shapely.Point(1, 1), shapely.box(0, 0, 1, 1)]),
+    ],
+    ids=lambda shape: shape.wkt[:40],
+)
+def test_every_path_of_an_svg_begins_with_a_point(shape):
+    """Browsers complain of others; what has no line is left out, title and all."""
+    drawing = Drawing(10, 10, "shapes")
+    drawing.add(Lines(shape, (0, 0, 0), 1.0, title="told"), Area(shape, (0, 0, 0)))
+    paths = re.findall(r' d="([^"]*)"', drawing.svg())
+    assert all(re.fullmatch(r"(M-?\d[^MZ]*Z?)+", path) for path in paths)
+    has_lines = shapely.length(shape) > 0
+    assert len(paths) == (2 if has_lines else 0)
+    assert ("told" in drawing.svg()) == has_lines

@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 
 from rose2_logs.drawing.chart import ON_PAGE, Curve, Mark, lane_chart, line_chart
-from rose2_logs.drawing.palette import state_colors, track_color
+from rose2_logs.drawing.palette import TEMPORARY, state_colors, track_color
 from rose2_logs.drawing.shapes import Color
 from rose2_logs.model.occupancy import BoolArray, FloatArray, IntArray
 from rose2_logs.model.room_quality import UNSURE_SIGN, unsure_sign
+from rose2_logs.outputs.report.facts import is_last
 from rose2_logs.outputs.report.words import css, duration
 from rose2_logs.runs.run import Run
 from rose2_logs.system.text import percent
@@ -20,7 +21,7 @@ from rose2_logs.system.text import percent
 BLUE, ORANGE, GREEN, VIOLET = (47, 126, 216), (224, 123, 26), (42, 157, 92), (138, 95, 208)
 AREAS_MOST = 8
 """Rooms whose area is drawn: the largest of the last map."""
-TRACK_COLUMNS = ["track", "shape_right_snapshot", "area_settled_snapshot", "wall_support"]
+TRACK_COLUMNS = ["track", "in_last_map", "shape_right_snapshot", "area_settled_snapshot", "wall_support"]
 LANES_MOST = 80
 """Rooms whose presence is drawn: those that were there in most maps."""
 
@@ -83,12 +84,12 @@ def run_charts(results: Run) -> list[Chart]:
     largest = in_last[np.argsort(-areas[in_last, -1], kind="stable")[:AREAS_MOST]]
     charts = [
         chart(
-            "How much of the last layout was there",
+            "Agreement with the final layout, %",
             _final_meaning(results),
             [
-                ("share of the layout, %", in_percent("final_share"), GREEN),
-                ("share of the known part, %", in_percent("known_final_share"), ORANGE),
-                ("mean overlap, %", in_percent("final_iou"), BLUE),
+                ("same rooms", in_percent("final_share"), GREEN),
+                ("same rooms, where known", in_percent("known_final_share"), ORANGE),
+                ("overlap", in_percent("final_iou"), BLUE),
             ],
             whole,
         ),
@@ -130,9 +131,9 @@ def _final_meaning(results: Run) -> str:
     """Say what counts as a final layout."""
     tracking = results.parameters.tracking
     return (
-        f"A room of the last map is there when a room overlaps it by {tracking.final_room_min_iou:g}. "
-        "Share of the last layout, by area, in rooms that are there; the same of the part known at the "
-        "time, as far as it was known, so that rooms not seen yet do not count; mean overlap of all rooms. "
+        "Same rooms: share of the last layout, by area, in rooms that were there, which some room of the map "
+        f"overlaps by {tracking.final_room_min_iou:g}. Where known: the same of the part known at the time, "
+        "so that rooms not seen yet do not count. Overlap: the mean of all rooms. "
         f"The layout is final from the map on after which the first share stays at "
         f"{percent(tracking.final_min_share)} or above: a few rooms at the frontier may still change. "
         "The known part is final likewise, by the second share."
@@ -168,7 +169,7 @@ def run_marks(results: Run) -> list[tuple[int, str, str]]:
     """What the curves mark: at which map, in words, and its kind, ``final`` or ``shifted``."""
     final = results.summary.get("layout", {}).get("final_since")
     marks: list[tuple[int, str, str]] = []
-    if final is not None:
+    if final is not None and not is_last(final, results.choose()):
         marks.append((final["snapshot"], f"layout final from here on, {duration(final['time_s'])}", "final"))
     events = results.table("events", ["snapshot", "kind"]).to_pylist()
     marks += [
@@ -235,18 +236,25 @@ def _lanes(results: Run, axes: Sequence[RunAxis], numbers: np.ndarray, present: 
     left_out = len(numbers) - len(shown)
     meaning = (
         "A lane for each room, by its number: pale while it forms, stronger once its shape was right, full "
-        f"once its area has settled. {UNSURE_SIGN}: little of its last outline is supported by walls."
+        f"once its area has settled, gray if the last map does not show it. {UNSURE_SIGN}: little of its "
+        "last outline is supported by walls."
     ) + (f" {left_out} rooms that were there only shortly are left out." if left_out else "")
-    legend = tuple((state, css(color)) for state, color in colors[0].items())
+    legend = tuple(
+        (state, css(color))
+        for number, (state, color) in enumerate(colors[0].items(), start=1)
+        if (states == number).any()
+    )
     return [Chart(title, meaning, legend, draw(axes[0]), draw(axes[1]), is_wide=True)]
 
 
 def _states(snapshots: np.ndarray, rows: Sequence[dict[str, Any]], present: BoolArray) -> IntArray:
-    """State (R, N) of each room at each map: 1 forming, 2 shape right, 3 settled, 0 where it is not."""
+    """State (R, N) of each room at each map: its place in `state_colors` from 1 on, 0 where it is not."""
     never = np.inf
     shaped, settled = (
         np.array([never if row[name] is None else row[name] for row in rows], float)[:, None]
         for name in ("shape_right_snapshot", "area_settled_snapshot")
     )
     states = np.where(snapshots >= settled, 3, np.where(snapshots >= shaped, 2, 1))
-    return np.where(present, states, 0)
+    in_last = np.array([row["in_last_map"] for row in rows])[:, None]
+    temporary = list(state_colors(0)).index(TEMPORARY) + 1
+    return np.where(present, np.where(in_last, states, temporary), 0)

@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 
 from rose2_logs.model.analysis import left_out_note
+from rose2_logs.model.borders import UNSURE_BORDER_BELOW
 from rose2_logs.model.room_plan import RoomPlan
+from rose2_logs.model.room_quality import UNSURE_BELOW
 from rose2_logs.outputs.report.words import MISSING, date_of, duration, size
 from rose2_logs.runs.run import Run
 from rose2_logs.system.text import percent
@@ -21,7 +23,7 @@ PREDICTED_SHARE = 0.25
 """Rooms of whose shape more than this share was not seen are reported."""
 NAMED_MOST = 6
 """Rooms named in one sentence."""
-NOT_FINAL = "not reached"
+NOT_FINAL = "still changing"
 
 
 @dataclass(frozen=True)
@@ -97,7 +99,7 @@ def is_last(final: dict[str, Any], last: int) -> bool:
 def _final(final: dict[str, Any] | None, last: int) -> tuple[str, str]:
     """Say from what map on the layout was final; if that is the last, it never was for sure."""
     if final is None or is_last(final, last):
-        return NOT_FINAL, "it changed up to the last map"
+        return NOT_FINAL, "rooms changed up to the last map"
     snapshot_ref = f"map {final['snapshot']}, {duration(final['time_s'])} into the run"
     return f"{percent(final['coverage'])} coverage", snapshot_ref
 
@@ -219,3 +221,40 @@ def _shift_notes(results: Run) -> list[Note]:
 def _listed(names: list[str]) -> str:
     more = len(names) - NAMED_MOST
     return ", ".join(names[:NAMED_MOST]) + (f" and {more} more" if more > 0 else "")
+
+
+def meanings(results: Run) -> list[tuple[str, str]]:
+    """Explain the figures and marks of the page: each term, and what it means."""
+    tracking = results.parameters.tracking
+    share, overlap = percent(tracking.final_min_share), f"{tracking.final_room_min_iou:g}"
+    return [
+        ("Coverage", "Known free floor over that of the last map."),
+        (
+            "Layout final from",
+            f"From this map on, at least {share} of the last layout, by area, was in rooms that were there: "
+            f"some room of the map overlaps them by {overlap} (intersection over union). A few rooms at the "
+            "frontier may still have changed. If only the last map is like that, the layout is still "
+            "changing: more maps might change it again.",
+        ),
+        (
+            "Known part final from",
+            "The same of the part known at the time, so that rooms not seen yet do not count. If it is early "
+            "and the layout late, the exploration took its time; if both are late, rooms were joined or "
+            "divided up to the end.",
+        ),
+        (
+            "Unsure, ?",
+            f"Walls support less than {percent(UNSURE_BELOW)} of the room's outline; doorways alone take a "
+            "room to about 90%.",
+        ),
+        ("Hatched", "Part of a room's shape that no map has shown: predicted from its walls."),
+        ("Orange line", "A doorway between two rooms."),
+        (
+            "Purple line",
+            "An unsure border: that its rooms are two has a probability below "
+            f"{percent(UNSURE_BORDER_BELOW)}.",
+        ),
+        ("Colors", "A room keeps its number and color over the whole run; colors mean nothing else."),
+        ("Dashed green line", "In curves: the layout is final from here on."),
+        ("Dotted orange line", "In curves: the whole map shifted, by a loop closure or trouble of SLAM."),
+    ]

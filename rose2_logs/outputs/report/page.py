@@ -125,6 +125,7 @@ def _content(results: Run, panels: int, *, is_beside: bool) -> dict[str, Any]:
         "subtitle": facts.subtitle(results),
         "tiles": facts.tiles(results, plan),
         "notes": facts.notes(results, plan),
+        "meanings": facts.meanings(results),
         "plan": drawn(as_svg(draw_plan(plan, FIGURE), is_inline=True)),
         "panels": drawn_panels,
         "maps": len(results.columns["snapshot"]),

@@ -55,9 +55,10 @@ def room_table(results: Run, plan: RoomPlan) -> Table:
             Cell(_others(neighbors.get(row["track"], ()), results)),
             share(row["first_coverage"]),
             when(row["first_time_s"]),
-            share(row["shape_right_coverage"]),
-            share(row["shape_right_seen_share"]),
-            share(row["area_settled_coverage"]),
+            *(
+                share(row[name] if row["in_last_map"] else None)
+                for name in ("shape_right_coverage", "shape_right_seen_share", "area_settled_coverage")
+            ),
             count(row["maps"]),
             count(row["splits"]),
             count(row["merges"]),
@@ -76,9 +77,15 @@ def room_table(results: Run, plan: RoomPlan) -> Table:
         Column("doorways to", "rooms behind its doorways in the last map", is_number=False),
         Column("first seen", "coverage when it was first seen"),
         Column("at time", "time into the run when it was first seen"),
-        Column("shape right", "coverage when its shape first overlapped the last one by 0.8"),
+        Column(
+            "shape right",
+            "coverage when its shape first overlapped the last one by 0.8; of rooms of the last map only",
+        ),
         Column("of it seen", "how much of it had been seen by then: low is an early, right prediction"),
-        Column("area settled", "coverage from which on its area stayed within 10 % of the last"),
+        Column(
+            "area settled",
+            "coverage from which on its area stayed within 10 % of the last; of rooms of the last map only",
+        ),
         Column("maps", "number of maps that show it"),
         Column("splits", "how often it was split"),
         Column("merges", "how often another room merged into it"),

@@ -13,14 +13,16 @@ from rose2_logs.model.occupancy import FloatArray
 from rose2_logs.outputs.rerun.back_projected import BACK_PROJECTED, SEEN_SHARE
 from rose2_logs.outputs.rerun.lanes import FINAL_IOU, FINAL_SHARE, KNOWN_FINAL_SHARE, LANES, SHIFTS
 from rose2_logs.outputs.rerun.layers import Instant
-from rose2_logs.outputs.rerun.legend import LEGEND, LEGEND_TEXT
+from rose2_logs.outputs.rerun.legend import CURVE_NAMES, LEGEND_TEXT, MAP_SIGNS
 from rose2_logs.outputs.rerun.world import (
     BORDERS,
     CLEAN,
+    DARK,
     DOORWAYS,
     FACES,
     FILLS,
     LINES,
+    PAPER,
     PATH,
     PREDICTED,
     ROBOT,
@@ -33,17 +35,16 @@ from rose2_logs.outputs.rerun.world import (
 
 EYE_HEIGHT = 1.02
 """Height of the eye over the side of the map that fills the view: the viewer sees 1.04 times its height."""
-MAP_ASPECT = 1.4
+MAP_ASPECT = 1.25
 """Width over height of the view of the map in a window of usual shape."""
 SWITCHED = (BORDERS, CLEAN, SCORE, SEGMENTS, LINES, FACES, VORONOI)
 """Layers of the map's view that are off at first and can be switched on."""
 PLAY_S = 20.0
 """Time that playing the run takes, whatever its length."""
-SIDE_SHARE, LEGEND_SHARE, CURVES_SHARE = 0.32, 0.05, 0.36
-"""Shares of the window: of its width for what is beside the map; of its height for the strip of the legend,
-and for the curves."""
+SIDE_SHARE, CURVES_SHARE, SIGNS_SHARE, NAMES_SHARE = 0.4, 0.36, 0.05, 0.13
+"""Shares of the window on a screen from 1280 x 720 on: of its width for what is beside the map, of its height
+for the curves there; of the map's height, and of the curves', for the strip of their legend."""
 Overrides = list[rrb.EntityBehavior | rrb.VisibleTimeRanges]
-PAPER, DARK = (236, 236, 236), (12, 12, 16)
 
 
 def make_blueprint(
@@ -96,8 +97,8 @@ def make_blueprint(
         rrb.Horizontal(
             rrb.Vertical(
                 rrb.Tabs(*views, active_tab=0),
-                _legend_strip(),
-                row_shares=[1 - LEGEND_SHARE, LEGEND_SHARE],
+                _strip(MAP_SIGNS),
+                row_shares=[1 - SIGNS_SHARE, SIGNS_SHARE],
             ),
             rrb.Vertical(
                 rrb.Tabs(*_curve_views(back_projected), active_tab=0),
@@ -189,23 +190,26 @@ def _axis() -> rrb.archetypes.TimeAxis:
     return rrb.archetypes.TimeAxis(link="Independent", view_range=whole_run)
 
 
-def _curve_views(back_projected: bool) -> list[rrb.View]:
+def _curve_views(back_projected: bool) -> list[rrb.View | rrb.Container]:
     """Views of everything that is a curve, what matters most first."""
-    views: list[rrb.View] = [
-        _curves(
-            "Agreement with the final layout",
-            ("/run/coverage", FINAL_SHARE, KNOWN_FINAL_SHARE, FINAL_IOU, SHIFTS),
-            (0.0, 105.0),
+    agreement = "Agreement with the final layout"
+    paths = ("/run/coverage", FINAL_SHARE, KNOWN_FINAL_SHARE, FINAL_IOU, SHIFTS)
+    views: list[rrb.View | rrb.Container] = [
+        rrb.Vertical(
+            _strip(CURVE_NAMES),
+            _curves(f"{agreement}, %", paths, (0.0, 105.0), titlebar=False),
+            row_shares=[NAMES_SHARE, 1 - NAMES_SHARE],
+            name=agreement,
         ),
-        _curves("Area, m²", ("/run/area/**",), legend=False),
+        _curves("Area, m²", ("/run/area/**",)),
     ]
     if back_projected:
-        views.append(_curves("Seen share, %", (f"{SEEN_SHARE}/**",), legend=False))
+        views.append(_curves("Seen share, %", (f"{SEEN_SHARE}/**",)))
     return [*views, _curves("Rooms", ("/run/rooms",)), _curves("Change", ("/run/variation_bits",))]
 
 
 def _curves(
-    name: str, paths: Iterable[str], span: tuple[float, float] | None = None, legend: bool = True
+    name: str, paths: Iterable[str], span: tuple[float, float] | None = None, *, titlebar: bool = True
 ) -> rrb.TimeSeriesView:
     return rrb.TimeSeriesView(
         name=name,
@@ -213,10 +217,12 @@ def _curves(
         contents=list(paths),
         axis_x=_axis(),
         axis_y=None if span is None else rrb.ScalarAxis(range=span),
-        # In the end everything agrees, at the top: this corner is empty.
-        plot_legend=rrb.PlotLegend(visible=legend, corner=rrb.Corner2D.RightBottom),
+        # It would hide much of a small plot.
+        plot_legend=rrb.PlotLegend(visible=False),
+        titlebar=titlebar,
     )
 
 
-def _legend_strip() -> rrb.Spatial2DView:
-    return rrb.Spatial2DView(name="Signs", origin=LEGEND, titlebar=False, background=PAPER)
+def _strip(path: str) -> rrb.Spatial2DView:
+    """Show a strip of a legend, without a title of its own."""
+    return rrb.Spatial2DView(name="Signs", origin=path, titlebar=False, background=PAPER)

@@ -20,8 +20,8 @@ from rose2_logs.drawing.palette import track_color
 from rose2_logs.model.labels import known_window
 from rose2_logs.model.occupancy import UNKNOWN, FloatArray
 from rose2_logs.model.outlines import outer_rings
-from rose2_logs.outputs.rerun.blueprint import PAPER, eye_above
-from rose2_logs.outputs.rerun.world import LABEL_COLOR, OUTLINE_POINTS, OUTLINE_SHADE, lifted
+from rose2_logs.outputs.rerun.blueprint import eye_above
+from rose2_logs.outputs.rerun.world import LABEL_COLOR, OUTLINE_POINTS, OUTLINE_SHADE, PAPER, lifted
 from rose2_logs.system.files import replacing
 from rose2_logs.tracking.registration import RigidMotion
 

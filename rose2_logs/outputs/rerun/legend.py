@@ -5,48 +5,66 @@ from __future__ import annotations
 from collections.abc import Collection
 
 import cv2
-import numpy as np
 import rerun as rr
-from numpy.typing import NDArray
 
 from rose2_logs.drawing.palette import FORMING, SETTLED, SHAPED, TEMPORARY, track_color
 from rose2_logs.drawing.sheet import Key, legend
 from rose2_logs.model.borders import UNSURE_BORDER_BELOW
 from rose2_logs.model.room_quality import UNSURE_BELOW, UNSURE_SIGN
-from rose2_logs.outputs.rerun.world import DOOR_COLOR, PATH_COLOR, ROBOT_COLOR
+from rose2_logs.outputs.rerun.lanes import FINAL_IOU, FINAL_SHARE, KNOWN_FINAL_SHARE, SHIFTS
+from rose2_logs.outputs.rerun.pictures import FILL_OPACITY
+from rose2_logs.outputs.rerun.world import DOOR_COLOR, PAPER, PATH_COLOR, ROBOT_COLOR, Color
 from rose2_logs.system.text import percent
 
-LEGEND, LEGEND_TEXT = "/legend", "/legend_text"
-WIDTH_EM, WIDTH_PX = 68.0, 2400
-"""Width of the strip in sizes of its font, so that all keys stand in one row, and in pixels: sharp also on
-screens with two pixels a point."""
-ROOM_OPACITY, UNSEEN_OPACITY = 0.6, 0.15
-"""Of a room's color where it was seen and where it is predicted."""
+MAP_SIGNS, CURVE_NAMES, LEGEND_TEXT = "/legend/map", "/legend/curves", "/legend/text"
+MAP_WIDTH_EM, CURVES_WIDTH_EM = 58.0, 50.0
+"""Widths of the strips in sizes of their font: what one row of their keys needs."""
+WIDTH_PX = 2000
+"""Width of the strips in pixels: sharp also on screens with two pixels a point."""
+UNSEEN_OPACITY = 0.15
+"""Of a room's color where it is predicted."""
 SAMPLE = 1
 """Track whose color the samples have."""
+CURVES: dict[str, tuple[str, Color]] = {
+    "/run/coverage": ("coverage", (90, 190, 90)),
+    FINAL_SHARE: ("same rooms", (250, 160, 50)),
+    KNOWN_FINAL_SHARE: ("same, where known", (170, 120, 220)),
+    FINAL_IOU: ("overlap", (90, 150, 250)),
+    SHIFTS: ("map shifted", (255, 80, 80)),
+}
+"""Curves of the agreement with the final layout, in percent: what they are called and their colors."""
 
 
 def log_legend(recording: rr.RecordingStream, layers: Collection[str]) -> None:
-    """Log the strip and the text, for a recording with these layers."""
-    done, png = cv2.imencode(".png", cv2.cvtColor(legend_pixels(layers), cv2.COLOR_RGB2BGR))
-    assert done
-    picture = rr.EncodedImage(contents=png.tobytes(), media_type="image/png")
-    recording.log(LEGEND, picture, static=True)
+    """Log the strips and the text, for a recording with these layers."""
+    for path, keys, width_em in (
+        (MAP_SIGNS, map_keys(layers), MAP_WIDTH_EM),
+        (CURVE_NAMES, curve_keys(), CURVES_WIDTH_EM),
+    ):
+        strip = legend(keys, width_em, 1.0)
+        strip.paper = PAPER
+        png = cv2.imencode(".png", cv2.cvtColor(strip.pixels(WIDTH_PX), cv2.COLOR_RGB2BGR))[1].tobytes()
+        recording.log(path, rr.EncodedImage(contents=png, media_type="image/png"), static=True)
     text = rr.TextDocument(legend_text(layers), media_type="text/markdown")
     recording.log(LEGEND_TEXT, text, static=True)
 
 
-def legend_pixels(layers: Collection[str]) -> NDArray[np.uint8]:
-    """Draw the strip (H, W, 3)."""
+def map_keys(layers: Collection[str]) -> list[Key]:
+    """Signs of the map with its rooms."""
     color = track_color(SAMPLE)
-    keys = [Key("room as far as seen: number, area", color, opacity=ROOM_OPACITY)]
+    keys = [Key("room: number, area seen", color, opacity=FILL_OPACITY)]
     if "predicted" in layers:
-        keys.append(Key("predicted, unseen", color, "hatched", UNSEEN_OPACITY))
+        keys.append(Key("predicted", color, "hatched", UNSEEN_OPACITY))
     keys.append(Key("doorway", DOOR_COLOR, "line"))
     if "path" in layers:
         keys += [Key("path", PATH_COLOR, "line"), Key("robot", ROBOT_COLOR, "arrow")]
-    keys.append(Key("unsure: little wall around", kind="sign", sign=f"7{UNSURE_SIGN}"))
-    return legend(keys, WIDTH_EM, 1.0).pixels(WIDTH_PX)
+    keys.append(Key("unsure: few walls", kind="sign", sign=f"7{UNSURE_SIGN}"))
+    return keys
+
+
+def curve_keys() -> list[Key]:
+    """Names of the curves of the agreement."""
+    return [Key(name, color, "cross" if path == SHIFTS else "line") for path, (name, color) in CURVES.items()]
 
 
 def legend_text(layers: Collection[str]) -> str:
@@ -85,7 +103,7 @@ def legend_text(layers: Collection[str]) -> str:
         "- **same rooms**: area of the final rooms that were there already\n"
         "- **same, where known**: the same of the part known at the time\n"
         "- **overlap**: mean overlap of all final rooms\n"
-        "- **red cross**: the whole map shifted",
+        "- **red cross**: the whole map shifted, by a loop closure or trouble of SLAM",
         "**Room history**",
         f"- **{FORMING}**: its shape still differs from the last\n"
         f"- **{SHAPED}**: its shape, the unseen part included, overlaps the last by 0.8\n"

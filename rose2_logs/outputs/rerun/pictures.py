@@ -14,8 +14,8 @@ from rose2_logs.model.labels import known_window
 from rose2_logs.model.occupancy import FloatArray, OccupancySnapshot
 from rose2_logs.outputs.rerun.columns import Picture
 
-FILL_OPACITY = 0.6
-"""Share of a room's color in its cells: the map shows through."""
+FILL_OPACITY = 0.45
+"""Share of a room's color in its cells: the map shows through, and black names can be read."""
 CLUTTER_VALUE = 20
 """Occupancy that cells left out of the clean map are drawn with: they can be seen and do not matter."""
 _VALUES = np.arange(256, dtype=np.uint8)

@@ -19,9 +19,9 @@ from rose2_logs.outputs.rerun.back_projected import BackProjectedWorld
 from rose2_logs.outputs.rerun.blueprint import make_blueprint, view_side_m
 from rose2_logs.outputs.rerun.columns import Entry, Scalar
 from rose2_logs.outputs.rerun.disk import abandon, require_space
-from rose2_logs.outputs.rerun.lanes import FINAL_IOU, FINAL_SHARE, KNOWN_FINAL_SHARE, SHIFTS, TrackLanes
+from rose2_logs.outputs.rerun.lanes import SHIFTS, TrackLanes
 from rose2_logs.outputs.rerun.layers import CHUNK_BYTES, Layers, whole_percent
-from rose2_logs.outputs.rerun.legend import log_legend
+from rose2_logs.outputs.rerun.legend import CURVES, log_legend
 from rose2_logs.outputs.rerun.summary import summary_text
 from rose2_logs.outputs.rerun.world import World
 from rose2_logs.runs.history import RunSummary
@@ -34,26 +34,22 @@ from rose2_logs.tracking.tracked_snapshot import RoomEvent, TrackedSnapshot, map
 logger = logging.getLogger(__name__)
 
 FLUSH_TIMEOUT_S = 60.0
-CURVES = {
-    "/run/coverage": ("coverage, %", (90, 190, 90)),
-    FINAL_SHARE: ("same rooms, %", (250, 160, 50)),
-    KNOWN_FINAL_SHARE: ("same, where known, %", (170, 120, 220)),
-    FINAL_IOU: ("overlap, %", (90, 150, 250)),
+COUNTS = {
     "/run/rooms": ("rooms", (190, 130, 250)),
     "/run/variation_bits": ("variation of information, bits", (250, 100, 100)),
 }
-"""Curves of the whole run: what they are called and their colors."""
-SHIFT_COLOR = (255, 80, 80)
+"""Further curves of the whole run: what they are called and their colors."""
 
 
 class RerunRecording(Sink):
     """Sink that writes a ``.rrd`` with its layout, or shows the run in an open viewer, or both.
 
     Timelines are ``message_log_time`` and ``ros2_timestamp`` (as in Rerun's own MCAP importer), ``snapshot``,
-    and ``coverage_percent``, the greatest so far, rounded down. Rooms stand under ``/world/rooms/TRACK``, their
-    areas under ``/run/area/TRACK``; they are cleared when their track is lost. What has not changed since the
-    snapshot before is not logged again. The lanes of the tracks and the convergence, which only the last map
-    tells, follow at the end; before them the back-projected rooms, in a second pass, if there is one.
+    and ``coverage_percent``, the greatest so far, rounded down. Rooms stand under ``/world/rooms/TRACK``,
+    their areas under ``/run/area/TRACK``; they are cleared when their track is lost. What has not changed
+    since the snapshot before is not logged again. The lanes of the tracks and the convergence, which only
+    the last map tells, follow at the end; before them the back-projected rooms, in a second pass, if there
+    is one.
 
     Parameters
     ----------
@@ -118,12 +114,13 @@ class RerunRecording(Sink):
         self._world = World(self._layers, self._stream, self._wanted, self._name_of)
         self._lanes = TrackLanes(self._stream, self._name_of)
         log_legend(self._stream, self._wanted)
-        for path, (name, color) in CURVES.items():
-            self._stream.log(path, rr.SeriesLines(names=name, colors=[color], widths=2), static=True)
-        jumps = rr.SeriesPoints(
-            names="the map shifted", colors=[SHIFT_COLOR], markers="cross", marker_sizes=8
-        )
-        self._stream.log(SHIFTS, jumps, static=True)
+        for path, (name, color) in (CURVES | COUNTS).items():
+            style = (
+                rr.SeriesPoints(names=name, colors=[color], markers="cross", marker_sizes=8)
+                if path == SHIFTS
+                else rr.SeriesLines(names=name, colors=[color], widths=2)
+            )
+            self._stream.log(path, style, static=True)
 
     def write(self, step: TrackedSnapshot) -> None:
         """Log one snapshot at all its times."""
@@ -161,7 +158,7 @@ class RerunRecording(Sink):
         if self._back_projected is not None:
             self._back_projected.flush()
         self._lanes.log(summary.convergence)
-        text = rr.TextDocument(summary_text(self._info, summary), media_type="text/markdown")
+        text = rr.TextDocument(summary_text(self._info, summary, self._name_of), media_type="text/markdown")
         self._stream.log("/summary", text, static=True)
         if self._maps:
             self._send_blueprint()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 
+from rose2_logs.model.room_names import NameOf, room_name, short_name
 from rose2_logs.model.room_quality import UNSURE_SIGN, is_unsure
 from rose2_logs.runs.history import RunSummary
 from rose2_logs.runs.sink import RunInfo
@@ -17,7 +18,7 @@ _MARKUP = re.compile(r"[\\`*_{}\[\]<>()#!&~$]")
 """What has a meaning in Markdown; after a backslash it has none."""
 
 
-def summary_text(info: RunInfo, summary: RunSummary) -> str:
+def summary_text(info: RunInfo, summary: RunSummary, name_of: NameOf = room_name) -> str:
     """Write the summary of a run as Markdown.
 
     Parameters
@@ -26,12 +27,14 @@ def summary_text(info: RunInfo, summary: RunSummary) -> str:
         The run.
     summary : RunSummary
         What it came to.
+    name_of : callable
+        Name of a room by its track.
     """
     histories, convergence, maps = summary.histories, summary.convergence, summary.totals.snapshots
     minutes = "" if histories.last is None else f", {_duration(histories.last.time_s)}"
     rooms = len(histories.in_last_map)
     text = [
-        f"# {_cell(info.log_path.name)}",
+        f"### {_cell(info.log_path.name)}",
         f"**{counted(rooms, 'room')}** at the end, {len(histories.tracks)} over the run"
         f"{f', {len(convergence.brief)} only briefly' if convergence.brief else ''}; "
         f"{counted(maps, 'map')}{minutes}.",
@@ -50,9 +53,9 @@ def summary_text(info: RunInfo, summary: RunSummary) -> str:
             f" What was known of it was right **from {_percent(known.coverage)} coverage on** "
             f"({_duration(known.time_s)})."
         )
-    text += _worth_a_look(histories)
+    text += _worth_a_look(histories, name_of)
     rows = [
-        "| room | area, m² | first seen | shape final | area final | walls |",
+        "| room | area, m² | first seen | shape right | settled | walls |",
         "|--:|--:|--:|--:|--:|--:|",
     ]
     for track in histories.in_last_map:
@@ -61,14 +64,14 @@ def summary_text(info: RunInfo, summary: RunSummary) -> str:
         settled = convergence.area_settled.get(track)
         walls = "" if history.wall_support is None else _percent(history.wall_support)
         rows.append(
-            f"| {track} | {history.area_m2:.1f} | {_percent(history.first.coverage)} | {_coverage(right)} "
-            f"| {_coverage(settled)} | {walls} |"
+            f"| {_cell(short_name(track, name_of))} | {history.area_m2:.1f} "
+            f"| {_percent(history.first.coverage)} | {_coverage(right)} | {_coverage(settled)} | {walls} |"
         )
     text.append("\n".join(rows))
     text.append(
-        "Percent of coverage: when the room was first seen; when its shape, including the unseen part, first "
-        "overlapped its final shape by 0.8; since when its area has been within 10 % of the final one. "
-        "Walls: share of its outline that is supported by walls. "
+        "Coverage when the room was first seen; when its shape, the unseen part included, first overlapped "
+        "its last by 0.8; from which on its area stayed within 10 % of the last. "
+        "Walls: share of its outline that is supported by walls."
     )
     about = {
         "log": info.origin or info.log_path.name,
@@ -84,13 +87,16 @@ def summary_text(info: RunInfo, summary: RunSummary) -> str:
     return "\n\n".join(text) + "\n"
 
 
-def _worth_a_look(histories: TrackHistories) -> list[str]:
+def _worth_a_look(histories: TrackHistories, name_of: NameOf) -> list[str]:
     """List which rooms are unsure, and where the whole map shifted."""
     lines = []
     shares = [(histories.tracks[track].wall_support, track) for track in histories.in_last_map]
     unsure = sorted((share, track) for share, track in shares if share is not None and is_unsure(share))
     if unsure:
-        named = ", ".join(f"{track}{UNSURE_SIGN} ({_percent(share)})" for share, track in unsure[:NAMED_MOST])
+        named = ", ".join(
+            f"{_cell(short_name(track, name_of))}{UNSURE_SIGN} ({_percent(share)})"
+            for share, track in unsure[:NAMED_MOST]
+        )
         more = f" and {len(unsure) - NAMED_MOST} more" if len(unsure) > NAMED_MOST else ""
         lines.append(f"**Unsure**, with little of the outline supported by walls: room {named}{more}.")
     if histories.largest_shift is not None:

@@ -30,9 +30,11 @@ OUTLINE_POINTS, DOOR_POINTS, PATH_POINTS, LINE_POINTS, THIN_POINTS = 2.0, 4.0, 2
 DOOR_COLOR, PATH_COLOR, ROBOT_COLOR = (230, 90, 20), (20, 90, 200), (200, 20, 60)
 LINE_COLOR, VORONOI_COLOR, DIRECTION_COLOR = (60, 110, 230), (150, 20, 150), (255, 190, 40)
 UNCLUSTERED_COLOR = (130, 130, 130)
-LABEL_COLOR, SPECTRUM_LABEL_COLOR = (12, 12, 16), (255, 255, 255)
-"""Letters on the box that the viewer draws behind them, pale in its light theme, half dark in its dark one: on
-the pale map only near black can be read in both, on the dark spectrum white."""
+LABEL_COLOR, SPECTRUM_LABEL_COLOR = (0, 0, 0), (255, 255, 255)
+"""Letters on the box that the viewer draws behind them, pale in its light theme, half dark in its dark one.
+On the pale map only black can be read in both, on the dark spectrum white."""
+PAPER, DARK = (236, 236, 236), (12, 12, 16)
+"""Ground of the views."""
 STRONG_EDGE, WEAK_EDGE = (20, 20, 90), (80, 165, 235)
 """Edges that walls cover all along, and not at all; distinct also for those who do not see red and green."""
 SURE_BORDER, UNSURE_BORDER = (20, 20, 90), (190, 40, 230)

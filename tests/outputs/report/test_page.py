@@ -110,16 +110,52 @@ def test_it_says_when_each_room_was_seen_where_the_run_was_back_projected(
 
 
 def test_lanes_tell_when_each_room_was_right(office_results: Path, tmp_path: Path):
-    """A room of the last map has settled by then; one that was right later than it came formed before."""
+    """A room of the last map has settled by then; one that was right later than it came formed before.
+
+    One that the last map does not show is only told to have been there.
+    """
     text = write_report(office_results, tmp_path / "report.html").read_text(encoding="utf-8")
     tracks = pq.read_table(office_results / "tracks.parquet").to_pylist()
     signs = {row["track"]: "?" if row["wall_support"] < 0.7 else "" for row in tracks}
     for row in tracks:
         name = f"{row['track']}{signs[row['track']]}"
-        if row["in_last_map"]:
-            assert f"<title>{name}: settled</title>" in text
+        if not row["in_last_map"]:
+            assert f"<title>{name}: not in the last map</title>" in text
+            assert f"<title>{name}: settled</title>" not in text
+            continue
+        assert f"<title>{name}: settled</title>" in text
         right = min(row["shape_right_snapshot"], row["area_settled_snapshot"])
         assert (f"<title>{name}: forming</title>" in text) == (right > row["first_snapshot"])
+
+
+def test_a_room_that_is_gone_in_the_end_never_settled(office_results: Path, tmp_path: Path):
+    """The columns that compare with the last map say nothing of it; its lane is gray."""
+    folder = shutil.copytree(office_results, tmp_path / "office")
+    tracks = pq.read_table(folder / "tracks.parquet")
+    gone = tracks["track"].to_pylist()[-1]
+    in_last = [track != gone for track in tracks["track"].to_pylist()]
+    place = tracks.schema.get_field_index("in_last_map")
+    pq.write_table(tracks.set_column(place, tracks.field(place), [in_last]), folder / "tracks.parquet")
+    page = write_report(folder)
+    rows = {row[0]: row for row in Reader(page).rows("rooms-table")}
+    assert rows[f"Room {gone}"][9:12] == ["–"] * 3
+    assert all("–" not in row[9:12] for name, row in rows.items() if name != f"Room {gone}")
+    titles = set(re.findall(rf"<title>{gone}\??: ([a-z ]+)</title>", page.read_text(encoding="utf-8")))
+    assert titles == {"not in the last map"}
+
+
+def test_curves_mark_a_final_layout_only_where_its_tile_tells_of_one(office_results: Path, tmp_path: Path):
+    """If only the last map is like the last map, the layout is still changing."""
+    folder = shutil.copytree(office_results, tmp_path / "office")
+    summary = json.loads((folder / "summary.json").read_text())
+    rows = pq.read_table(folder / "snapshots.parquet").to_pylist()
+    for row, is_final in ((rows[-1], False), (rows[-2], True)):
+        since = {name: row[name] for name in ("snapshot", "time_s", "coverage")}
+        summary["layout"]["final_since"] = since
+        (folder / "summary.json").write_text(json.dumps(summary))
+        text = write_report(folder, overwrite=True).read_text(encoding="utf-8")
+        assert ("layout final from here on" in text) == is_final
+        assert ("<strong>still changing</strong>" in text) != is_final
 
 
 def test_it_stands_alone(office_results: Path, tmp_path: Path):

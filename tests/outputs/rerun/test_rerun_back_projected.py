@@ -23,7 +23,7 @@ from rose2_logs.tracking.back_projection import BackProjectedRooms, BackProjecte
 from rose2_logs.tracking.registration import RigidMotion
 from rose2_logs.workflows.analyze import RunOptions, RunResult, analyze_log
 
-TIMELINES = ("message_log_time", "ros2_timestamp", "snapshot", "coverage")
+TIMELINES = ("message_log_time", "ros2_timestamp", "snapshot", "coverage_percent")
 CELL_M2 = 0.05**2
 
 

@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 from rerun.chunk import RrdReader
 
 from rose2_logs.outputs.rerun.columns import Label, Picture, Strips
-from rose2_logs.outputs.rerun.layers import Layers
+from rose2_logs.outputs.rerun.layers import Layers, whole_percent
 
-TIMELINES = ("message_log_time", "ros2_timestamp", "snapshot", "coverage")
+TIMELINES = ("message_log_time", "ros2_timestamp", "snapshot", "coverage_percent")
 COMPONENTS = {"/line": "LineStrips3D:strips", "/picture": "GridMap:data", "/label": "Points3D:labels"}
 
 Row = dict[str, int]
@@ -73,7 +73,7 @@ def everything(steps: list[Step], stamps: list[int]) -> dict[str, list[Row]]:
                 "message_log_time": 10 * index,
                 "ros2_timestamp": stamps[index],
                 "snapshot": index,
-                "coverage": furthest[index],
+                "coverage_percent": furthest[index],
                 "order": index,
                 "content": step[layer],
             }
@@ -193,3 +193,11 @@ def test_no_more_rows_wait_than_were_allowed():
     chunks.sort(key=lambda chunk: chunk[1].column("rerun.controls.RowId")[0].as_py())
     rows = [(name, batch.num_rows) for name, batch in chunks]
     assert rows == [("/picture", 6), ("/picture", 3), ("/label", 4), ("/label", 1)]
+
+
+@given(st.floats(0.0, 1.0))
+def test_coverage_in_whole_percent_is_never_too_much(coverage: float):
+    """And less than one percent too little; only the whole is 100."""
+    percent = whole_percent(coverage)
+    assert percent <= 100 * coverage < percent + 1
+    assert (percent == 100) == (100 * coverage >= 100)

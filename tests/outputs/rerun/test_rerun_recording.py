@@ -14,9 +14,20 @@ from commands import wait_for
 from looking import free_port, needs_vulkan
 from saved_maps import save_run
 
+from rose2_logs.config.run_options import RECORDING_LAYERS
+from rose2_logs.drawing.sheet import legend
 from rose2_logs.errors import OutputError
 from rose2_logs.model.borders import UNSURE_BORDER_BELOW
-from rose2_logs.outputs.rerun.world import room_label
+from rose2_logs.outputs.rerun.blueprint import PLAY_S, make_blueprint
+from rose2_logs.outputs.rerun.legend import (
+    CURVES_WIDTH_EM,
+    MAP_WIDTH_EM,
+    curve_keys,
+    legend_text,
+    map_keys,
+)
+from rose2_logs.outputs.rerun.recording import _event_level
+from rose2_logs.outputs.rerun.world import direction_name, room_label
 from rose2_logs.system.text import percent
 from rose2_logs.tracking.registration import RigidMotion
 from rose2_logs.tracking.tracked_snapshot import MAP_TRACK, RoomEvent
@@ -46,7 +57,7 @@ def values(recording: Path, entity: str) -> dict[int, float]:
     for chunk in RrdReader(str(recording)).stream():
         batch = chunk.to_record_batch()
         if str(chunk.entity_path) == entity and {"snapshot", "Scalars:scalars"} <= set(batch.schema.names):
-            assert {"coverage", "message_log_time", "ros2_timestamp"} <= set(batch.schema.names)
+            assert {"coverage_percent", "message_log_time", "ros2_timestamp"} <= set(batch.schema.names)
             rows = zip(
                 batch.column("snapshot").to_pylist(), batch.column("Scalars:scalars").to_pylist(), strict=True
             )
@@ -64,7 +75,7 @@ def test_rerun_finds_the_file_whole(recording):
 def test_the_logged_values_are_those_of_the_tables(result, recording):
     snapshots = pq.read_table(result.folder / "snapshots.parquet").to_pylist()
     coverage = values(recording, "/run/coverage")
-    assert coverage == {row["snapshot"]: pytest.approx(row["coverage"]) for row in snapshots}
+    assert coverage == {row["snapshot"]: pytest.approx(100 * row["coverage"]) for row in snapshots}
     rooms = pq.read_table(result.folder / "rooms.parquet").to_pylist()
     track = rooms[-1]["track"]
     areas = {row["snapshot"]: row["area_m2"] for row in rooms if row["track"] == track}
@@ -73,8 +84,8 @@ def test_the_logged_values_are_those_of_the_tables(result, recording):
 
 def test_how_right_the_layout_was_is_that_of_the_tables(result, recording):
     snapshots = pq.read_table(result.folder / "snapshots.parquet").to_pylist()
-    for figure in ("final_share", "final_iou", "variation_bits"):
-        told = {row["snapshot"]: row[figure] for row in snapshots if row[figure] is not None}
+    for figure, unit in (("final_share", 100), ("final_iou", 100), ("variation_bits", 1)):
+        told = {row["snapshot"]: unit * row[figure] for row in snapshots if row[figure] is not None}
         assert len(told) > 5
         assert values(recording, f"/run/{figure}") == pytest.approx(told)
 
@@ -213,7 +224,45 @@ def test_a_shift_of_the_map_is_told_in_metres_and_degrees():
 
 def test_names_of_rooms_are_short_enough_for_their_place_in_the_view():
     """Number and area in one line; of a room that is small in the view the number; a sign if unsure."""
-    assert room_label(7, 22.4, 40.0) == "7: 22 m²"
-    assert room_label(7, 22.4, 40.0, unsure=True) == "7?: 22 m²"
-    assert room_label(7, 22.4, 40.0, text="51%") == "7: 51%"
-    assert room_label(7, 22.4, 100.0, unsure=True) == "7?"
+    assert room_label("7", 22.4, 40.0) == "7: 22 m²"
+    assert room_label("Kitchen", 22.4, 40.0, unsure=True) == "Kitchen?: 22 m²"
+    assert room_label("7", 22.4, 40.0, text="51%") == "7: 51%"
+    assert room_label("7", 22.4, 100.0, unsure=True) == "7?"
+
+
+@pytest.mark.parametrize(
+    ("angle_deg", "name"),
+    [(0.0, "0.0°"), (179.94, "179.9°"), (179.96, "0.0°"), (180.0, "0.0°"), (-0.01, "0.0°"), (-90.0, "90.0°")],
+)
+def test_directions_of_walls_are_below_half_a_turn(angle_deg: float, name: str):
+    assert direction_name(np.deg2rad(angle_deg)) == f"walls at {name}"
+
+
+def test_only_a_shift_of_the_whole_map_is_a_warning():
+    """Rooms split, merge and go in any run."""
+    levels = {kind: _event_level(RoomEvent(kind, 5, 1)) for kind in ("born", "split", "merged", "lost")}
+    assert set(levels.values()) == {"INFO"}
+    assert _event_level(RoomEvent("shifted", 5, MAP_TRACK)) == "WARN"
+
+
+@pytest.mark.parametrize("layers", [(), ("predicted",), ("path",), RECORDING_LAYERS])
+def test_the_legend_tells_of_what_the_recording_shows(layers):
+    """No sign of a layer that is not there; the strips are one row each."""
+    names = {key.text for key in map_keys(layers)}
+    assert ("predicted" in names) == ("predicted" in layers)
+    assert ("robot" in names) == ("path" in layers)
+    text = legend_text(layers)
+    assert ("hatched" in text) == ("predicted" in layers)
+    assert ("**Spectrum**" in text) == ("spectrum" in layers)
+    for keys, width_em in ((map_keys(layers), MAP_WIDTH_EM), (curve_keys(), CURVES_WIDTH_EM)):
+        assert legend(keys, width_em, 1.0).height == legend(keys[:1], width_em, 1.0).height
+
+
+def test_a_run_opens_on_its_last_map_and_plays_in_some_seconds():
+    """Whatever coverage it begins with."""
+    for first in (0, 28, 100):
+        panel = make_blueprint(np.zeros(2), np.ones(2), first_percent=first).time_panel
+        assert panel.play_state == "following"
+        assert panel.timeline == "coverage_percent"
+        assert (100 - first) / panel.fps <= PLAY_S
+    assert (100 - 28) / make_blueprint(np.zeros(2), np.ones(2), first_percent=28).time_panel.fps == PLAY_S

@@ -35,11 +35,13 @@ def test_the_summary_tells_rooms_and_since_when_they_were_right():
     )
     info = RunInfo(Path("a|b.mcap"), "/map", "rose2", Parameters(), {"tool": "1"}, {})
     text = told(info, histories, convergence, 10)
-    assert text.startswith("# a/b.mcap\n")
+    assert text.startswith("### a/b.mcap\n")
     assert "**1 room** at the end, 2 over the run; 10 maps, 1 min 30 s." in text
     assert "**from 80 % coverage on** (1 min 15 s)" in text
     assert "| 1 | 20.0 | 25 % | 50 % | 100 % | 90 % |" in text
     assert "| version of tool | 1 |" in text
+    summary = RunSummary(RunTotals(snapshots=10), histories, convergence)
+    assert "| Sam's \\<den\\> | 20.0 |" in summary_text(info, summary, {1: "Sam's <den>"}.__getitem__)
     assert "known" not in text
     known = dataclasses.replace(convergence, known_final=SnapshotRef(2, 20.0, 0.4), brief=(2,))
     text = told(info, histories, known, 10)
