@@ -32,7 +32,14 @@ LATCHED_QOS = (
     "  liveliness: 1\n  liveliness_lease_duration:\n    sec: 9223372036\n    nsec: 854775807\n"
     "  avoid_ros_namespace_conventions: false"
 )
-"""Keep last, depth 1, reliable, transient local: how ROS 2 publishes maps, in rosbag2's notation."""
+"""Keep last, depth 1, reliable, transient local: how ROS 2 publishes maps, in rosbag2's numbers."""
+NAMED_LATCHED_QOS = (
+    LATCHED_QOS.replace("history: 1", "history: keep_last")
+    .replace("reliability: 1", "reliability: reliable")
+    .replace("durability: 1", "durability: transient_local")
+    .replace("liveliness: 1", "liveliness: automatic")
+)
+"""The same in the names that rosbag2 writes since version 9."""
 
 
 @dataclass(frozen=True)
@@ -267,7 +274,7 @@ class _Files(CopiedLog):
             if converted is not None:
                 encoding, language, definition = "cdr", "ros2msg", converted
         elif encoding == "cdr":
-            metadata["offered_qos_profiles"] = _qos_of_version_8(metadata.get("offered_qos_profiles", "[]"))
+            metadata["offered_qos_profiles"] = qos_of_version_8(metadata.get("offered_qos_profiles", "[]"))
             if not definition and (known := self._definition(name)) is not None:
                 language, definition = "ros2msg", known
         schema_id = self._schema_ids.setdefault((name, definition), len(self._schema_ids) + 1)
@@ -311,8 +318,8 @@ def _definitions(channels: Sequence[Channel]) -> dict[str, Any]:
     return types
 
 
-def _qos_of_version_8(text: str) -> str:
-    """Quality of service in the older notation that readers of MCAP files expect."""
+def qos_of_version_8(text: str) -> str:
+    """Quality of service as rosbag2 wrote it up to version 8, with numbers; empty if it cannot be read."""
     from rosbags.rosbag2.metadata import dump_qos_v8, parse_qos
 
     try:
