@@ -23,7 +23,7 @@ def read_dxf_plan(path: Path) -> RoomNames:
 
     Raises
     ------
-    ValueError, OSError
+    ValueError
         If it is no DXF that ezdxf can read.
     """
     import ezdxf
@@ -31,7 +31,8 @@ def read_dxf_plan(path: Path) -> RoomNames:
 
     try:
         document = ezdxf.readfile(path)  # type: ignore[attr-defined]
-    except ezdxf.DXFError as error:  # type: ignore[attr-defined]
+    except (ezdxf.DXFError, OSError) as error:  # type: ignore[attr-defined]
+        # Of what is no DXF at all it says so by an OSError.
         raise ValueError(str(error)) from error
     to_m = units.conversion_factor(document.units, units.M) if document.units else 1.0
     space = document.modelspace()
