@@ -219,26 +219,29 @@ def _write_name(painter: MapPainter, room: PlanRoom, shape: BaseGeometry, style:
     """Write name and area of a room where they have room, else its number."""
     if shape.is_empty:
         return
-    circle = shapely.maximum_inscribed_circle(shape, tolerance=0.5)
-    (x, y), radius = shapely.get_coordinates(circle)[0].tolist(), float(shapely.length(circle))
+    x, y = shapely.get_coordinates(shapely.maximum_inscribed_circle(shape, tolerance=0.5))[0].tolist()
+
+    def fits(text: str, size: float) -> bool:
+        half = text_width(text, size) / 2
+        return bool(shape.covers(shapely.box(x - half, y - size, x + half, y + size)))
+
     area, font = area_text(room.area_m2), style.font
     sign = unsure_sign(room.wall_support)
     number, name = f"{room.number}{sign}", f"{room.name}{sign}"
     small = 0.8 * font
-    if not (style.has_names and _fits(area, small, radius, lines=2)):
+    if not (style.has_names and fits(area, small)):
         painter.name(number, x, y, font)
         return
-    painter.name(name if _fits(name, font, radius, lines=2) else number, x, y - 0.5 * font, font)
+    # A name that a person gave is rather written small than left out.
+    if room.given_name and not fits(name, font) and fits(name, small):
+        font = small
+    painter.name(name if fits(name, font) else number, x, y - 0.5 * font, font)
     painter.name(area, x, y + 0.6 * font, small, is_bold=False)
 
 
 def area_text(area_m2: float) -> str:
     """Format an area as in the names of rooms: with a decimal where it is small."""
     return f"{area_m2:.0f} m²" if area_m2 >= 10 else f"{area_m2:.1f} m²"
-
-
-def _fits(text: str, font: float, radius: float, lines: int) -> bool:
-    return bool(np.hypot(text_width(text, font), lines * font) <= 2 * radius)
 
 
 def _add_legend(painter: MapPainter, plan: RoomPlan, style: PlanStyle, *, has_predicted: bool) -> None:

@@ -100,6 +100,22 @@ def test_drawing_programs_find_each_room_and_each_kind_of_thing():
     assert not any(each.get("id") for each in inline.iter())
 
 
+def test_names_are_written_where_they_have_room():
+    """Along a corridor too; where a given name is too long, it is written smaller, then the number."""
+
+    def written(room: PlanRoom) -> dict[str, float]:
+        plan = RoomPlan("t", "map", (room,), ())
+        bounds = (0.0, 0.0, 20.0, 20.0)
+        texts = [each for each in draw_plan(plan, FIGURE, bounds).shapes if isinstance(each, Text)]
+        return {each.text: each.size for each in texts if each.y < 780}
+
+    corridor = PlanRoom(7, shapely.box(1, 9, 19, 10), 18.0, None, (), given_name="A long corridor")
+    assert written(corridor)["A long corridor"] == FIGURE.font
+    box = PlanRoom(7, shapely.box(5, 5, 7.4, 8), 7.2, None, (), given_name="Registry of all")
+    assert written(box)["Registry of all"] < FIGURE.font
+    assert "7" in written(dataclasses.replace(box, given_name="Registry of all the deeds"))
+
+
 def test_unsure_rooms_are_marked_and_the_legend_says_so():
     """A sign behind the number of a room with little wall support, also in small pictures."""
     plan = two_rooms_plan()
