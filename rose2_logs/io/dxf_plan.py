@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import shapely
+from shapely.geometry.base import BaseGeometry
 
 from rose2_logs.model.room_names import RoomNames
 
@@ -28,35 +29,44 @@ def read_dxf_plan(path: Path) -> RoomNames:
     """
     import ezdxf
     from ezdxf import units
+    from ezdxf.entities import LWPolyline, MText, Polyline, Text
 
     try:
         document = ezdxf.readfile(path)  # type: ignore[attr-defined]
     except (ezdxf.DXFError, OSError) as error:  # type: ignore[attr-defined]
         # Of what is no DXF at all it says so by an OSError.
         raise ValueError(str(error)) from error
-    to_m = units.conversion_factor(document.units, units.M) if document.units else 1.0
-    space = document.modelspace()
-    rings = []
-    for line in space.query("LWPOLYLINE POLYLINE"):
-        points = [
-            point[:2] for point in (line.vertices() if line.dxftype() == "LWPOLYLINE" else line.points())
-        ]
-        is_closed = bool(line.closed if line.dxftype() == "LWPOLYLINE" else line.is_closed)
-        if is_closed and len(points) >= 3:
-            rings.append(shapely.make_valid(shapely.Polygon(np.array(points, float) * to_m)))
+    to_m = 1.0
+    if document.units:
+        to_m = units.conversion_factor(units.InsertUnits(document.units), units.InsertUnits.Meters)
+    outlines = []
     texts = []
-    for text in space.query("TEXT MTEXT"):
-        name = " ".join((text.plain_text() if text.dxftype() == "MTEXT" else text.dxf.text).split())
-        if not NO_NAME.fullmatch(name):
-            height = text.dxf.char_height if text.dxftype() == "MTEXT" else text.dxf.height
-            at = text.dxf.insert if text.dxftype() == "MTEXT" else text.get_placement()[1]
-            texts.append((height, at[1], at[0], name))
-    outlines = np.array(rings, object)
-    areas = shapely.area(outlines)
+    for entity in document.modelspace():
+        match entity:
+            case LWPolyline() if entity.closed:
+                outlines.append(_outline([(x, y) for x, y, *_ in entity.get_points()], to_m))
+            case Polyline() if entity.is_closed:
+                outlines.append(_outline([(x, y) for x, y, _ in entity.points()], to_m))
+            case Text():
+                _, at, _ = entity.get_placement()
+                texts.append((entity.dxf.height, at.y, at.x, entity.plain_text()))
+            case MText():
+                at = entity.dxf.insert
+                texts.append((entity.dxf.char_height, at.y, at.x, entity.plain_text()))
+    shapes = np.array(outlines, object)
+    areas = shapely.area(shapes)
     named: dict[int, str] = {}
     # The last one that is put down stays.
-    for _, y, x, name in sorted(texts):
-        around = np.flatnonzero(shapely.contains_xy(outlines, x * to_m, y * to_m))
-        if len(around):
+    for _, y, x, text in sorted(texts):
+        name = " ".join(text.split())
+        around = np.flatnonzero((areas > 0) & shapely.contains_xy(shapes, x * to_m, y * to_m))
+        if len(around) and not NO_NAME.fullmatch(name):
             named[int(around[areas[around].argmin()])] = name
-    return RoomNames({}, tuple(rings[place] for place in named), tuple(named.values()))
+    return RoomNames({}, tuple(outlines[place] for place in named), tuple(named.values()))
+
+
+def _outline(points: list[tuple[float, float]], to_m: float) -> BaseGeometry:
+    """Polygon of the corners of a closed line; empty where they are fewer than three."""
+    if len(points) < 3:
+        return shapely.Polygon()
+    return shapely.make_valid(shapely.Polygon(np.array(points, float) * to_m))

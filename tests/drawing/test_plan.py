@@ -111,7 +111,7 @@ def test_names_are_written_where_they_have_room():
 
     corridor = PlanRoom(7, shapely.box(1, 9, 19, 10), 18.0, None, (), given_name="A long corridor")
     assert written(corridor)["A long corridor"] == FIGURE.font
-    box = PlanRoom(7, shapely.box(5, 5, 7.4, 8), 7.2, None, (), given_name="Registry of all")
+    box = PlanRoom(7, shapely.box(5, 5, 7.1, 8), 6.3, None, (), given_name="Registry of all")
     assert written(box)["Registry of all"] < FIGURE.font
     assert "7" in written(dataclasses.replace(box, given_name="Registry of all the deeds"))
 
