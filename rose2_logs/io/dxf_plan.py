@@ -29,7 +29,11 @@ def read_dxf_plan(path: Path) -> RoomNames:
     """
     import ezdxf
     from ezdxf import units
-    from ezdxf.entities import LWPolyline, MText, Polyline, Text
+    from ezdxf.entities.lwpolyline import LWPolyline
+    from ezdxf.entities.mtext import MText
+    from ezdxf.entities.polyline import Polyline
+    from ezdxf.entities.text import Text
+    from ezdxf.enums import InsertUnits
 
     try:
         document = ezdxf.readfile(path)  # type: ignore[attr-defined]
@@ -38,7 +42,7 @@ def read_dxf_plan(path: Path) -> RoomNames:
         raise ValueError(str(error)) from error
     to_m = 1.0
     if document.units:
-        to_m = units.conversion_factor(units.InsertUnits(document.units), units.InsertUnits.Meters)
+        to_m = units.conversion_factor(InsertUnits(document.units), InsertUnits.Meters)
     outlines = []
     texts = []
     for entity in document.modelspace():
@@ -52,7 +56,7 @@ def read_dxf_plan(path: Path) -> RoomNames:
                 texts.append((entity.dxf.height, at.y, at.x, entity.plain_text()))
             case MText():
                 at = entity.dxf.insert
-                texts.append((entity.dxf.char_height, at.y, at.x, entity.plain_text()))
+                texts.append((entity.dxf.char_height, at.y, at.x, " ".join(entity.plain_text(split=True))))
     shapes = np.array(outlines, object)
     areas = shapely.area(shapes)
     named: dict[int, str] = {}
