@@ -324,8 +324,8 @@ class RunOptions:
     )
     base_frame: str | None = option(
         None,
-        "Frame of the robot's base, whose way the recording shows. By default base_link, base_footprint or "
-        "the like, or the only frame below odom.",
+        "Frame of the robot's base, whose way the recording and the annotated MCAP show. By default "
+        "base_link, base_footprint or the like, or the only frame below odom.",
         panel=OUTPUTS,
         commands=BOTH,
         metavar="NAME",

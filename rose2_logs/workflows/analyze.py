@@ -210,7 +210,7 @@ def _follow(
         reader,
         workers,
         parameters,
-        with_path="path" in options.shown_layers,
+        with_path="path" in options.shown_layers or options.annotated_log,
         base_frame=options.base_frame,
     )
     store = RunStore(folder, parameters.occupancy, back_project=options.back_project)

@@ -13,7 +13,7 @@ import pytest
 from commands import started, wait_for
 
 PROGRAMS = Path(os.environ["ROSE2_LOGS_PROGRAMS"]) if os.environ.get("ROSE2_LOGS_PROGRAMS") else None
-"""Folder of what `.ci/look` installs beside the system's own programs; None where it does not run the tests."""
+"""Folder of what `.ci/look` installs beside the system's own programs; None elsewhere than there."""
 SCREEN_PX = (1600, 900)
 
 
@@ -41,7 +41,16 @@ def screen(size_px: tuple[int, int] = SCREEN_PX) -> Iterator[dict[str, str]]:
     """Start an X server without a monitor; give the environment for programs that draw on it."""
     (server,) = needed("Xvfb")
     read, write = os.pipe()
-    command = (server, "-displayfd", str(write), "-screen", "0", "{}x{}x24".format(*size_px), "-nolisten", "tcp")
+    command = (
+        server,
+        "-displayfd",
+        str(write),
+        "-screen",
+        "0",
+        "{}x{}x24".format(*size_px),
+        "-nolisten",
+        "tcp",
+    )
     with started(*command, pass_fds=(write,)), os.fdopen(read) as told:
         os.close(write)
         display = wait_for(told.readline).strip()

@@ -13,6 +13,7 @@ from typing import IO, Any
 from mcap.exceptions import McapError
 
 from rose2_logs.drawing.extent import Extent
+from rose2_logs.drawing.robot_trail import RobotTrail
 from rose2_logs.errors import OutputError
 from rose2_logs.io import open_source
 from rose2_logs.io.mcap.index import DAMAGE
@@ -27,8 +28,8 @@ from rose2_logs.outputs.mcap.input import (
     CopiedMessage,
     copied_log,
 )
-from rose2_logs.outputs.mcap.ros_messages import ROOMS_TYPE, MessageMaker
-from rose2_logs.outputs.mcap.viewer_layouts import MapScene, bag_metadata_path, write_layouts
+from rose2_logs.outputs.mcap.ros_messages import ROOMS_TYPE, MarkerSizes, MessageMaker
+from rose2_logs.outputs.mcap.viewer_layouts import MapScene, bag_metadata_path, view_height_m, write_layouts
 from rose2_logs.outputs.mcap.writer import McapWriter
 from rose2_logs.runs.history import RunSummary
 from rose2_logs.runs.sink import RunInfo, Sink
@@ -93,6 +94,7 @@ class AnnotatedMcap(Sink):
         self._opened_source: MessageSource | None = None
         self._is_bag = is_bag
         self._extent = Extent()
+        self._trail = RobotTrail()
         self._frame_id = ""
         self._file: IO[bytes] | None = None
         self.facts: dict[str, Any] = {}
@@ -138,8 +140,8 @@ class AnnotatedMcap(Sink):
         for record in log.metadata():
             self._writer.add_metadata(record.name, record.metadata)
         # The quality of service of the source map, as its ROS distribution writes it.
-        qos = map_metadata.get("offered_qos_profiles", "[]")
-        self._qos = qos if qos.strip() not in ("", "[]") else LATCHED_QOS
+        self._map_qos = map_metadata.get("offered_qos_profiles", "")
+        self._qos = self._map_qos if self._map_qos.strip() not in ("", "[]") else LATCHED_QOS
         self._added = {topic: self._add_channel(topic, kind) for topic, kind in ADDED.items()}
         self._own_map = self._map_channel()
         self._writer.add_metadata(
@@ -151,7 +153,10 @@ class AnnotatedMcap(Sink):
         assert self._source is not None
         is_built = self._source.recorded is not self._source
         is_empty = not self._log.channels() and self._log.profile == "ros2" and not self._has_messages()
-        return self._add_channel(self._info.topic, GRID_TYPE) if is_built or is_empty else None
+        if not is_built and not is_empty:
+            return None
+        self._map_qos = self._qos
+        return self._add_channel(self._info.topic, GRID_TYPE)
 
     def _has_messages(self) -> bool:
         self._waiting = next(self._items, None)
@@ -163,13 +168,15 @@ class AnnotatedMcap(Sink):
         assert source is not None  # it was opened by `begin`
         time_ns = source.recorded_ns(step.snapshot.log_time_ns)
         self._extent.add(step)
+        self._trail.add(step.path)
+        sizes = MarkerSizes.of_view(view_height_m(self._extent.low_m, self._extent.high_m, aspect=1.0))
         self._frame_id = step.analysis.geometry.frame_id
         with self._writing():
             self._copy_until(time_ns)
             messages = {
                 "/rose2/segmented_map": self._maker.segmented_map(step),
                 "/rose2/clean_map": self._maker.clean_map(step),
-                "/rose2/markers": self._maker.markers(step),
+                "/rose2/markers": self._maker.markers(step, self._trail.pieces_m, sizes),
                 "/rose2/rooms": self._maker.rooms(step),
             }
             if self._own_map is not None:
@@ -196,7 +203,9 @@ class AnnotatedMcap(Sink):
     def _describe(self) -> None:
         """Write the layouts for viewers and, if wanted, the bag's description."""
         extent = self._extent
-        scene = MapScene(self._frame_id, self._info.topic, extent.low_m, extent.high_m, self._qos)
+        scene = MapScene(
+            self._frame_id, self._info.topic, extent.low_m, extent.high_m, self._map_qos, self._qos
+        )
         write_layouts(self._path, scene)
         if self._is_bag:
             write_bag_metadata(self._path, bag_metadata_path(self._path))

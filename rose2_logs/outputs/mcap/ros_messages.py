@@ -28,6 +28,7 @@ ROOMS_DEFINITION = """\
 # The rooms of one map snapshot, found by rose2_logs.
 std_msgs/Header header      # stamp and frame of the map
 float64 coverage            # known free area over that of the run's last map, 0..1
+uint32 count                # number of rooms
 rose2_msgs/Room[] rooms
 """
 ROOM_DEFINITION = """\
@@ -40,19 +41,24 @@ uint32[] neighbors         # tracks of the rooms that a doorway connects it with
 """
 WRITTEN_TYPES = ("nav_msgs/msg/OccupancyGrid", "visualization_msgs/msg/MarkerArray", ROOMS_TYPE)
 HIGHEST_VALUE = 98
-"""A room has the value 1 + (track - 1) % 98 in `/rose2/segmented_map`: between free, 0, and occupied, 100."""
+"""Rooms have the values 1..98 in `/rose2/segmented_map`: between free, 0, and occupied, 100."""
+VALUE_STEP = 37
+"""From one track's value to the next one's, modulo 98: viewers draw values as shades, and neighboring rooms
+often have neighboring tracks. It has no factor in common with 98, so the first 98 tracks differ."""
 FILL_OPACITY = 0.45
-LABEL_HEIGHT_M = 0.5
-OUTLINE_WIDTH_M = 0.06
-LINE_WIDTH_M = 0.03
-MARKER_LAYERS = ("rooms", "lines", "walls", "outlines", "doorways", "unsure_borders", "labels")
+MARKER_LAYERS = ("rooms", "lines", "walls", "outlines", "path", "doorways", "unsure_borders", "labels")
 """Namespaces of markers, the lowest first."""
+VIEW_PX = 700
+"""Height in pixels of the view that the next ones are meant for: that of a window on a laptop's screen."""
+LABEL_PX, OUTLINE_PX, LINE_PX, DOORWAY_PX, PATH_PX = 14, 1.5, 1.0, 4.0, 2.0
+"""Height of labels and widths of lines where a whole building fills this view."""
 LAYER_STEP_M = 0.01
 DEFAULT_OCCUPANCY = OccupancyParameters()
 TOUCH_M = 1e-3
 """How much a shape is widened that cannot be triangulated as it is: far less than a cell."""
 ADD, DELETE_ALL = 0, 3
-LINE_LIST, TEXT, TRIANGLES = 5, 9, 11
+LINE_STRIP, LINE_LIST, TEXT, TRIANGLES = 4, 5, 9, 11
+PATH_COLOR = (0.0, 0.35, 0.75, 1.0)
 NO_TURN = (0.0, 0.0, 0.0, 1.0)
 """Quaternion x, y, z, w."""
 
@@ -101,6 +107,40 @@ def _type_name(kind: Any) -> str:
     )
 
 
+@dataclass(frozen=True)
+class MarkerSizes:
+    """Sizes of markers, in meters: viewers draw them in the scale of the map.
+
+    Attributes
+    ----------
+    label_m : float
+        Height of labels.
+    outline_m, line_m, doorway_m, path_m : float
+        Widths of lines: of rooms and walls, of representative lines, of doorways, of the robot's path.
+    """
+
+    label_m: float = 0.5
+    outline_m: float = 0.06
+    line_m: float = 0.03
+    doorway_m: float = 0.15
+    path_m: float = 0.06
+
+    @classmethod
+    def of_view(cls, height_m: float) -> Self:
+        """Sizes to be seen in a view of `VIEW_PX` rows that shows a whole building, but no smaller ones."""
+        pixel_m = height_m / VIEW_PX
+        return cls(
+            label_m=max(cls.label_m, LABEL_PX * pixel_m),
+            outline_m=max(cls.outline_m, OUTLINE_PX * pixel_m),
+            line_m=max(cls.line_m, LINE_PX * pixel_m),
+            doorway_m=max(cls.doorway_m, DOORWAY_PX * pixel_m),
+            path_m=max(cls.path_m, PATH_PX * pixel_m),
+        )
+
+
+SMALLEST_SIZES = MarkerSizes()
+
+
 class MessageMaker:
     """Makes the serialized messages of a snapshot.
 
@@ -128,7 +168,7 @@ class MessageMaker:
 
     def segmented_map(self, step: TrackedSnapshot) -> bytearray:
         """Make the segmented map: rooms as 1..98, occupied 100, other free cells 0, all others -1."""
-        values = np.array([0, *(1 + (track - 1) % HIGHEST_VALUE for track in step.track_ids)], np.int8)
+        values = np.array([0, *map(room_value, step.track_ids)], np.int8)
         labels = step.analysis.rooms.labels
         # The probabilities that some maps contain would look like rooms.
         known = np.ascontiguousarray(step.snapshot.cells).view(np.uint8)
@@ -151,7 +191,7 @@ class MessageMaker:
         message = CdrWriter()
         message.header(step.snapshot.stamp_ns, step.analysis.geometry.frame_id)
         message.numbers("d", step.coverage)
-        message.numbers("I", len(rooms))
+        message.numbers("I", len(rooms), len(rooms))  # the count, and the length of the sequence
         points = np.nan_to_num(rooms.label_points_m).tolist()
         for track, number in sorted(zip(tracks, range(1, len(rooms) + 1), strict=True)):
             shape = rooms.polygons[number - 1]
@@ -166,8 +206,23 @@ class MessageMaker:
             message.sequence(np.array(neighbors, np.uint32))
         return message.message()
 
-    def markers(self, step: TrackedSnapshot) -> bytearray:
-        """Make the markers: delete the old ones, then fills, outlines, labels, walls, lines, doorways."""
+    def markers(
+        self,
+        step: TrackedSnapshot,
+        path_m: Sequence[FloatArray] = (),
+        sizes: MarkerSizes = SMALLEST_SIZES,
+    ) -> bytearray:
+        """Make the markers: delete the old ones, then rooms, walls, lines, doorways and the robot's path.
+
+        Parameters
+        ----------
+        step : TrackedSnapshot
+            The map.
+        path_m : sequence of (N, 2) float
+            Where the robot has been up to then, world meters, in pieces.
+        sizes : MarkerSizes
+            Widths of lines and height of labels.
+        """
         analysis, rooms = step.analysis, step.analysis.rooms
         markers = [Marker("", 0, TRIANGLES, action=DELETE_ALL)]
         points = np.nan_to_num(rooms.label_points_m).tolist()
@@ -185,28 +240,33 @@ class MessageMaker:
                     LINE_LIST,
                     ring_segments(rooms.outer_rings_m[number]),
                     line,
-                    OUTLINE_WIDTH_M,
+                    sizes.outline_m,
                 ),
                 Marker(
                     "labels",
                     track,
                     TEXT,
                     color=(0.0, 0.0, 0.0, 1.0),
-                    width_m=LABEL_HEIGHT_M,
+                    width_m=sizes.label_m,
                     text=f"{track}{sign}\n{rooms.areas_m2[number]:.0f} m2",
                     position_m=(x, y),
                 ),
             ]
         if analysis.walls is not None:
             walls, lines = analysis.walls.segments_m.reshape(-1, 2), analysis.walls.lines_m.reshape(-1, 2)
-            markers.append(Marker("walls", 0, LINE_LIST, walls, (0.1, 0.1, 0.1, 1.0), OUTLINE_WIDTH_M))
-            markers.append(Marker("lines", 0, LINE_LIST, lines, (0.2, 0.4, 0.9, 0.35), LINE_WIDTH_M))
+            markers.append(Marker("walls", 0, LINE_LIST, walls, (0.1, 0.1, 0.1, 1.0), sizes.outline_m))
+            markers.append(Marker("lines", 0, LINE_LIST, lines, (0.2, 0.4, 0.9, 0.35), sizes.line_m))
         for name, doors, color in (
             ("doorways", rooms.doorways, (0.9, 0.3, 0.1, 1.0)),
             ("unsure_borders", analysis.unsure_doorways, (0.6, 0.15, 0.8, 1.0)),
         ):
             ends = np.array([door.ends_m for door in doors]).reshape(-1, 2)
-            markers.append(Marker(name, 0, LINE_LIST, ends, color, OUTLINE_WIDTH_M))
+            markers.append(Marker(name, 0, LINE_LIST, ends, color, sizes.doorway_m))
+        markers += [
+            Marker("path", number, LINE_STRIP, points_m, PATH_COLOR, sizes.path_m)
+            for number, points_m in enumerate(path_m)
+            if len(points_m) > 1  # a line of one point is an error in RViz
+        ]
         # At different heights, so that layers do not flicker through each other or through the map.
         heights = {name: LAYER_STEP_M * (layer + 1) for layer, name in enumerate(MARKER_LAYERS)}
         message = CdrWriter()
@@ -301,6 +361,11 @@ class Marker:
         message.written(shared.after_text, 4)
 
 
+def room_value(track: int) -> int:
+    """Value of a room's cells in the segmented map; tracks that differ by a multiple of 98 share one."""
+    return 1 + VALUE_STEP * (track - 1) % HIGHEST_VALUE
+
+
 def _grid(step: TrackedSnapshot, cells: NDArray[np.int8]) -> bytearray:
     """Make a nav_msgs/OccupancyGrid with the stamp and the geometry of the map."""
     geometry, stamp_ns = step.analysis.geometry, step.snapshot.stamp_ns
@@ -338,7 +403,9 @@ class Triangles:
 
 
 def _triangulated(parts: NDArray[np.object_]) -> list[FloatArray]:
-    """Corners (3 K, 2) of the triangles of each polygon.
+    """Corners (3 K, 2) of the triangles of each polygon, counterclockwise.
+
+    RViz lights the front of a triangle, which is where its corners go around counterclockwise: from above.
 
     GEOS fails on some cell outlines in which a ring touches itself at a corner. Slightly widened, they touch
     along a line instead, and GEOS succeeds.
@@ -351,7 +418,7 @@ def _triangulated(parts: NDArray[np.object_]) -> list[FloatArray]:
         wider = shapely.buffer(parts, TOUCH_M, join_style="mitre")
         found = shapely.constrained_delaunay_triangles(wider)
     triangles, part = shapely.get_parts(found, return_index=True)
-    corners = shapely.get_coordinates(triangles).reshape(-1, 4, 2)[:, :3]
+    corners = shapely.get_coordinates(shapely.orient_polygons(triangles)).reshape(-1, 4, 2)[:, :3]
     ends = np.cumsum(np.bincount(part, minlength=len(parts)))
     return [each.reshape(-1, 2) for each in np.split(corners, ends[:-1])] if len(parts) else []
 

@@ -18,8 +18,10 @@ MARGIN = 1.1
 RVIZ_VIEW_PX = (1100, 850)
 """Width and height of RViz's 3D view in the window that the configuration asks for."""
 RVIZ_WINDOW_PX = (1500, 950)
-FOXGLOVE_ASPECT = 1.3
-"""Width over height of Foxglove's large panel in a typical window."""
+FOXGLOVE_ASPECT = 1.0
+"""Width over height of Foxglove's large panel in a window of 1600 x 900 points with the sidebar."""
+FOXGLOVE_SMALL_ASPECT = 0.9
+"""The same of its small panel for the clean map."""
 MAP_ALPHA = 0.7
 TRANSIENT_LOCAL, VOLATILE = "Transient Local", "Volatile"
 RELIABLE, BEST_EFFORT = "Reliable", "Best Effort"
@@ -37,14 +39,17 @@ class MapScene:
         Topic of the map.
     low_m, high_m : (2,) float
         Corners of the area to show, meters.
+    map_qos : str
+        Quality of service that the map is offered with, in rosbag2's notation; empty if it is not known.
     qos : str
-        Quality of service that all these topics are offered with, in rosbag2's notation.
+        The same of the added topics.
     """
 
     frame_id: str
     map_topic: str
     low_m: FloatArray
     high_m: FloatArray
+    map_qos: str
     qos: str
 
     @property
@@ -55,8 +60,13 @@ class MapScene:
 
     def height_m(self, aspect: float) -> float:
         """Height of the smallest view with a given width over height that shows everything."""
-        width, height = self.high_m - self.low_m
-        return MARGIN * float(max(width / aspect, height, 1.0))
+        return view_height_m(self.low_m, self.high_m, aspect)
+
+
+def view_height_m(low_m: FloatArray, high_m: FloatArray, aspect: float) -> float:
+    """Height of the smallest view with a given width over height that shows a rectangle with some margin."""
+    width, height = high_m - low_m
+    return MARGIN * float(max(width / aspect, height, 1.0))
 
 
 def foxglove_path(log: Path) -> Path:
@@ -107,10 +117,10 @@ def foxglove_layout(scene: MapScene) -> dict[str, Any]:
     }
     return {
         "configById": {
-            "3D!rooms": _foxglove_world("Rooms", scene, rooms),
-            "3D!clean": _foxglove_world("Clean map", scene, clean),
+            "3D!rooms": _foxglove_world("Rooms", scene, rooms, FOXGLOVE_ASPECT),
+            "3D!clean": _foxglove_world("Clean map", scene, clean, FOXGLOVE_SMALL_ASPECT),
             "Plot!coverage": _foxglove_plot("Coverage", "/rose2/rooms.coverage"),
-            "Plot!rooms": _foxglove_plot("Number of rooms", "/rose2/rooms.rooms.length"),
+            "Plot!rooms": _foxglove_plot("Number of rooms", "/rose2/rooms.count"),
         },
         "globalVariables": {},
         "userNodes": {},
@@ -134,7 +144,7 @@ def foxglove_layout(scene: MapScene) -> dict[str, Any]:
     }
 
 
-def _foxglove_world(title: str, scene: MapScene, topics: dict[str, Any]) -> dict[str, Any]:
+def _foxglove_world(title: str, scene: MapScene, topics: dict[str, Any], aspect: float) -> dict[str, Any]:
     x, y = scene.center_m
     return {
         "foxglovePanelTitle": title,
@@ -143,7 +153,7 @@ def _foxglove_world(title: str, scene: MapScene, topics: dict[str, Any]) -> dict
             "perspective": False,
             "phi": 0,
             "thetaOffset": 0,
-            "distance": scene.height_m(FOXGLOVE_ASPECT),
+            "distance": scene.height_m(aspect),
             "target": [0, 0, 0],
             "targetOffset": [x, y, 0],
             "targetOrientation": [0, 0, 0, 1],
@@ -153,7 +163,11 @@ def _foxglove_world(title: str, scene: MapScene, topics: dict[str, Any]) -> dict
         },
         "followMode": "follow-none",
         "followTf": scene.frame_id,
-        "scene": {"labelScaleFactor": 1, "transforms": {"showLabel": False, "axisScale": 0.5}},
+        "scene": {
+            "labelScaleFactor": 1,
+            # Without the line from each frame to its parent, which crosses the plan.
+            "transforms": {"showLabel": False, "axisScale": 0.5, "lineWidth": 0},
+        },
         "transforms": {},
         "topics": topics,
         "layers": {},
@@ -178,15 +192,15 @@ def rviz_config(scene: MapScene) -> dict[str, Any]:
     x, y = scene.center_m
     width, height = RVIZ_VIEW_PX
     displays = [
-        _rviz_map("Map", scene.map_topic, scene, is_on=True),
-        _rviz_map("Clean map", "/rose2/clean_map", scene, is_on=False),
-        _rviz_map("Segmented map", "/rose2/segmented_map", scene, is_on=False, colors="costmap"),
+        _rviz_map("Map", scene.map_topic, scene.map_qos, is_on=True),
+        _rviz_map("Clean map", "/rose2/clean_map", scene.qos, is_on=False),
+        _rviz_map("Segmented map", "/rose2/segmented_map", scene.qos, is_on=False, colors="costmap"),
         {
             "Class": "rviz_default_plugins/MarkerArray",
             "Name": "Rooms",
             "Enabled": True,
             "Namespaces": dict.fromkeys(MARKER_LAYERS, True),
-            "Topic": _rviz_topic("/rose2/markers", scene),
+            "Topic": _rviz_topic("/rose2/markers", scene.qos),
             "Value": True,
         },
         {
@@ -201,11 +215,8 @@ def rviz_config(scene: MapScene) -> dict[str, Any]:
         },
     ]
     return {
-        "Panels": [
-            {"Class": "rviz_common/Displays", "Name": "Displays"},
-            {"Class": "rviz_common/Views", "Name": "Views"},
-            {"Class": "rviz_common/Time", "Name": "Time"},
-        ],
+        # Further panels, Time above all, would be docked on the same side and leave no room for the view.
+        "Panels": [{"Class": "rviz_common/Displays", "Name": "Displays"}],
         "Visualization Manager": {
             "Class": "",
             "Displays": displays,
@@ -239,7 +250,7 @@ def rviz_config(scene: MapScene) -> dict[str, Any]:
     }
 
 
-def _rviz_map(name: str, topic: str, scene: MapScene, *, is_on: bool, colors: str = "map") -> dict[str, Any]:
+def _rviz_map(name: str, topic: str, qos: str, *, is_on: bool, colors: str = "map") -> dict[str, Any]:
     return {
         "Class": "rviz_default_plugins/Map",
         "Name": name,
@@ -247,16 +258,16 @@ def _rviz_map(name: str, topic: str, scene: MapScene, *, is_on: bool, colors: st
         "Alpha": MAP_ALPHA,
         "Color Scheme": colors,
         "Draw Behind": True,
-        "Topic": _rviz_topic(topic, scene),
-        "Update Topic": _rviz_topic(f"{topic}_updates", scene),
+        "Topic": _rviz_topic(topic, qos),
+        "Update Topic": _rviz_topic(f"{topic}_updates", qos),
         "Use Timestamp": False,
         "Value": is_on,
     }
 
 
-def _rviz_topic(topic: str, scene: MapScene) -> dict[str, Any]:
+def _rviz_topic(topic: str, qos: str) -> dict[str, Any]:
     """Request exactly the quality of service that is offered: requesting more gets no messages."""
-    durability, reliability = offered(scene.qos)
+    durability, reliability = offered(qos)
     return {
         "Depth": 1,
         "Durability Policy": durability,
@@ -269,7 +280,8 @@ def _rviz_topic(topic: str, scene: MapScene) -> dict[str, Any]:
 def offered(qos: str) -> tuple[str, str]:
     """Durability and reliability of a topic, in RViz's notation, from rosbag2's list of its publishers.
 
-    Up to the release Iron they are numbers of rmw: 1 is transient local and reliable.
+    Where that does not say, rosbag2 plays the topic as volatile and reliable, the default of ROS 2. Up to the
+    release Iron they are numbers of rmw: 1 is transient local and reliable.
     """
     try:
         profiles = yaml.safe_load(qos)
@@ -277,6 +289,6 @@ def offered(qos: str) -> tuple[str, str]:
         profiles = None
     if not isinstance(profiles, list) or not all(isinstance(each, dict) for each in profiles):
         profiles = []
-    durable = all(each.get("durability") in (1, "transient_local") for each in profiles)
+    durable = len(profiles) > 0 and all(each.get("durability") in (1, "transient_local") for each in profiles)
     reliable = all(each.get("reliability") in (1, "reliable") for each in profiles)
     return TRANSIENT_LOCAL if durable else VOLATILE, RELIABLE if reliable else BEST_EFFORT

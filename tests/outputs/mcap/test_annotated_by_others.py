@@ -99,7 +99,7 @@ def test_foxgloves_packages_read_every_message_and_every_marker(tmp_path, node_p
     assert found["profile"] == "ros2"
     assert found["messages"] == messages
     assert set(found["markers"]) == {
-        *("", "rooms", "outlines", "labels", "walls", "lines", "doorways", "unsure_borders")
+        *("", "rooms", "outlines", "labels", "walls", "lines", "doorways", "unsure_borders", "path")
     }
     for name, told in markers.items():
         assert found["markers"][name] == pytest.approx(told)
@@ -165,11 +165,46 @@ def test_the_layouts_show_topics_that_are_there_in_the_frame_of_the_map(folder):
     assert {each["Topic"]["Value"] for each in displays.values() if "Topic" in each} <= topics
     assert displays["Map"]["Enabled"]
     assert displays["Rooms"]["Topic"]["Durability Policy"] == "Transient Local"
+    # Beside the list of displays RViz leaves the rest of the window to the view.
+    assert [panel["Name"] for panel in config["Panels"]] == ["Displays"]
+    # What the curves show is a number in the messages: not every viewer counts the elements of a list.
+    curves = [path["value"] for panel in panels.values() for path in panel.get("paths", ())]
+    assert curves == ["/rose2/rooms.coverage", "/rose2/rooms.count"]
     # Both look at the rooms from above.
     view = config["Visualization Manager"]["Views"]["Current"]
     camera = world["cameraState"]
     assert camera["targetOffset"][:2] == [view["X"], view["Y"]]
     assert np.abs(xy - camera["targetOffset"][:2]).max(axis=0)[1] < camera["distance"] / 2
+
+
+def test_rviz_asks_for_the_map_as_it_is_played_even_if_the_log_does_not_say(tmp_path):
+    """An unknown quality of service is played as volatile; the added topics tell theirs."""
+    log = tmp_path / "unknown.mcap"
+    with OFFICE.open("rb") as source, log.open("wb") as target:
+        writer = Writer(target)
+        writer.start("ros2", "test")
+        schemas = {}
+        for kind, channel, message in make_reader(source).iter_messages():
+            if channel.topic not in schemas:
+                schema = writer.register_schema(kind.name, kind.encoding, kind.data)
+                schemas[channel.topic] = writer.register_channel(channel.topic, "cdr", schema)
+            number = schemas[channel.topic]
+            writer.add_message(number, message.log_time, message.data, message.publish_time)
+        writer.finish()
+    folder = analyzed(log, tmp_path / "out")
+    (config,) = folder.glob("*.rviz")
+    displays = yaml.safe_load(config.read_text(encoding="utf-8"))["Visualization Manager"]["Displays"]
+    asked = {each["Name"]: each["Topic"]["Durability Policy"] for each in displays if "Topic" in each}
+    assert asked == {
+        "Map": "Volatile",
+        **dict.fromkeys(["Clean map", "Segmented map", "Rooms"], "Transient Local"),
+    }
+    described = yaml.safe_load((folder / "metadata.yaml").read_text(encoding="utf-8"))
+    for topic in described["rosbag2_bagfile_information"]["topics_with_message_count"]:
+        profiles = yaml.safe_load(topic["topic_metadata"]["offered_qos_profiles"]) or []
+        assert [each["durability"] for each in profiles] == (
+            [1] if topic["topic_metadata"]["name"] in ADDED else []
+        )
 
 
 def _leaves(layout) -> list[str]:
@@ -179,12 +214,13 @@ def _leaves(layout) -> list[str]:
 @pytest.mark.parametrize(
     ("qos", "expected"),
     [
-        ("", ("Transient Local", "Reliable")),
+        ("", ("Volatile", "Reliable")),
+        ("[]", ("Volatile", "Reliable")),
         ("- durability: 1\n  reliability: 1\n", ("Transient Local", "Reliable")),
         ("- durability: transient_local\n  reliability: reliable\n", ("Transient Local", "Reliable")),
         ("- durability: 2\n  reliability: 2\n", ("Volatile", "Best Effort")),
         ("- durability: 1\n  reliability: 1\n- durability: volatile\n", ("Volatile", "Best Effort")),
-        ("{", ("Transient Local", "Reliable")),
+        ("{", ("Volatile", "Reliable")),
     ],
 )
 def test_viewers_ask_for_no_more_than_is_offered(qos, expected):

@@ -16,9 +16,11 @@ from rose2_logs.model.outlines import outer_rings, outline
 from rose2_logs.model.rooms import RoomMap
 from rose2_logs.outputs.mcap.ros_messages import (
     ROOMS_TYPE,
+    MarkerSizes,
     MessageMaker,
     Triangles,
     ring_segments,
+    room_value,
     ros2_typestore,
 )
 from rose2_logs.segmentation.pipeline import METHODS, analyze
@@ -71,12 +73,13 @@ def test_the_fields_stand_where_they_belong(step: TrackedSnapshot):
     )
     cells = np.asarray(grid.data).reshape(geometry.shape)
     for number, track in enumerate(step.track_ids, start=1):
-        assert (cells[rooms.labels == number] == track).all()
+        assert (cells[rooms.labels == number] == room_value(track)).all()
     outside = rooms.labels == 0
     np.testing.assert_array_equal(cells[outside], step.snapshot.cells[outside])
 
     told = store.deserialize_cdr(maker.rooms(step), ROOMS_TYPE)
     assert told.coverage == 0.5
+    assert told.count == len(told.rooms) == len(rooms)
     assert (told.header.stamp.nanosec, told.header.frame_id) == (2, "map")
     for room in told.rooms:
         number = step.track_ids.index(room.track)
@@ -118,11 +121,44 @@ def test_rings_of_shapes_with_parts_and_holes():
     assert ring_segments([]).shape == (0, 2)
 
 
+def test_values_of_the_segmented_map_differ_and_those_of_neighbors_do_so_clearly():
+    """As far as there are values: the 99th track shares that of the first."""
+    values = np.array([room_value(track) for track in range(1, 99)])
+    assert sorted(values) == list(range(1, 99))
+    assert np.abs(np.diff(values)).min() >= 30
+    assert room_value(99) == room_value(1)
+
+
+def test_sizes_of_markers_grow_with_the_building():
+    """What can be read in a picture of a small building can be read in one of a large building."""
+    small, large = MarkerSizes.of_view(5.0), MarkerSizes.of_view(200.0)
+    assert small == MarkerSizes()
+    assert large.label_m > 3 > small.label_m
+    assert MarkerSizes.of_view(400.0).doorway_m == pytest.approx(2 * large.doorway_m)
+
+
+def test_the_path_is_drawn_in_its_pieces(step: TrackedSnapshot):
+    """A piece of one point is no line."""
+    pieces = [np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 2.0]]), np.array([[5.0, 5.0]]), np.eye(2)]
+    written = MessageMaker().markers(step, pieces, MarkerSizes(path_m=0.2))
+    found = ros2_typestore().deserialize_cdr(written, KINDS["markers"]).markers
+    path = [marker for marker in found if marker.ns == "path"]
+    assert [(marker.type, marker.scale.x) for marker in path] == [(4, 0.2), (4, 0.2)]
+    assert [[(point.x, point.y) for point in marker.points] for marker in path] == [
+        [(0.0, 0.0), (1.0, 0.0), (1.0, 2.0)],
+        [(1.0, 0.0), (0.0, 1.0)],
+    ]
+
+
 def test_triangles_fill_any_outline_of_cells():
+    """And they go around counterclockwise: seen from above, RViz draws others without their color."""
     rng = np.random.default_rng(3)
     for _ in range(60):
         shape = outline(rng.random((14, 14)) < rng.uniform(0.3, 0.9), 0.05)
         corners, none = Triangles().corners_of([shape, shapely.Polygon()])
+        one, two, three = corners.reshape(-1, 3, 2).transpose(1, 0, 2)
+        (ax, ay), (bx, by) = (two - one).T, (three - one).T
+        assert (ax * by - ay * bx >= 0).all()
         found = shapely.polygons(corners.reshape(-1, 3, 2))
         assert shapely.area(found).sum() == pytest.approx(shape.area, rel=0.05)
         assert shapely.area(shapely.union_all(found).symmetric_difference(shape)) < 0.05 * shape.area
