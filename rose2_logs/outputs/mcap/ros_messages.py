@@ -265,8 +265,10 @@ class MessageMaker:
         markers += [
             Marker("path", number, LINE_STRIP, points_m, PATH_COLOR, sizes.path_m)
             for number, points_m in enumerate(path_m)
-            if len(points_m) > 1  # a line of one point is an error in RViz
+            if len(points_m) > 1
         ]
+        # RViz calls a marker without points an error.
+        markers = [each for each in markers if len(each.points_m) or each.kind == TEXT or each.action != ADD]
         # At different heights, so that layers do not flicker through each other or through the map.
         heights = {name: LAYER_STEP_M * (layer + 1) for layer, name in enumerate(MARKER_LAYERS)}
         message = CdrWriter()

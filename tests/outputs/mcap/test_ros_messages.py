@@ -92,6 +92,8 @@ def test_the_fields_stand_where_they_belong(step: TrackedSnapshot):
     markers = store.deserialize_cdr(maker.markers(step), KINDS["markers"]).markers
     by_name = {(marker.ns, marker.id): marker for marker in markers}
     assert markers[0].action == 3
+    # RViz calls a marker without points an error.
+    assert all(len(marker.points) > 0 for marker in markers[1:] if marker.ns != "labels")
     for track, shape in zip(step.track_ids, rooms.polygons, strict=True):
         fill, line = by_name["rooms", track], by_name["outlines", track]
         corners = np.array([(point.x, point.y) for point in fill.points]).reshape(-1, 3, 2)
