@@ -51,7 +51,7 @@ def last_messages(log: Path) -> dict[str, Any]:
 
 
 def of_rviz1(settings: Any) -> Any:
-    """A configuration of RViz2 in the terms of RViz: other names of classes, topics without quality of service."""
+    """A configuration of RViz2 in the terms of RViz: other classes, topics without quality of service."""
     if isinstance(settings, list):
         return [of_rviz1(each) for each in settings]
     if not isinstance(settings, dict):
