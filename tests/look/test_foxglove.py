@@ -1,4 +1,4 @@
-"""Foxglove Studio 1.48, the last version whose code is in a package, in Chromium with the layout beside the log."""
+"""Foxglove Studio 1.48, whose code is in a package, in Chromium with the layout that is beside the log."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ class _Places(SimpleHTTPRequestHandler):
         super().__init__(*given, **options)
 
     def translate_path(self, path: str) -> str:
-        _, place, rest = path.partition("?")[0].split("/", 2)
-        return str(self.places[place] / rest)
+        place, _, rest = path.partition("?")[0].strip("/").partition("/")
+        return str(self.places.get(place, Path("/nowhere")) / rest)
 
     def do_GET(self) -> None:
         part = ALL_PLACES.match(self.headers.get("Range", ""))

@@ -10,6 +10,7 @@ import yaml
 from mcap.reader import make_reader
 
 from rose2_logs.errors import OutputError
+from rose2_logs.outputs.mcap.input import qos_of_version_8
 from rose2_logs.system.files import replacing
 
 VERSION = 5
@@ -49,7 +50,8 @@ def write_bag_metadata(log: Path, path: Path) -> None:
                 "name": channel.topic,
                 "type": summary.schemas[channel.schema_id].name,
                 "serialization_format": channel.message_encoding,
-                "offered_qos_profiles": channel.metadata.get("offered_qos_profiles", ""),
+                # Since Iron they are recorded with names, which rosbag2 refuses in a bag of this version.
+                "offered_qos_profiles": qos_of_version_8(channel.metadata.get("offered_qos_profiles", "")),
             },
             "message_count": count,
         }

@@ -267,7 +267,7 @@ class _Files(CopiedLog):
             if converted is not None:
                 encoding, language, definition = "cdr", "ros2msg", converted
         elif encoding == "cdr":
-            metadata["offered_qos_profiles"] = _qos_of_version_8(metadata.get("offered_qos_profiles", "[]"))
+            metadata["offered_qos_profiles"] = qos_of_version_8(metadata.get("offered_qos_profiles", "[]"))
             if not definition and (known := self._definition(name)) is not None:
                 language, definition = "ros2msg", known
         schema_id = self._schema_ids.setdefault((name, definition), len(self._schema_ids) + 1)
@@ -311,8 +311,8 @@ def _definitions(channels: Sequence[Channel]) -> dict[str, Any]:
     return types
 
 
-def _qos_of_version_8(text: str) -> str:
-    """Quality of service in the older notation that readers of MCAP files expect."""
+def qos_of_version_8(text: str) -> str:
+    """Quality of service as rosbag2 wrote it up to version 8, with numbers; empty if it cannot be read."""
     from rosbags.rosbag2.metadata import dump_qos_v8, parse_qos
 
     try:
