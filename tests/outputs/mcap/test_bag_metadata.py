@@ -46,7 +46,7 @@ PROFILE = """\
 
 @pytest.mark.parametrize(("recorded", "expected"), [(PROFILE, [(1, 1)]), ("", []), ("- durability: 1", [])])
 def test_quality_of_service_is_in_the_notation_of_the_version(tmp_path: Path, recorded, expected):
-    """With numbers and with all fields, or not at all: rosbag2 fails on names and on fields that are missing."""
+    """With numbers and all fields, or not at all: rosbag2 fails on names and on fields that are missing."""
     log, path = tmp_path / "run.mcap", tmp_path / "metadata.yaml"
     with log.open("wb") as file:
         writer = Writer(file)
