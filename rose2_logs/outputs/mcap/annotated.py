@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
+import re
 from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -18,10 +19,11 @@ from rose2_logs.errors import OutputError
 from rose2_logs.io import open_source
 from rose2_logs.io.mcap.index import DAMAGE
 from rose2_logs.io.source import MessageSource
-from rose2_logs.outputs.mcap.bag_metadata import write_bag_metadata
+from rose2_logs.outputs.mcap.bag_metadata import RECORD_NAME, version_record, write_bag_metadata
 from rose2_logs.outputs.mcap.check import Tallies, checked_copy
 from rose2_logs.outputs.mcap.input import (
     LATCHED_QOS,
+    NAMED_LATCHED_QOS,
     CopiedChannel,
     CopiedChunk,
     CopiedLog,
@@ -50,6 +52,8 @@ ADDED = {
 """The added topics, with their types."""
 ATTACHMENT = "rose2_parameters.json"
 METADATA = "rose2_logs"
+NAMED_QOS = re.compile(r"reliability:\s*[a-z]")
+"""Quality of service with names instead of numbers, as rosbag2 writes it since version 9."""
 
 
 class AnnotatedMcap(Sink):
@@ -137,16 +141,27 @@ class AnnotatedMcap(Sink):
                 attachment.media_type,
                 attachment.data,
             )
+        names = set()
         for record in log.metadata():
+            names.add(record.name)
             self._writer.add_metadata(record.name, record.metadata)
-        # The quality of service of the source map, as its ROS distribution writes it.
         self._map_qos = map_metadata.get("offered_qos_profiles", "")
-        self._qos = self._map_qos if self._map_qos.strip() not in ("", "[]") else LATCHED_QOS
+        self._qos = self._added_qos(has_version=RECORD_NAME in names)
         self._added = {topic: self._add_channel(topic, kind) for topic, kind in ADDED.items()}
         self._own_map = self._map_channel()
         self._writer.add_metadata(
             METADATA, {name: str(value) for name, value in (info.versions | info.provenance).items()}
         )
+
+    def _added_qos(self, *, has_version: bool) -> str:
+        """Quality of service of the added topics: that of the map, else of maps in the log's notation."""
+        texts = [channel.metadata.get("offered_qos_profiles", "") for channel in self._log.channels()]
+        is_named = any(NAMED_QOS.search(text) for text in texts)
+        if self._log.profile == "ros2" and not has_version and not is_named:
+            self._writer.add_metadata(RECORD_NAME, version_record())
+        if self._map_qos.strip() not in ("", "[]"):
+            return self._map_qos
+        return NAMED_LATCHED_QOS if is_named else LATCHED_QOS
 
     def _map_channel(self) -> int | None:
         """Add a channel for maps that the log does not contain: saved ones, and those built from scans."""

@@ -15,6 +15,28 @@ from rose2_logs.system.files import replacing
 
 VERSION = 5
 """Version of the format: that of Humble, which all later releases can read."""
+RECORD_NAME = "rosbag2"
+"""Name of the record of an MCAP in which rosbag2 looks for the version."""
+
+
+def version_record() -> dict[str, str]:
+    """Content of a record by which rosbag2 reads the quality of service in the notation of `VERSION`.
+
+    Without one it expects that of its own version. All but the version it takes from the file itself.
+    """
+    described = {
+        "version": VERSION,
+        "storage_identifier": "mcap",
+        "duration": {"nanoseconds": 0},
+        "starting_time": {"nanoseconds_since_epoch": 0},
+        "message_count": 0,
+        "topics_with_message_count": [],
+        "compression_format": "",
+        "compression_mode": "",
+        "relative_file_paths": [],
+        "files": [],
+    }
+    return {"serialized_metadata": yaml.safe_dump(described, sort_keys=False)}
 
 
 def write_bag_metadata(log: Path, path: Path) -> None:

@@ -32,7 +32,14 @@ LATCHED_QOS = (
     "  liveliness: 1\n  liveliness_lease_duration:\n    sec: 9223372036\n    nsec: 854775807\n"
     "  avoid_ros_namespace_conventions: false"
 )
-"""Keep last, depth 1, reliable, transient local: how ROS 2 publishes maps, in rosbag2's notation."""
+"""Keep last, depth 1, reliable, transient local: how ROS 2 publishes maps, in rosbag2's numbers."""
+NAMED_LATCHED_QOS = (
+    LATCHED_QOS.replace("history: 1", "history: keep_last")
+    .replace("reliability: 1", "reliability: reliable")
+    .replace("durability: 1", "durability: transient_local")
+    .replace("liveliness: 1", "liveliness: automatic")
+)
+"""The same in the names that rosbag2 writes since version 9."""
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ from saved_maps import save_run
 from rose2_logs.errors import OutputError
 from rose2_logs.io import open_log
 from rose2_logs.outputs.mcap.annotated import ADDED
+from rose2_logs.outputs.mcap.input import NAMED_LATCHED_QOS
 from rose2_logs.outputs.mcap.viewer_layouts import offered
 from rose2_logs.workflows.analyze import RunOptions, analyze_log
 
@@ -176,21 +177,42 @@ def test_the_layouts_show_topics_that_are_there_in_the_frame_of_the_map(folder):
     assert np.abs(xy - camera["targetOffset"][:2]).max(axis=0)[1] < camera["distance"] / 2
 
 
-def test_rviz_asks_for_the_map_as_it_is_played_even_if_the_log_does_not_say(tmp_path):
-    """An unknown quality of service is played as volatile; the added topics tell theirs."""
-    log = tmp_path / "unknown.mcap"
+def without_qos(log: Path, of_odometry: str = "") -> Path:
+    """The office without quality of service, but for that of the odometry."""
     with OFFICE.open("rb") as source, log.open("wb") as target:
         writer = Writer(target)
         writer.start("ros2", "test")
-        schemas = {}
+        channels = {}
         for kind, channel, message in make_reader(source).iter_messages():
-            if channel.topic not in schemas:
+            if channel.topic not in channels:
                 schema = writer.register_schema(kind.name, kind.encoding, kind.data)
-                schemas[channel.topic] = writer.register_channel(channel.topic, "cdr", schema)
-            number = schemas[channel.topic]
+                qos = {"offered_qos_profiles": of_odometry} if channel.topic == "/odom" else {}
+                channels[channel.topic] = writer.register_channel(channel.topic, "cdr", schema, qos)
+            number = channels[channel.topic]
             writer.add_message(number, message.log_time, message.data, message.publish_time)
         writer.finish()
-    folder = analyzed(log, tmp_path / "out")
+    return log
+
+
+@pytest.mark.parametrize(("odometry", "version"), [("", 5), (NAMED_LATCHED_QOS, None)])
+def test_the_file_says_in_which_notation_quality_of_service_is(tmp_path, odometry, version):
+    """In numbers a record says so; in names, as rosbag2 writes since Iron, the added ones are in names too."""
+    (path,) = analyzed(without_qos(tmp_path / "log.mcap", odometry), tmp_path / "out").glob("*.rose2.mcap")
+    with path.open("rb") as file:
+        reader = make_reader(file)
+        records = {record.name: record.metadata for record in reader.iter_metadata()}
+        channels = {channel.topic: channel for channel in reader.get_summary().channels.values()}
+    told = yaml.safe_load(records.get("rosbag2", {}).get("serialized_metadata", "{}"))
+    assert told.get("version") == version
+    (profile,) = yaml.safe_load(channels["/rose2/markers"].metadata["offered_qos_profiles"])
+    assert (profile["durability"], profile["reliability"]) == (
+        (1, 1) if version else ("transient_local", "reliable")
+    )
+
+
+def test_rviz_asks_for_the_map_as_it_is_played_even_if_the_log_does_not_say(tmp_path):
+    """An unknown quality of service is played as volatile; the added topics tell theirs."""
+    folder = analyzed(without_qos(tmp_path / "unknown.mcap"), tmp_path / "out")
     (config,) = folder.glob("*.rviz")
     displays = yaml.safe_load(config.read_text(encoding="utf-8"))["Visualization Manager"]["Displays"]
     asked = {each["Name"]: each["Topic"]["Durability Policy"] for each in displays if "Topic" in each}
