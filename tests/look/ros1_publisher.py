@@ -1,6 +1,6 @@
-"""Publishes a map and markers as a ROS 1 node, run by the Python of Debian's ROS; latched, until it is ended.
+"""Publishes messages as a ROS 1 node, run by the Python of Debian's ROS; latched, until it is ended.
 
-Arguments: a JSON file {"map": {"topic", "message"}, "markers": {...}}, in which messages are nested fields.
+Arguments: a JSON file [{"topic", "type", "message"}], in which messages are nested fields.
 """
 
 import json
@@ -8,8 +8,6 @@ import sys
 from pathlib import Path
 
 import rospy
-from nav_msgs.msg import OccupancyGrid
-from visualization_msgs.msg import MarkerArray
 
 
 def fill(message, fields):
@@ -28,7 +26,7 @@ def fill(message, fields):
 
 
 def element_of(kind):
-    """Return an empty message of an array's type, such as geometry_msgs/Point[]."""
+    """Return an empty message of a type, or of an array's type, such as geometry_msgs/Point[]."""
     package, name = kind.removesuffix("[]").split("/")
     return getattr(__import__(package + ".msg", fromlist=[name]), name)()
 
@@ -36,8 +34,9 @@ def element_of(kind):
 told = json.loads(Path(sys.argv[1]).read_text())
 rospy.init_node("results", disable_signals=True)
 publishers = []
-for key, kind in (("map", OccupancyGrid), ("markers", MarkerArray)):
-    publisher = rospy.Publisher(told[key]["topic"], kind, latch=True, queue_size=1)
-    publisher.publish(fill(kind(), told[key]["message"]))
+for each in told:
+    message = fill(element_of(each["type"]), each["message"])
+    publisher = rospy.Publisher(each["topic"], type(message), latch=True, queue_size=1)
+    publisher.publish(message)
     publishers.append(publisher)
 rospy.spin()

@@ -17,6 +17,8 @@ from looking import free_port
 from programs import needed, screen, screenshot
 from rosbags.highlevel import AnyReader
 
+from rose2_logs.outputs.mcap.viewer_layouts import RVIZ_WINDOW_PX
+
 DEBIAN_PYTHON = "/usr/bin/python3"
 CLASSES = ("rviz_default_plugins/", "rviz_common/")
 LEAST_SHARE = 1e-3
@@ -35,16 +37,16 @@ def fields_of(message: Any) -> Any:
     return message
 
 
-def last_messages(log: Path) -> dict[str, Any]:
-    """The last map and the last markers of an annotated log, and the last rooms."""
-    topics = {"map": "/map", "markers": "/rose2/markers", "rooms": "/rose2/rooms"}
-    found = {}
+def last_messages(log: Path) -> list[dict[str, Any]]:
+    """The last map, markers and transforms of an annotated log, as they are published again."""
+    found = []
     with AnyReader([log]) as reader:
-        for key, topic in topics.items():
+        for topic in ("/map", "/rose2/markers", "/tf"):
             connections = [each for each in reader.connections if each.topic == topic]
             *_, (connection, _, data) = reader.messages(connections)
-            message = reader.deserialize(data, connection.msgtype)
-            found[key] = {"topic": topic, "message": fields_of(message)}
+            message = fields_of(reader.deserialize(data, connection.msgtype))
+            kind = connection.msgtype.replace("/msg/", "/")
+            found.append({"topic": topic.replace("/tf", "/tf_static"), "type": kind, "message": message})
     return found
 
 
@@ -83,7 +85,7 @@ def rviz_showing(folder: Path, place: Path):
         "PATH": "/usr/bin:/bin",
     }
     publisher = Path(__file__).with_name("ros1_publisher.py")
-    with screen() as display:
+    with screen(RVIZ_WINDOW_PX) as display:
         environment = {key: value for key, value in display.items() if key != "PYTHONPATH"} | ros
         with (
             started(rosmaster, "--core", "-p", port, env=environment),
@@ -96,8 +98,12 @@ def rviz_showing(folder: Path, place: Path):
 def test_rviz_shows_each_room_in_its_color(wing, pictures, tmp_path):
     """Beside nothing but the list of displays, so that the rooms fill most of the window."""
     (log,) = wing.glob("*.rose2.mcap")
-    markers = last_messages(log)["markers"]["message"]["markers"]
-    colors = [[each["color"][part] for part in "rgb"] for each in markers if each["ns"] == "rooms"]
+    _, array, _ = last_messages(log)
+    colors = [
+        [each["color"][part] for part in "rgb"]
+        for each in array["message"]["markers"]
+        if each["ns"] == "rooms"
+    ]
     picture = pictures / "rviz_wing.png"
 
     def shown() -> bool:

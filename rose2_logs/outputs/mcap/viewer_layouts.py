@@ -22,6 +22,10 @@ FOXGLOVE_ASPECT = 1.0
 """Width over height of Foxglove's large panel in a window of 1600 x 900 points with the sidebar."""
 FOXGLOVE_SMALL_ASPECT = 0.9
 """The same of its small panel for the clean map."""
+AXES_SHARE = 0.025
+"""Length of the axes of frames relative to the height of the view."""
+AXES_M = 0.2
+"""Their length in RViz and Foxglove at the scale 1, meters."""
 MAP_ALPHA = 0.7
 TRANSIENT_LOCAL, VOLATILE = "Transient Local", "Volatile"
 RELIABLE, BEST_EFFORT = "Reliable", "Best Effort"
@@ -61,6 +65,11 @@ class MapScene:
     def height_m(self, aspect: float) -> float:
         """Height of the smallest view with a given width over height that shows everything."""
         return view_height_m(self.low_m, self.high_m, aspect)
+
+
+def _axes_scale(height_m: float) -> float:
+    """Scale at which the axes of frames can be seen in a view."""
+    return round(max(1.0, AXES_SHARE * height_m / AXES_M), 2)
 
 
 def view_height_m(low_m: FloatArray, high_m: FloatArray, aspect: float) -> float:
@@ -166,7 +175,11 @@ def _foxglove_world(title: str, scene: MapScene, topics: dict[str, Any], aspect:
         "scene": {
             "labelScaleFactor": 1,
             # Without the line from each frame to its parent, which crosses the plan.
-            "transforms": {"showLabel": False, "axisScale": 0.5, "lineWidth": 0},
+            "transforms": {
+                "showLabel": False,
+                "axisScale": _axes_scale(scene.height_m(aspect)),
+                "lineWidth": 0,
+            },
         },
         "transforms": {},
         "topics": topics,
@@ -191,6 +204,7 @@ def rviz_config(scene: MapScene) -> dict[str, Any]:
     """Make an RViz2 configuration: the maps, the markers over them, the frames, seen from above."""
     x, y = scene.center_m
     width, height = RVIZ_VIEW_PX
+    view_m = scene.height_m(width / height)
     displays = [
         _rviz_map("Map", scene.map_topic, scene.map_qos, is_on=True),
         _rviz_map("Clean map", "/rose2/clean_map", scene.qos, is_on=False),
@@ -207,7 +221,7 @@ def rviz_config(scene: MapScene) -> dict[str, Any]:
             "Class": "rviz_default_plugins/TF",
             "Name": "Frames",
             "Enabled": True,
-            "Marker Scale": 1,
+            "Marker Scale": _axes_scale(view_m),
             "Show Arrows": False,
             "Show Axes": True,
             "Show Names": True,
@@ -237,7 +251,7 @@ def rviz_config(scene: MapScene) -> dict[str, Any]:
                     "Class": "rviz_default_plugins/TopDownOrtho",
                     "Name": "Current View",
                     "Angle": 0,
-                    "Scale": height / scene.height_m(width / height),
+                    "Scale": height / view_m,
                     "Target Frame": "<Fixed Frame>",
                     "Value": "TopDownOrtho (rviz_default_plugins)",
                     "X": x,

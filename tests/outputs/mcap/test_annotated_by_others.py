@@ -196,7 +196,7 @@ def without_qos(log: Path, of_odometry: str = "") -> Path:
 
 @pytest.mark.parametrize(("odometry", "version"), [("", 5), (NAMED_LATCHED_QOS, None)])
 def test_the_file_says_in_which_notation_quality_of_service_is(tmp_path, odometry, version):
-    """In numbers a record says so; in names, as rosbag2 writes since Iron, the added ones are in names too."""
+    """In numbers a record says so; in names, as rosbag2 writes since Iron, the added ones are named too."""
     (path,) = analyzed(without_qos(tmp_path / "log.mcap", odometry), tmp_path / "out").glob("*.rose2.mcap")
     with path.open("rb") as file:
         reader = make_reader(file)
