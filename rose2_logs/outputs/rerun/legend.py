@@ -36,7 +36,7 @@ CURVES: dict[str, tuple[str, Color]] = {
 
 
 def log_legend(recording: rr.RecordingStream, layers: Collection[str]) -> None:
-    """Log the strips and the text, for a recording with these layers."""
+    """Log the strips and the text, for a recording that shows these layers."""
     for path, keys, width_em in (
         (MAP_SIGNS, map_keys(layers), MAP_WIDTH_EM),
         (CURVE_NAMES, curve_keys(), CURVES_WIDTH_EM),
@@ -83,8 +83,8 @@ def legend_text(layers: Collection[str]) -> str:
     stages = {
         "borders": (
             "Borders",
-            "doorways, the darker the surer that they part two rooms; purple: surer than not, but below "
-            f"{percent(UNSURE_BORDER_BELOW, ' %')}, with both rooms and the probability",
+            "doorways, the darker the surer that they part two rooms; purple: a probability below "
+            f"{percent(UNSURE_BORDER_BELOW, ' %')}, written with both rooms",
         ),
         "clean_map": ("Clean map", "black: structure; light gray: occupied cells left out as clutter"),
         "score": ("Structure score", "the brighter, the more a cell belongs to straight walls"),

@@ -113,7 +113,6 @@ class RerunRecording(Sink):
         self._stream.set_log_tick_enabled(False)
         self._world = World(self._layers, self._stream, self._wanted, self._name_of)
         self._lanes = TrackLanes(self._stream, self._name_of)
-        log_legend(self._stream, self._wanted)
         for path, (name, color) in (CURVES | COUNTS).items():
             style = (
                 rr.SeriesPoints(names=name, colors=[color], markers="cross", marker_sizes=8)
@@ -180,6 +179,8 @@ class RerunRecording(Sink):
         return Layers(self._stream, 0 if self._live else CHUNK_BYTES)
 
     def _send_blueprint(self) -> None:
+        shown = [layer for layer in self._wanted if layer != "path" or self._world.has_path]
+        log_legend(self._stream, shown)
         blueprint = make_blueprint(
             self._extent.low_m,
             self._extent.high_m,

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from rose2_logs.drawing.hatching import hatch_unseen
 from rose2_logs.drawing.palette import track_color
-from rose2_logs.drawing.robot_trail import GAP_M
 from rose2_logs.model.borders import UNSURE_BORDER_BELOW
 from rose2_logs.model.occupancy import FloatArray
 from rose2_logs.model.room_names import NameOf, room_name, short_name
@@ -41,6 +40,8 @@ SURE_BORDER, UNSURE_BORDER = (20, 20, 90), (190, 40, 230)
 """Borders of strength 1, and those that are unsure; between them the color goes from half way on."""
 OUTLINE_SHADE, SEGMENT_SHADE = 0.6, 0.75
 """Share of the color of a fill that its outline has, and of a track's that a wall's segments have."""
+PATH_GAP_M = 2.0
+"""Poses farther apart are not joined: the robot was put elsewhere, or found itself again."""
 ROBOT_LENGTH_M, ROBOT_WIDTH_M = 0.7, 0.45
 """Size of the arrowhead that stands for the robot, about that of a mobile base."""
 MARKS = (0.8, 0.98)
@@ -120,6 +121,11 @@ class World:
             (f"{SPECTRUM}/directions", LINE_POINTS, DIRECTION_COLOR),
         ):
             self._style_lines(path, width, color)
+
+    @property
+    def has_path(self) -> bool:
+        """Whether the robot's path is known so far."""
+        return self._pose is not None
 
     def log(self, step: TrackedSnapshot, view_side_m: float) -> None:
         """Log one map, after the layers have begun its snapshot; the view is so high, at first."""
@@ -244,7 +250,7 @@ class World:
             return
         poses = path if self._pose is None else np.concatenate([self._pose[None], path])
         self._pose = path[-1]
-        far = np.hypot(*np.diff(poses[:, :2], axis=0).T) > GAP_M
+        far = np.hypot(*np.diff(poses[:, :2], axis=0).T) > PATH_GAP_M
         lengths = np.diff([0, *np.flatnonzero(far) + 1, len(poses)])
         self._layers.add(PATH, Strips(lifted(poses[:, :2], HEIGHTS.index(PATH)), lengths.astype(np.int32)))
         tip, back, side = ROBOT_LENGTH_M / 2, -ROBOT_LENGTH_M / 2, ROBOT_WIDTH_M / 2

@@ -24,14 +24,15 @@ PROJECT = Path(__file__).parents[3]
 GOLDEN = Path(__file__).with_name("golden")
 COVERAGES = (0.3, 0.6, 1.0)
 TABS = ("Rooms projected back", "Clean map", "Structure score", "Walls", "Faces", "Voronoi graph", "Spectrum")
-PANELS = ("Rooms over the run", "Area, m²", "Seen share", "Count", "Change")
-TEXTS = ("Events", "Summary")
+PANELS = ("Area, m²", "Seen share, %", "Rooms", "Change")
+LANES_TAB = "Room history"
+TEXTS = ("Events", LANES_TAB, "Legend", "Summary")
 FIRST_MAP_S = 1_700_000_020.0
 """Log time of the sample's first map."""
 GOLDEN_WIDTH = 160
 MOST_DIFFERENCE = 6.0
 """Mean difference of two pictures of the same, in steps of 256: another version draws lines otherwise."""
-END_OF_CURVES, LANES = (slice(70, 280), slice(1750, 1910)), (slice(340, 700), slice(1420, 1910))
+END_OF_CURVES, LANES = (slice(130, 400), slice(1750, 1910)), (slice(500, 1000), slice(1200, 1910))
 """Where they stand in the window: rows and columns."""
 CURVES_SHARE, LANES_SHARE = 0.01, 0.3
 """Share of these that thin curves, and lanes, take at least."""
@@ -62,7 +63,7 @@ def shots(folder: Path) -> dict[str, Path]:
         tab: Shot(folder / f"{tab}.png", 1.0, (tab, panel, text), True)
         for tab, panel, text in zip(TABS, cycle(PANELS), cycle(TEXTS), strict=False)
     }
-    over = {"over time": Shot(folder / "time.png", tabs=(PANELS[0],), log_time_s=FIRST_MAP_S)}
+    over = {"over time": Shot(folder / "time.png", tabs=(LANES_TAB,), log_time_s=FIRST_MAP_S)}
     taken = along | others | over
     problems = take(record(folder), list(taken.values()), port=free_port(), settle_s=LOOK_S)
     assert not problems

@@ -78,7 +78,7 @@ def test_how_much_of_each_room_was_seen_is_that_of_the_table(result, back_projec
             row["snapshot"]: row["Scalars:scalars"][0]
             for row in rows(result, f"/run/seen_share/{track}", "Scalars:scalars")
         }
-        assert share == pytest.approx((areas / last[back_projected.index[-1], track]).to_dict())
+        assert share == pytest.approx((100 * areas / last[back_projected.index[-1], track]).to_dict())
 
 
 def test_a_room_is_named_from_when_it_is_seen(result, back_projected):
@@ -104,10 +104,10 @@ def test_the_outlines_are_those_of_the_last_map_from_the_first_on(result):
 
 
 def test_there_is_a_tab_for_them(result, tmp_path: Path):
-    assert {"Rooms projected back", "Seen share"} < names_of_views(result.folder / "office.rrd")
+    assert {"Rooms projected back", "Seen share, %"} < names_of_views(result.folder / "office.rrd")
     options = RunOptions(max_snapshots=2, annotated_log=False, layers=())
     plain = analyze_log(SAMPLE_LOGS / "office.mcap", tmp_path / "office", options).folder / "office.rrd"
-    assert not {"Rooms projected back", "Seen share"} & names_of_views(plain)
+    assert not {"Rooms projected back", "Seen share, %"} & names_of_views(plain)
     paths = {str(chunk.entity_path) for chunk in RrdReader(str(plain)).stream()}
     assert not any("back_projected" in path or "seen" in path for path in paths)
 

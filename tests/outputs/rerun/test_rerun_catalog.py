@@ -131,6 +131,6 @@ def test_the_viewer_opens_a_run_of_the_catalog_in_our_layout(results, tmp_path, 
     ):
         (dataset,) = CatalogClient(url).datasets()
         viewer.open(dataset.segment_url(dataset.segment_ids()[0]))
-        wanted = {"Rooms", "Rooms projected back", "Rooms over the run"}
+        wanted = {"Rooms", "Rooms projected back", "Room history"}
         wait_for(lambda: wanted <= {view.name for view in viewer.get_state().views})
         assert not [report for view in viewer.get_state().views for report in view.reports]
