@@ -60,7 +60,7 @@ _EVIDENCE: dict[str, tuple[pa.DataType, str]] = {
 }
 
 _CALLED: dict[str, tuple[pa.DataType, str]] = {
-    "name": (pa.string(), "name that it was given, of `--names`; null for none"),
+    "name": (pa.string(), "name that a person gave it; null for none"),
     "kind_guess": (
         pa.string(),
         "corridor, hall, closet or room: a guess from its shape, by the parameters kinds; null without one",
