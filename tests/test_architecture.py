@@ -72,5 +72,5 @@ def test_tests_mirror_the_package():
     """A folder of tests for each folder of the package, and none for what is no longer there."""
     of_package = {path.name for path in PACKAGE.iterdir() if path.is_dir() and path.name != "__pycache__"}
     of_tests = {path.name for path in (PROJECT / "tests").iterdir() if path.is_dir()}
-    assert of_tests - {"__pycache__", "faults", "support", "tools"} <= of_package
+    assert of_tests - {"__pycache__", "faults", "look", "support", "tools"} <= of_package
     assert of_package - of_tests <= {"config"}

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 from shapely.geometry.base import BaseGeometry
@@ -10,6 +11,7 @@ from shapely.geometry.base import BaseGeometry
 from rose2_logs.comparison.placement import PlacedMap
 from rose2_logs.model.analysis import Walls
 from rose2_logs.model.occupancy import FloatArray
+from rose2_logs.model.room_names import room_name
 from rose2_logs.system.text import counted
 from rose2_logs.tracking.registration import RigidMotion
 
@@ -32,6 +34,8 @@ class FinalLayout:
         Their areas as far as they were seen.
     walls : Walls or None
         None from a method that finds none.
+    names : mapping of int to str
+        Names that rooms were given, by their numbers.
     """
 
     name: str
@@ -40,6 +44,11 @@ class FinalLayout:
     shapes: tuple[BaseGeometry, ...]
     areas_m2: FloatArray
     walls: Walls | None
+    names: Mapping[int, str] = field(default_factory=dict)
+
+    def name_of(self, track: int) -> str:
+        """Return what a room is called."""
+        return room_name(track, self.names.get(track, ""))
 
     def __repr__(self) -> str:
         size = self.map.snapshot.geometry.size_text

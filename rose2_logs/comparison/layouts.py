@@ -10,7 +10,7 @@ from functools import cached_property
 import shapely
 
 from rose2_logs.comparison.final_layout import FinalLayout
-from rose2_logs.comparison.placement import Placement, fitting_scale, place
+from rose2_logs.comparison.placement import Placement, fits, fitting_scale, place
 from rose2_logs.comparison.room_changes import RoomChange, RoomStatus, compare_rooms
 from rose2_logs.comparison.wall_changes import WallComparison, compare_walls
 
@@ -56,18 +56,36 @@ class LayoutComparison:
     @property
     def same_building(self) -> bool:
         """Whether the two seem to show the same building."""
-        placement, parameters = self.placement, self.a.map.parameters.comparison
-        in_parts = (
-            placement.agreement >= parameters.parts_min_agreement
-            and placement.common_share >= parameters.parts_min_common_share
-        )
-        return placement.score >= parameters.same_building_min_score or in_parts
+        return fits(self.placement, self.a.map.parameters.comparison)
 
     @property
     def ambiguous(self) -> bool:
         """Whether another placement fits about as well."""
         share = self.a.map.parameters.comparison.ambiguous_share
         return self.placement.runner_up_score >= share * self.placement.score
+
+    @property
+    def doubts(self) -> list[str]:
+        """What makes the comparison doubtful, in sentences; empty where nothing does."""
+        if self.same_building:
+            if not self.ambiguous:
+                return []
+            return [
+                "the building fits about as well in another way, as when it looks the same turned by half a "
+                "circle: B may be misaligned with A"
+            ]
+        doubts = [
+            "these do not seem to be two runs in one building: hardly any walls agree, and what is changes "
+            "below means little"
+        ]
+        if self.scale is not None:
+            cell_a_m, cell_b_m = self.a.map.resolution_m, self.b.map.resolution_m
+            doubts.append(
+                f"B would fit if it were {self.scale:.2f} times as large: is the size of a cell right? With "
+                f"{cell_b_m * self.scale:.4f} m instead of {cell_b_m:.4f} m in B, or "
+                f"{cell_a_m / self.scale:.4f} m instead of {cell_a_m:.4f} m in A, they show one building"
+            )
+        return doubts
 
     @property
     def room_counts(self) -> dict[RoomStatus, int]:
@@ -98,6 +116,12 @@ class LayoutComparison:
         return sum(w * o for w, o in zip(weights, overlaps, strict=True)) / total if total > 0 else 0.0
 
 
+def compare_placed(a: FinalLayout, b: FinalLayout, placement: Placement) -> LayoutComparison:
+    """Find what differs between two layouts that lie over each other."""
+    rooms = compare_rooms(a, b, placement.motion)
+    return LayoutComparison(a, b, placement, rooms, compare_walls(a, b, placement.motion))
+
+
 def compare_layouts(a: FinalLayout, b: FinalLayout) -> LayoutComparison | None:
     """Align two layouts and find what differs.
 
@@ -109,8 +133,7 @@ def compare_layouts(a: FinalLayout, b: FinalLayout) -> LayoutComparison | None:
     placement = place(b.map, a.map)
     if placement is None:
         return None
-    rooms = compare_rooms(a, b, placement.motion)
-    comparison = LayoutComparison(a, b, placement, rooms, compare_walls(a, b, placement.motion))
+    comparison = compare_placed(a, b, placement)
     if comparison.same_building:
         return comparison
     return dataclasses.replace(comparison, scale=fitting_scale(b.map, a.map))

@@ -175,6 +175,21 @@ def place(moving: PlacedMap, fixed: PlacedMap) -> Placement | None:
     return Placement(motion, agreement, common, score, max(others, default=0.0))
 
 
+def fits(placement: Placement, parameters: ComparisonParameters) -> bool:
+    """Whether two placed maps seem to show the same building."""
+    in_parts = (
+        placement.agreement >= parameters.parts_min_agreement
+        and placement.common_share >= parameters.parts_min_common_share
+    )
+    return placement.score >= parameters.same_building_min_score or in_parts
+
+
+def placement_by(moving: PlacedMap, fixed: PlacedMap, motion: RigidMotion) -> Placement:
+    """Measure how far two maps agree that a motion brings together."""
+    agreement, common_share, score = _Agreement(moving, fixed).of(motion)
+    return Placement(motion, agreement, common_share, score, 0.0)
+
+
 def _is_same(
     one: RigidMotion, other: RigidMotion, center_m: FloatArray, parameters: ComparisonParameters
 ) -> bool:

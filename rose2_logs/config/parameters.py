@@ -24,6 +24,7 @@ from rose2_logs.config.baselines import (
 )
 from rose2_logs.config.comparison import ComparisonParameters
 from rose2_logs.config.fields import ParameterBlock, choice, number
+from rose2_logs.config.kinds import KindParameters
 from rose2_logs.config.mapping import MappingParameters
 from rose2_logs.config.reading import ReadingParameters
 from rose2_logs.config.regions import RegionParameters
@@ -425,6 +426,7 @@ class Parameters:
     voronoi_merge: VoronoiMergeParameters = field(default_factory=VoronoiMergeParameters)
     tracking: TrackingParameters = field(default_factory=TrackingParameters)
     comparison: ComparisonParameters = field(default_factory=ComparisonParameters)
+    kinds: KindParameters = field(default_factory=KindParameters)
 
     def __post_init__(self) -> None:
         for declared in dataclasses.fields(self):

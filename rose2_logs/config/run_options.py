@@ -332,6 +332,14 @@ class RunOptions:
         commands=BOTH,
         metavar="NAME",
     )
+    names: str | None = option(
+        None,
+        "Names of rooms: a table (CSV) with the columns name and track, or name, x and y in meters of the "
+        "last map; or GeoJSON or DXF with named outlines, which is laid over it. All outputs have them.",
+        panel=OUTPUTS,
+        commands=("analyze",),
+        metavar="FILE",
+    )
     method: str = option(
         "rose2",
         f"Segmentation method: {METHODS[0]}, or one that it is compared with, {', '.join(METHODS[1:])}.",

@@ -21,6 +21,7 @@ from rose2_logs.drawing.shapes import Color, Lines
 from rose2_logs.drawing.sheet import Key, captioned, legend, side_by_side, stacked, text_line
 from rose2_logs.model.labels import known_window
 from rose2_logs.model.occupancy import UNKNOWN, BoolArray, FloatArray
+from rose2_logs.model.room_names import short_name
 from rose2_logs.model.room_plan import PlanMap, PlanRoom, RoomPlan
 from rose2_logs.tracking.registration import RigidMotion
 
@@ -154,7 +155,7 @@ def _differences(comparison: LayoutComparison, bounds: Bounds) -> Drawing:
         if change.status in NOTED and not whole.is_empty:
             circle = shapely.maximum_inscribed_circle(whole, tolerance=1.0)
             x, y = shapely.get_coordinates(circle)[0].tolist()
-            painter.name(_pair_name(change.tracks_a, change.tracks_b), x, y, NUMBER_PX)
+            painter.name(pair_name(comparison, change), x, y, NUMBER_PX)
     return painter.drawing
 
 
@@ -177,9 +178,10 @@ def _draw_room(painter: MapPainter, change: RoomChange) -> None:
         painter.drawing.add(Lines(simpler(shape, DETAIL), OUTLINE, OUTLINE_WIDTH))
 
 
-def _pair_name(tracks_a: tuple[int, ...], tracks_b: tuple[int, ...]) -> str:
-    """Name rooms by their numbers in A and B."""
-    a, b = ("+".join(map(str, tracks)) for tracks in (tracks_a, tracks_b))
+def pair_name(comparison: LayoutComparison, change: RoomChange) -> str:
+    """Name rooms by their numbers in A and B, or by the names that they were given."""
+    a = "+".join(short_name(track, comparison.a.name_of) for track in change.tracks_a)
+    b = "+".join(short_name(track, comparison.b.name_of) for track in change.tracks_b)
     return f"{a} > {b}" if a and b else a or b
 
 

@@ -80,17 +80,19 @@ class MapPainter:
         matrix[:, 2] += self._to_page[:, 2]
         self.drawing.add(Picture(pixels, matrix))
 
-    def area(self, shape: BaseGeometry, color: Color, opacity: float, title: str = "") -> None:
+    def area(
+        self, shape: BaseGeometry, color: Color, opacity: float, title: str = "", identity: str = ""
+    ) -> None:
         """Fill a shape on the page."""
-        self.drawing.add(Area(shape, color, opacity, title))
+        self.drawing.add(Area(shape, color, opacity, title, identity))
 
-    def outline(self, shape: BaseGeometry, color: Color, width: float) -> None:
+    def outline(self, shape: BaseGeometry, color: Color, width: float, identity: str = "") -> None:
         """Draw the rings of a room's shape on the page, in a darker color than that of the room."""
-        self.drawing.add(Lines(shape, shaded(color, OUTLINE_SHADE), width))
+        self.drawing.add(Lines(shape, shaded(color, OUTLINE_SHADE), width, id=identity))
 
-    def hatch(self, lines: BaseGeometry, color: Color, width: float) -> None:
+    def hatch(self, lines: BaseGeometry, color: Color, width: float, identity: str = "") -> None:
         """Draw hatching on the page in a room's color."""
-        self.drawing.add(Lines(lines, shaded(color, HATCH_SHADE), width))
+        self.drawing.add(Lines(lines, shaded(color, HATCH_SHADE), width, id=identity))
 
     def lines(self, ends_m: FloatArray, color: Color, width: float, rim: float = 0.0) -> None:
         """Draw straight lines of the world (N, 2, 2), meters, with a pale rim on both sides."""

@@ -25,6 +25,8 @@ from rose2_logs.drawing.map_painter import (
 from rose2_logs.drawing.palette import track_color
 from rose2_logs.drawing.shapes import Area, Color, Lines, Text
 from rose2_logs.drawing.sheet import Key, legend, side_by_side, stacked
+from rose2_logs.model.labels import distinct_labels
+from rose2_logs.model.outlines import room_outlines
 from rose2_logs.model.room_plan import PlanRoom, RoomPlan, predicted_parts
 from rose2_logs.model.room_quality import UNSURE_SIGN, unsure_sign
 from rose2_logs.system.text import percent
@@ -111,34 +113,38 @@ def draw_plan(
     bounds = x0 - MARGIN_M, y0 - MARGIN_M, x1 + MARGIN_M, y1 + MARGIN_M
     painter = MapPainter(bounds, style.width, plan.title)
     colors = {room.number: track_color(room.number) for room in plan.rooms} if colors is None else colors
-    tinted = _lay_map(painter, plan, style, colors)
+    seen_m = _lay_map(painter, plan, style)
     shapes = {room.number: simpler(painter.on_page(room.shape), style.detail) for room in plan.rooms}
     predicted = {
         number: simpler(painter.on_page(part), style.detail) for number, part in predicted_parts(plan).items()
     }
     # Names are placed on what was seen.
     seen = shapes | {number: shapes[number].difference(part) for number, part in predicted.items()}
+    painter.drawing.begin_layer("unseen")
+    for number, part in predicted.items():
+        painter.area(part, colors[number], PREDICTED_OPACITY, identity=f"room-{number}-unseen")
+        lines = hatching(part, style.hatch_gap)
+        painter.hatch(lines, colors[number], 0.7 * style.line, f"room-{number}-hatching")
+    painter.drawing.begin_layer("rooms")
     for room in plan.rooms:
-        number = room.number
-        if number not in tinted:
-            painter.area(seen[number], colors[number], SHAPE_OPACITY, _told(room) if style.tells else "")
-        if number in predicted:
-            painter.area(predicted[number], colors[number], PREDICTED_OPACITY)
-            lines = hatching(predicted[number], style.hatch_gap)
-            painter.hatch(lines, colors[number], 0.7 * style.line)
+        number, told = room.number, _told(room) if style.tells else ""
+        if number in seen_m:
+            cells = simpler(painter.on_page(seen_m[number]), style.detail)
+            painter.area(cells, colors[number], SEEN_OPACITY, told, f"room-{number}")
+        else:
+            painter.area(seen[number], colors[number], SHAPE_OPACITY, told, f"room-{number}")
+    painter.drawing.begin_layer("outlines")
     for number, shape in shapes.items():
-        painter.outline(shape, colors[number], style.line)
+        painter.outline(shape, colors[number], style.line, f"room-{number}-outline")
     if style.has_walls and plan.walls_m is not None:
+        painter.drawing.begin_layer("walls")
         painter.lines(plan.walls_m, WALL_COLOR, 1.5 * style.line)
+    painter.drawing.begin_layer("doorways")
     for doors, color in ((plan.doorways, DOORWAY_COLOR), (plan.unsure_doorways, UNSURE_COLOR)):
         ends_m = np.array([door.ends_m for door in doors]).reshape(-1, 2, 2)
         painter.lines(ends_m, color, 2.4 * style.line, rim=0.8 * style.line)
-    if style.tells:
-        # Nothing to be seen, but under the pointer they say what they are.
-        for room in plan.rooms:
-            if room.number in tinted:
-                painter.area(shapes[room.number], WHITE, 0.0, _told(room))
     if style.font:
+        painter.drawing.begin_layer("names")
         for room in plan.rooms:
             name_on = seen[room.number] if seen[room.number].area else shapes[room.number]
             _write_name(painter, room, name_on, style)
@@ -180,15 +186,24 @@ def draw_segmentation(plan: RoomPlan) -> Drawing:
     return drawing
 
 
-def _lay_map(painter: MapPainter, plan: RoomPlan, style: PlanStyle, colors: Mapping[int, Color]) -> set[int]:
-    """Lay the map on the page; return the numbers of the rooms that its cells show."""
+def _lay_map(painter: MapPainter, plan: RoomPlan, style: PlanStyle) -> dict[int, BaseGeometry]:
+    """Lay the map on the page; return the outlines of the cells of the rooms that it shows, world meters."""
+    painter.drawing.begin_layer("map")
     if plan.map is None:
-        return set()
+        return {}
     below = plan.map.cropped()
     painter.ground()
-    pixels = tinted_cells(below.cells, below.labels, colors, SEEN_OPACITY)
-    painter.picture(pixels, below.geometry, style.picture_most_px)
-    return {room.number for room in plan.rooms} & set(np.unique(below.labels).tolist())
+    painter.picture(tinted_cells(below.cells), below.geometry, style.picture_most_px)
+    numbers = [number for number in distinct_labels(below.labels)[0].tolist() if number > 0]
+    ranks = np.zeros(max(numbers, default=0) + 1, np.int32)
+    ranks[numbers] = np.arange(1, len(numbers) + 1)
+    outlines = room_outlines(ranks[below.labels], below.geometry.resolution_m)
+    shapes = dict(zip(numbers, outlines, strict=True))
+    return {
+        room.number: shapely.transform(shapes[room.number], below.geometry.grid_to_world)
+        for room in plan.rooms
+        if room.number in shapes
+    }
 
 
 def _told(room: PlanRoom) -> str:
@@ -204,26 +219,29 @@ def _write_name(painter: MapPainter, room: PlanRoom, shape: BaseGeometry, style:
     """Write name and area of a room where they have room, else its number."""
     if shape.is_empty:
         return
-    circle = shapely.maximum_inscribed_circle(shape, tolerance=0.5)
-    (x, y), radius = shapely.get_coordinates(circle)[0].tolist(), float(shapely.length(circle))
+    x, y = shapely.get_coordinates(shapely.maximum_inscribed_circle(shape, tolerance=0.5))[0].tolist()
+
+    def fits(text: str, size: float) -> bool:
+        half = text_width(text, size) / 2
+        return bool(shape.covers(shapely.box(x - half, y - size, x + half, y + size)))
+
     area, font = area_text(room.area_m2), style.font
     sign = unsure_sign(room.wall_support)
     number, name = f"{room.number}{sign}", f"{room.name}{sign}"
     small = 0.8 * font
-    if not (style.has_names and _fits(area, small, radius, lines=2)):
+    if not (style.has_names and fits(area, small)):
         painter.name(number, x, y, font)
         return
-    painter.name(name if _fits(name, font, radius, lines=2) else number, x, y - 0.5 * font, font)
+    # A name that a person gave is rather written small than left out.
+    if room.given_name and not fits(name, font) and fits(name, small):
+        font = small
+    painter.name(name if fits(name, font) else number, x, y - 0.5 * font, font)
     painter.name(area, x, y + 0.6 * font, small, is_bold=False)
 
 
 def area_text(area_m2: float) -> str:
     """Format an area as in the names of rooms: with a decimal where it is small."""
     return f"{area_m2:.0f} m²" if area_m2 >= 10 else f"{area_m2:.1f} m²"
-
-
-def _fits(text: str, font: float, radius: float, lines: int) -> bool:
-    return bool(np.hypot(text_width(text, font), lines * font) <= 2 * radius)
 
 
 def _add_legend(painter: MapPainter, plan: RoomPlan, style: PlanStyle, *, has_predicted: bool) -> None:
@@ -247,6 +265,7 @@ def _add_legend(painter: MapPainter, plan: RoomPlan, style: PlanStyle, *, has_pr
         keys.append(Key("wall segment", WALL_COLOR, "line"))
     if any(room.is_unsure for room in plan.rooms):
         keys.append(Key("unsure, little wall around", kind="sign", sign=f"7{UNSURE_SIGN}"))
+    painter.drawing.begin_layer("legend")
     strip = legend(keys, style.width, font, indent=x + text_width(label, font) + 3 * font)
     top = page.height
     page.height += strip.height + 1.4 * style.font

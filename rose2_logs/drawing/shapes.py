@@ -46,12 +46,15 @@ class Area:
         In [0, 1].
     title : str
         What a viewer shows when the pointer is over it; empty for nothing.
+    id : str
+        By which other programs find it in the drawing, once in a page; empty for none.
     """
 
     shape: BaseGeometry
     fill: Color
     opacity: float = 1.0
     title: str = ""
+    id: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,8 +70,8 @@ class Lines:
         Units of the page.
     kind : str
         Class in the style of an HTML page, which may give it another color; empty for none.
-    title : str
-        What a viewer shows when the pointer is over it; empty for nothing.
+    title, id : str
+        As of `Area`.
     """
 
     shape: BaseGeometry
@@ -76,6 +79,7 @@ class Lines:
     width: float
     kind: str = ""
     title: str = ""
+    id: str = ""
 
 
 @dataclass(frozen=True)
@@ -139,6 +143,8 @@ class Page:
     kind : str
         Class of the whole in the style of an HTML page; empty for none.
     shapes : list of Shape
+    layers : list of (int, str)
+        Layers as drawing programs have them: number of the first shape and name.
     """
 
     width: float
@@ -147,10 +153,15 @@ class Page:
     paper: Color | None = (255, 255, 255)
     kind: str = ""
     shapes: list[Shape] = field(default_factory=list)
+    layers: list[tuple[int, str]] = field(default_factory=list)
 
     def add(self, *shapes: Shape) -> None:
         """Lay shapes on top."""
         self.shapes += shapes
+
+    def begin_layer(self, name: str) -> None:
+        """Put what is added from here on into a layer."""
+        self.layers.append((len(self.shapes), name))
 
     def lay(self, page: Page, x: float, y: float, scale: float = 1.0) -> None:
         """Lay what is on another page on top, its upper left corner at (x, y)."""

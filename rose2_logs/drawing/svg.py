@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import io
 import re
+from collections.abc import Iterator
 from xml.sax import saxutils
 
 import numpy as np
@@ -17,6 +18,9 @@ from rose2_logs.drawing.shapes import Area, Color, Dot, Lines, Page, Picture, Sh
 FONTS = "Helvetica, Arial, 'Liberation Sans', 'DejaVu Sans', sans-serif"
 DECIMALS = 2
 FEW_COLORS = 128
+NAMESPACES = 'xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink"'
+"""Programs that know SVG 1.1 only, as Inkscape 1.2, find pictures by xlink."""
+FOR_PROGRAMS = ' xmlns:inkscape="http://www.inkscape.org/namespaces/inkscape"'
 MIDDLE_EM = 0.36
 """A text's baseline is this far below the middle of its capitals: half their height in usual fonts."""
 
@@ -31,12 +35,13 @@ def as_svg(page: Page, *, is_inline: bool = False) -> str:
     ----------
     page : Page
     is_inline : bool
-        For a place within an HTML page: no XML declaration, and it fills the width it is given.
+        For a place within an HTML page: no XML declaration, no layers and ids, which a page may hold once
+        only, and it fills the width it is given.
     """
     width, height = _number(page.width), _number(page.height)
-    size = "" if is_inline else f' width="{width}" height="{height}"'
+    about = "" if is_inline else f'{FOR_PROGRAMS} width="{width}" height="{height}"'
     head = (
-        f'<svg xmlns="http://www.w3.org/2000/svg"{_class(page.kind)} viewBox="0 0 {width} {height}"{size} '
+        f'<svg {NAMESPACES}{_class(page.kind)} viewBox="0 0 {width} {height}"{about} '
         f'role="img" aria-label={quoteattr(page.title)} font-family="{FONTS}">'
     )
     title = "" if is_inline else f"<title>{escape(page.title)}</title>"
@@ -45,8 +50,25 @@ def as_svg(page: Page, *, is_inline: bool = False) -> str:
         if page.paper is None
         else f'<rect width="{width}" height="{height}" fill="{css_color(page.paper)}"/>'
     )
-    body = "\n".join([head, title + paper, *filter(None, map(_element, page.shapes)), "</svg>"])
+    shown = map(_element, page.shapes) if is_inline else _layered(page)
+    body = "\n".join([head, title + paper, *filter(None, shown), "</svg>"])
     return body if is_inline else f'<?xml version="1.0" encoding="UTF-8"?>\n{body}\n'
+
+
+def _layered(page: Page) -> Iterator[str]:
+    """Yield the elements of a page with their ids, each layer within a group."""
+    starts = dict(page.layers)
+    is_open = False
+    for place, shape in enumerate(page.shapes):
+        if place in starts:
+            name = quoteattr(starts[place])
+            if is_open:
+                yield "</g>"
+            yield f'<g id={name} inkscape:groupmode="layer" inkscape:label={name}>'
+            is_open = True
+        yield _element(shape, getattr(shape, "id", ""))
+    if is_open:
+        yield "</g>"
 
 
 def png_uri(pixels: NDArray[np.uint8], *, few_colors: bool = False) -> str:
@@ -60,8 +82,9 @@ def png_uri(pixels: NDArray[np.uint8], *, few_colors: bool = False) -> str:
     return f"data:image/png;base64,{base64.b64encode(stream.getvalue()).decode()}"
 
 
-def _element(shape: Shape) -> str:
+def _element(shape: Shape, identity: str = "") -> str:
     """Write a shape; nothing for one without any line, whose path no browser could read."""
+    named = f" id={quoteattr(identity)}" if identity else ""
     path = _path(shape.shape) if isinstance(shape, Area | Lines) else ""
     if isinstance(shape, Area | Lines) and not path:
         return ""
@@ -71,16 +94,18 @@ def _element(shape: Shape) -> str:
             parts = " ".join(f"{value:.6g}" for value in np.asarray(matrix).T.ravel())
             return (
                 f'<image width="{width}" height="{height}" transform="matrix({parts})" '
-                f'preserveAspectRatio="none" style="image-rendering:pixelated" href="{png_uri(pixels)}"/>'
+                f'preserveAspectRatio="none" style="image-rendering:pixelated" '
+                f'xlink:href="{png_uri(pixels)}"/>'
             )
         case Area(_, fill, opacity, title):
             shown = "" if opacity == 1 else f' fill-opacity="{opacity:g}"'
             return (
-                f'<path d="{path}" fill="{css_color(fill)}"{shown} fill-rule="evenodd"{_end("path", title)}'
+                f'<path{named} d="{path}" fill="{css_color(fill)}"{shown} fill-rule="evenodd"'
+                f"{_end('path', title)}"
             )
         case Lines(_, color, thickness, kind, title):
             return (
-                f'<path{_class(kind)} d="{path}" fill="none" stroke="{css_color(color)}" '
+                f'<path{named}{_class(kind)} d="{path}" fill="none" stroke="{css_color(color)}" '
                 f'stroke-width="{_number(thickness)}" stroke-linejoin="round" stroke-linecap="butt"'
                 f"{_end('path', title)}"
             )

@@ -15,6 +15,7 @@ from rose2_logs.model.borders import Border, unsure_of
 from rose2_logs.model.labels import known_window
 from rose2_logs.model.occupancy import UNKNOWN, BoolArray, FloatArray, GridGeometry, OccupancySnapshot
 from rose2_logs.model.outlines import outline
+from rose2_logs.model.room_names import room_name
 from rose2_logs.model.room_quality import RoomQuality, is_unsure
 from rose2_logs.model.rooms import Doorway
 
@@ -22,6 +23,12 @@ PREDICTED_MIN_WIDTH_M = 0.3
 """Narrower unseen parts of rooms are not drawn or exported: they are walls, whose inside is never seen."""
 RAY_WIDTH_M = 0.5
 """Display only: known parts that are narrower, rays that left through a gap, do not enlarge a picture."""
+WALL_JOIN_M = 0.1
+"""Segments up to twice this far apart are one wall, whose two faces and rows of cells gave several."""
+WALL_EDGE_M = 0.025
+"""The outline of a wall is this far from its segments, which run along the middles of cells."""
+WALL_DETAIL_M = 0.03
+"""Steps up to this high in the outline of a wall are straightened: less than a cell."""
 ROUNDING_CELLS = 0.25
 """Half the distance that a corner may have from the cell that it is rounded to."""
 
@@ -46,6 +53,8 @@ class PlanRoom:
         Share of its outline supported by walls, see `RoomQuality`; None where it was not measured.
     frontier_m : float or None
         Its open frontier.
+    given_name : str
+        Name that it was given, empty for none.
     """
 
     number: int
@@ -55,11 +64,12 @@ class PlanRoom:
     neighbors: tuple[int, ...]
     wall_support: float | None = None
     frontier_m: float | None = None
+    given_name: str = ""
 
     @property
     def name(self) -> str:
         """What it is called."""
-        return f"Room {self.number}"
+        return room_name(self.number, self.given_name)
 
     @property
     def is_unsure(self) -> bool:
@@ -201,6 +211,23 @@ def plan_of_analysis(
     return RoomPlan(
         title, snapshot.geometry.frame_id, tuple(rooms), found.doorways, walls, below, analysis.borders
     )
+
+
+def wall_outlines(plan: RoomPlan) -> list[shapely.Polygon]:
+    """Join the many wall segments that overlap into the outlines of walls.
+
+    Returns
+    -------
+    list of Polygon
+        Walls that meet are one; world meters, by the lowest corner from left to right. Empty where no walls
+        are known.
+    """
+    if plan.walls_m is None or not len(plan.walls_m):
+        return []
+    lines = shapely.linestrings(plan.walls_m)
+    wide = shapely.union_all(shapely.buffer(lines, WALL_JOIN_M, cap_style="square", join_style="mitre"))
+    walls = shapely.buffer(wide, WALL_EDGE_M - WALL_JOIN_M, join_style="mitre").simplify(WALL_DETAIL_M)
+    return sorted(shapely.get_parts(walls), key=lambda wall: wall.bounds)
 
 
 def predicted_parts(plan: RoomPlan) -> dict[int, BaseGeometry]:

@@ -43,6 +43,8 @@ def _room_rows(comparison: LayoutComparison) -> list[Row]:
             "status": change.status,
             "tracks_a": list(change.tracks_a),
             "tracks_b": list(change.tracks_b),
+            "names_a": [comparison.a.name_of(track) for track in change.tracks_a],
+            "names_b": [comparison.b.name_of(track) for track in change.tracks_b],
             "iou": change.iou,
             "explored_iou": change.explored_iou,
             "explored_share": change.explored_share,

@@ -54,6 +54,7 @@ def back_projected_plan(run: StoredRun, snapshot: int) -> RoomPlan:
             float(area),
             (point[0], point[1]),
             room.neighbors,
+            given_name=room.given_name,
         )
         for room, area, point in zip(last.rooms, found.areas_m2, points, strict=True)
         if area > 0

@@ -219,6 +219,14 @@ class Run(StoredRun, Sequence["RunSnapshot"]):
         return {}
 
 
+def named_run(folder: Path, names: Path | None) -> Run:
+    """Open a stored run, whose rooms are called by other names where a file of names is given."""
+    run = Run(folder)
+    if names is not None:
+        run.rename(names)
+    return run
+
+
 class RunSnapshot:
     """One map of a stored run.
 

@@ -10,6 +10,7 @@ from typing import Self
 
 import numpy as np
 
+from rose2_logs.config.kinds import KindParameters
 from rose2_logs.config.parameters import OccupancyParameters
 from rose2_logs.runs import tables
 from rose2_logs.runs.history import RunHistory, RunSummary
@@ -44,6 +45,8 @@ class RunStore:
         Output folder, created if needed.
     parameters : OccupancyParameters
         Which cells are free and which occupied.
+    kinds : KindParameters, optional
+        For the guess of kinds of rooms.
     back_project : bool
         Whether to write the table of the back-projected rooms, too.
     has_parts : bool
@@ -54,12 +57,14 @@ class RunStore:
         self,
         folder: Path,
         parameters: OccupancyParameters,
+        kinds: KindParameters | None = None,
         *,
         back_project: bool = False,
         has_parts: bool = False,
     ) -> None:
         self._folder = folder
         self._parameters = parameters
+        self._kinds = kinds or KindParameters()
         self._has_parts = has_parts
         self._names = (*TABLES, BACK_PROJECTED) if back_project else TABLES
         self._stack = ExitStack()
@@ -87,7 +92,7 @@ class RunStore:
         key = snapshot_key(step)
         rows: dict[str, list[Row]] = {
             ALONG: [tables.snapshot_row(step, history.snapshot_refs[step.snapshot.index])],
-            "rooms": tables.room_rows(step),
+            "rooms": tables.room_rows(step, self._kinds),
             "events": tables.event_rows(step),
             "doorways": tables.doorway_rows(step),
             "borders": tables.border_rows(step),
@@ -138,7 +143,9 @@ class RunStore:
         for part, of_part in summary.parts.items() or [(None, summary)]:
             for track, of_track in sorted(of_part.histories.tracks.items()):
                 in_last_map = track in of_part.histories.in_last_map
-                row = tables.track_row(track, of_track, of_part.convergence, in_last_map=in_last_map)
+                row = tables.track_row(
+                    track, of_track, of_part.convergence, self._kinds, in_last_map=in_last_map
+                )
                 self._tables["tracks"].add([tables.part_key(part) | row])
         for name in ("snapshots", "tracks"):
             self._tables[name].close()

@@ -21,9 +21,11 @@ from rose2_logs.errors import InvalidMapError, ParameterError, ResultsError
 from rose2_logs.io.discovery import ANNOTATED_ENDING
 from rose2_logs.model.analysis import Walls
 from rose2_logs.model.borders import Border
-from rose2_logs.model.occupancy import GridGeometry
+from rose2_logs.model.occupancy import GridGeometry, OccupancySnapshot
+from rose2_logs.model.room_names import room_name
 from rose2_logs.model.room_plan import PlanMap, PlanRoom, RoomPlan
 from rose2_logs.model.rooms import Doorway
+from rose2_logs.runs.names import names_in, tell_unused
 from rose2_logs.runs.summary import RESULTS_FORMAT, SUMMARY
 from rose2_logs.runs.summary_schema import what_it_lacks
 from rose2_logs.runs.tables import BACK_PROJECTED, TABLES, Row, unpack_image
@@ -121,6 +123,41 @@ class StoredRun:
                     raise ResultsError(
                         f"{path}: its parameters.{block}.{name} is missing; {MAKE_AGAIN}", file=path
                     )
+
+    @cached_property
+    def names(self) -> dict[int, str]:
+        """Names that rooms were given, by track."""
+        rows = self.table("tracks", ["track", "name"]).to_pylist()
+        return {row["track"]: row["name"] for row in rows if row["name"]}
+
+    def name_of(self, track: int) -> str:
+        """Return what a room is called."""
+        return room_name(track, self.names.get(track, ""))
+
+    def rename(self, path: Path) -> None:
+        """Call rooms by other names than the run has stored; those that it names not keep theirs.
+
+        Parameters
+        ----------
+        path : path
+            As for the option ``names`` of `RunOptions`; points and outlines are those of the last map.
+
+        Raises
+        ------
+        ParameterError
+            If the names cannot be read, or a plan of outlines does not fit the last map.
+        ResultsError
+            If the results cannot be read.
+        """
+        last = self.choose()
+        below, _ = self.map(last)
+        snapshot = OccupancySnapshot(last, 0, 0, "", below.cells, below.geometry)
+        given = names_in(snapshot, path, self.parameters, below.occupancy)
+        rows = self.table("tracks", ["track", "polygon_wkb"]).to_pylist()
+        tracks = [row["track"] for row in rows]
+        found = given.of(tracks, self.shapes("tracks", [row["polygon_wkb"] for row in rows]))
+        tell_unused(path, given.unused(found, tracks))
+        self.names.update({track: name for track, name in zip(tracks, found, strict=True) if name})
 
     @property
     def annotated_log(self) -> Path | None:
@@ -340,7 +377,10 @@ class StoredRun:
         row = self.row(snapshot)
         rows = self.table("rooms", snapshot=snapshot).to_pylist()
         shapes = self.shapes("rooms", [each["polygon_wkb"] for each in rows])
-        rooms = [_room(each, shape) for each, shape in zip(rows, shapes, strict=True)]
+        names = self.names
+        rooms = [
+            _room(each, shape, names.get(each["track"], "")) for each, shape in zip(rows, shapes, strict=True)
+        ]
         doorways = [_doorway(each) for each in self.table("doorways", snapshot=snapshot).to_pylist()]
         borders = [_border(each) for each in self.table("borders", snapshot=snapshot).to_pylist()]
         walls = self.found_walls(snapshot) if with_walls else None
@@ -407,7 +447,7 @@ def _reading(path: Path) -> Iterator[None]:
         raise ResultsError(f"{path}: cannot be read: {why}; {MAKE_AGAIN}", file=path) from error
 
 
-def _room(row: Row, shape: BaseGeometry) -> PlanRoom:
+def _room(row: Row, shape: BaseGeometry, name: str) -> PlanRoom:
     point = (row["label_x_m"], row["label_y_m"])
     return PlanRoom(
         row["track"],
@@ -417,6 +457,7 @@ def _room(row: Row, shape: BaseGeometry) -> PlanRoom:
         tuple(row["neighbors"]),
         row["wall_support"],
         row["frontier_m"],
+        name,
     )
 
 

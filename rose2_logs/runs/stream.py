@@ -19,6 +19,7 @@ from rose2_logs.model.analysis import SnapshotAnalysis
 from rose2_logs.model.explored import coarser_for_its_size
 from rose2_logs.model.far_cells import find_far_cells
 from rose2_logs.model.occupancy import OccupancySnapshot, free_area_m2, is_same_to_analysis
+from rose2_logs.model.room_names import RoomNames
 from rose2_logs.runs.journal import Found, JournaledWorkers
 from rose2_logs.segmentation.pipeline import analyze
 from rose2_logs.system.warnings import log_warning
@@ -68,6 +69,8 @@ class TrackedStream:
     part_at : callable, optional
         Returns the part of the run that the map of a log time is of, None if the run has no parts. Each part
         has its own coverage and tracks.
+    names : RoomNames, optional
+        What rooms are called.
 
     Attributes
     ----------
@@ -90,6 +93,7 @@ class TrackedStream:
         topic: str | None = None,
         path: RobotPath | None = None,
         part_at: Callable[[int], int | None] = lambda _: None,
+        names: RoomNames | None = None,
     ) -> None:
         self.invalid = 0
         self.unchanged = 0
@@ -104,6 +108,7 @@ class TrackedStream:
         self._occupancy = parameters.occupancy
         self._source, self._topic = source, topic
         self._path = path
+        self._names = names
         self._tracker = RoomTracker(parameters.tracking, parameters.occupancy)
         self._layout = LayoutFollower()
         self._has_told_coarser = self._has_told_far = False
@@ -117,6 +122,7 @@ class TrackedStream:
         *,
         with_path: bool = False,
         base_frame: str | None = None,
+        names: RoomNames | None = None,
     ) -> TrackedStream:
         """Follow the rooms through an open log.
 
@@ -130,6 +136,8 @@ class TrackedStream:
             Whether to read where the robot was.
         base_frame : str, optional
             Frame of the robot's base, where it is none of the usual ones.
+        names : RoomNames, optional
+            As for the class.
 
         Raises
         ------
@@ -151,6 +159,7 @@ class TrackedStream:
             topic=reader.topic,
             path=reader.robot_path(last.geometry.frame_id, base_frame) if with_path else None,
             part_at=reader.part_at,
+            names=names,
         )
         stream.last_log_time_ns = last.log_time_ns
         stream._has_told_far = True  # the reader leaves them out, and tells it
@@ -188,9 +197,10 @@ class TrackedStream:
         change = self._layout.update(analysis.rooms, track_ids, map_motion(events))
         coverage = self._coverage(analysis.free_area_m2)
         poses = None if self._path is None else self._path.until(snapshot.log_time_ns)
+        names = () if self._names is None else self._names.of(track_ids, analysis.polygons)
         quality = analysis.quality
         return TrackedSnapshot(
-            snapshot, analysis, coverage, track_ids, begun + events, quality, change, poses, self._part
+            snapshot, analysis, coverage, track_ids, begun + events, quality, change, poses, self._part, names
         )
 
     def _begun_part(self, snapshot: OccupancySnapshot) -> tuple[RoomEvent, ...]:

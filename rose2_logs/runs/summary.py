@@ -15,7 +15,7 @@ from rose2_logs.system.files import reason_of, replacing
 
 SUMMARY = "summary.json"
 """Its name in the folder of a run."""
-RESULTS_FORMAT = 2
+RESULTS_FORMAT = 3
 """Number of the layout of a run's folder; 1, without the number, was that of version 0.1."""
 
 

@@ -19,6 +19,8 @@ def _table(columns: dict[str, tuple[pa.DataType, str]], metadata: dict[str, str]
 
 _NULLABLE = frozenset(
     {
+        "name",
+        "kind_guess",
         "label_x_m",
         "label_y_m",
         "clean_threshold",
@@ -55,6 +57,14 @@ _EVIDENCE: dict[str, tuple[pa.DataType, str]] = {
         "share of the outline, including its predicted part, supported by occupied cells; doorways are not",
     ),
     "frontier_m": (pa.float64(), "open frontier: border of its free cells to unknown ones, meters"),
+}
+
+_CALLED: dict[str, tuple[pa.DataType, str]] = {
+    "name": (pa.string(), "name that a person gave it; null for none"),
+    "kind_guess": (
+        pa.string(),
+        "corridor, hall, closet or room: a guess from its shape, by the parameters kinds; null without one",
+    ),
 }
 
 _SNAPSHOTS_ALONG: dict[str, tuple[pa.DataType, str]] = {
@@ -148,6 +158,7 @@ ROOMS = _table(
         **_SNAPSHOT,
         "track": (pa.int32(), "number of the room over the run, from 1"),
         "room": (pa.int32(), "number of the room in this snapshot, from 1"),
+        **_CALLED,
         "area_m2": (pa.float64(), "area seen, square meters"),
         "predicted_area_m2": (
             pa.float64(),
@@ -229,6 +240,7 @@ BACK_PROJECTED = _table(
 TRACKS = _table(
     {
         "track": (pa.int32(), "number of the room over the run, from 1"),
+        **_CALLED,
         "first_snapshot": (pa.int32(), "first map that shows it"),
         "first_time_s": (pa.float64(), "when that was, log time since the first map, seconds"),
         "first_coverage": (pa.float64(), "coverage then, share in [0, 1]"),
@@ -355,6 +367,8 @@ ROOM_CHANGES = _table(
         ),
         "tracks_a": (pa.list_(pa.int32()), "tracks of the rooms of A, ascending; none for a new room"),
         "tracks_b": (pa.list_(pa.int32()), "tracks of the rooms of B, ascending; none for a missing room"),
+        "names_a": (pa.list_(pa.string()), "what these rooms are called in A"),
+        "names_b": (pa.list_(pa.string()), "what these rooms are called in B"),
         "iou": (pa.float64(), "intersection over union of A's and B's shapes, share"),
         "explored_iou": (
             pa.float64(),

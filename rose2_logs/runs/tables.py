@@ -9,9 +9,11 @@ import numpy as np
 import zstandard
 from numpy.typing import NDArray
 
+from rose2_logs.config.kinds import KindParameters
 from rose2_logs.config.parameters import OccupancyParameters
 from rose2_logs.model.labels import known_window
 from rose2_logs.model.occupancy import UNKNOWN, classify
+from rose2_logs.model.room_kinds import guess_kind
 from rose2_logs.tracking.back_projection import BackProjectedSnapshot
 from rose2_logs.tracking.convergence import Convergence
 from rose2_logs.tracking.track_history import SnapshotRef, TrackHistory, quality_of
@@ -84,7 +86,7 @@ def snapshot_row(step: TrackedSnapshot, ref: SnapshotRef) -> Row:
     }
 
 
-def room_rows(step: TrackedSnapshot) -> list[Row]:
+def room_rows(step: TrackedSnapshot, kinds: KindParameters) -> list[Row]:
     """Give a row per room, by track."""
     rooms, tracks = step.analysis.rooms, step.track_ids
     rows = []
@@ -96,6 +98,8 @@ def room_rows(step: TrackedSnapshot) -> list[Row]:
             {
                 "track": track,
                 "room": number,
+                "name": step.given_name(number - 1) or None,
+                "kind_guess": guess_kind(polygon, kinds) or None,
                 "area_m2": float(rooms.areas_m2[number - 1]),
                 "predicted_area_m2": polygon.area,
                 "label_x_m": x,
@@ -255,10 +259,14 @@ def back_projected_rows(found: BackProjectedSnapshot) -> list[Row]:
     ]
 
 
-def track_row(track: int, history: TrackHistory, convergence: Convergence, *, in_last_map: bool) -> Row:
+def track_row(
+    track: int, history: TrackHistory, convergence: Convergence, kinds: KindParameters, *, in_last_map: bool
+) -> Row:
     """Give the row of a track."""
     return {
         "track": track,
+        "name": history.name or None,
+        "kind_guess": guess_kind(history.polygon, kinds) or None,
         **_snapshot_ref_columns("first", history.first),
         **_snapshot_ref_columns("last", history.last),
         "maps": history.maps,

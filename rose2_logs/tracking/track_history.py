@@ -45,6 +45,8 @@ class TrackHistory:
         Its area in the last of them, as far as it was seen.
     polygon : shapely Polygon or MultiPolygon
         Its shape there, with the predicted part.
+    name : str
+        Name that it was given last, empty for none.
     wall_support, frontier_m : float or None
         Evidence there, None where it was not measured.
     splits, merges, losses : int
@@ -56,6 +58,7 @@ class TrackHistory:
     maps: int = 0
     area_m2: float = 0.0
     polygon: BaseGeometry = field(default_factory=Polygon)
+    name: str = ""
     wall_support: float | None = None
     frontier_m: float | None = None
     splits: int = 0
@@ -110,6 +113,7 @@ class TrackHistories:
             history.maps += 1
             history.area_m2 = float(rooms.areas_m2[number])
             history.polygon = rooms.polygons[number]
+            history.name = step.given_name(number) or history.name
             history.wall_support, history.frontier_m = quality_of(step, number)
         for event in step.events:
             self._count(event)

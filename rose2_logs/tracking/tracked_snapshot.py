@@ -91,6 +91,8 @@ class TrackedSnapshot:
         Poses of the robot since the map before: x, y in world meters, yaw in radians.
     part : int, optional
         Number of the part, from 1, in a log in which maps were begun anew or are of several publishers.
+    names : tuple of R str
+        Names that were given to the rooms, empty for none; an empty tuple where no names were given.
 
     Examples
     --------
@@ -108,12 +110,17 @@ class TrackedSnapshot:
     change: LayoutChange | None = None
     path: FloatArray | None = None
     part: int | None = None
+    names: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         return (
             f"TrackedSnapshot(index={self.snapshot.index}, coverage={self.coverage:.2f}, "
             f"tracks={list(self.track_ids)}, {self.snapshot.geometry.size_text})"
         )
+
+    def given_name(self, number: int) -> str:
+        """Name that was given to room `number` + 1, empty for none."""
+        return self.names[number] if self.names else ""
 
     @property
     def rooms(self) -> RoomMap:

@@ -18,9 +18,11 @@ from rose2_logs.io import open_log
 from rose2_logs.io.discovery import stem_of
 from rose2_logs.io.log import LogReader
 from rose2_logs.model.analysis import left_out_note
+from rose2_logs.model.room_names import TrackNames
 from rose2_logs.outputs.mcap.viewer_layouts import bag_metadata_path, foxglove_path, rviz_path
 from rose2_logs.runs.history import RunHistory, RunSummary
 from rose2_logs.runs.journal import JournaledWorkers
+from rose2_logs.runs.names import names_in, tell_unused
 from rose2_logs.runs.output_folder import OutputFolder
 from rose2_logs.runs.provenance import fingerprint, software_versions
 from rose2_logs.runs.sink import RunInfo, Sink, abandoned_on_error, as_sinks
@@ -154,9 +156,10 @@ def _analyze_log(
         prepared = output.prepared(_facts(info, options), overwrite=options.overwrite, resume=options.resume)
         with prepared as (work, journal):
             planned = _planned_files(work, path, options)
-            outputs = [*sinks, *_make_sinks(planned, options, reader)]
+            called = TrackNames()
+            outputs = [*sinks, *_make_sinks(planned, options, reader, called)]
             workers = JournaledWorkers(processes, journal) if options.journal else processes
-            summary = _follow(reader, workers, work, info, options, outputs, on_snapshot)
+            summary = _follow(reader, workers, work, info, options, outputs, called, on_snapshot)
             if options.origin is not None:
                 warnings.rename(str(path), options.origin)
             seconds = time.perf_counter() - start
@@ -201,21 +204,27 @@ def _follow(
     info: RunInfo,
     options: RunOptions,
     sinks: Sequence[Sink],
+    called: TrackNames,
     on_snapshot: OnSnapshot | None,
 ) -> RunSummary:
     """Take the log's maps one by one to the history, the store and the sinks, and finish these."""
     parameters = options.parameters
     history = RunHistory(parameters, back_project=options.back_project)
+    names = None
+    if options.names is not None:
+        names = names_in(reader.last(), Path(options.names), parameters, parameters.occupancy)
     stream = TrackedStream.of_log(
         reader,
         workers,
         parameters,
         with_path="path" in options.shown_layers or options.annotated_log,
         base_frame=options.base_frame,
+        names=names,
     )
     store = RunStore(
         folder,
         parameters.occupancy,
+        parameters.kinds,
         back_project=options.back_project,
         has_parts=reader.part_count > 1,
     )
@@ -225,6 +234,7 @@ def _follow(
         for step in stream:
             history.add(step)
             store.write(step, history)
+            called.add(step.track_ids, step.names)
             for sink in sinks:
                 sink.write(step)
             _tell_progress(step, history, stream, on_snapshot)
@@ -235,6 +245,10 @@ def _follow(
         note = left_out_note(history.totals.outside_m2_last, history.totals.free_m2_last)
         if note is not None:
             logger.warning("%s: in the last map, %s", info.origin or info.log_path, note)
+        if options.names is not None and names is not None:
+            last = history.histories.in_last_map
+            used = [history.histories.tracks[track].name for track in last]
+            tell_unused(Path(options.names), names.unused(used, last))
         summary = store.finish(history)
         for sink in sinks:
             sink.finish(summary)
@@ -303,13 +317,18 @@ def _planned_files(folder: Path, log: Path, options: RunOptions) -> dict[str, Pa
     return files | {"summary": folder / SUMMARY}
 
 
-def _make_sinks(planned: dict[str, Path], options: RunOptions, reader: LogReader) -> list[Sink]:
+def _make_sinks(
+    planned: dict[str, Path], options: RunOptions, reader: LogReader, called: TrackNames
+) -> list[Sink]:
     # Imported here: each brings a large library that the others do not need.
     sinks: list[Sink] = []
     if options.recording or options.live:
         from rose2_logs.outputs.rerun.recording import RerunRecording
 
-        sinks.append(RerunRecording(planned.get("recording"), live=options.live, layers=options.layers))
+        recording = RerunRecording(
+            planned.get("recording"), live=options.live, layers=options.layers, name_of=called
+        )
+        sinks.append(recording)
     if options.annotated_log:
         from rose2_logs.outputs.mcap.annotated import AnnotatedMcap
 

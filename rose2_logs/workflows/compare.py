@@ -5,15 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
-from rose2_logs.comparison.final_layout import FinalLayout
 from rose2_logs.comparison.layouts import LayoutComparison, compare_layouts
-from rose2_logs.comparison.placement import PlacedMap
 from rose2_logs.config.parameters import Parameters
 from rose2_logs.errors import OutputError, ResultsError
-from rose2_logs.model.occupancy import OccupancySnapshot
-from rose2_logs.runs.run import Run
+from rose2_logs.runs.last_layout import read_final_layout
+from rose2_logs.runs.run import Run, named_run
 from rose2_logs.runs.summary import SUMMARY
 from rose2_logs.system.files import refuse_existing, writing
 
@@ -22,6 +18,7 @@ FILES = (
     "wall_changes.parquet",
     "comparison.json",
     "comparison.png",
+    "comparison.html",
     "comparison.rrd",
 )
 
@@ -43,6 +40,7 @@ def compare_runs(
     recording: bool = True,
     overwrite: bool = False,
     parameters: Parameters | None = None,
+    names: Path | None = None,
 ) -> ComparisonResult:
     """Compare the last layouts of two runs and write what differs.
 
@@ -58,6 +56,8 @@ def compare_runs(
         Whether an earlier comparison may be replaced.
     parameters : Parameters, optional
         Of the comparison.
+    names : path, optional
+        Other names for the rooms of A, see `Run.rename`.
 
     Raises
     ------
@@ -69,23 +69,27 @@ def compare_runs(
     """
     from rose2_logs.drawing.comparison_picture import draw_comparison
     from rose2_logs.outputs.comparison_tables import write_comparison_summary, write_comparison_tables
+    from rose2_logs.outputs.report.comparison import comparison_page
+    from rose2_logs.outputs.report.page import write_page
 
     if (folder / SUMMARY).is_file():
         raise OutputError(f"{folder}: holds the results of a run; write the comparison to another folder")
     files = tuple(folder / name for name in FILES)
     refuse_existing(files, overwrite=overwrite)
     name_a, name_b = _names(folder_a, folder_b)
-    comparison = compare_stored(Run(folder_a), Run(folder_b), name_a, name_b, parameters)
+    comparison = compare_stored(named_run(folder_a, names), Run(folder_b), name_a, name_b, parameters)
     write_comparison_tables(files[0], files[1], comparison)
     write_comparison_summary(files[2], comparison, folder_a, folder_b)
-    draw_comparison(comparison).save(files[3], width_px=None)
+    drawing = draw_comparison(comparison)
+    drawing.save(files[3], width_px=None)
+    write_page(files[4], comparison_page(comparison, drawing))
     if recording:
         from rose2_logs.outputs.rerun.comparison import write_comparison_recording
 
-        write_comparison_recording(files[4], comparison)
+        write_comparison_recording(files[5], comparison)
         return ComparisonResult(comparison, folder, files)
-    with writing(files[4]):
-        files[4].unlink(missing_ok=True)  # of the comparison that this one replaces
+    with writing(files[5]):
+        files[5].unlink(missing_ok=True)  # of the comparison that this one replaces
     return ComparisonResult(comparison, folder, files[:-1])
 
 
@@ -128,25 +132,3 @@ def _names(folder_a: Path, folder_b: Path) -> tuple[str, str]:
         if parts_a[-count:] != parts_b[-count:]:
             return "/".join(parts_a[-count:]), "/".join(parts_b[-count:])
     return folder_a.resolve().name, folder_b.resolve().name
-
-
-def read_final_layout(run: Run, name: str | None = None, parameters: Parameters | None = None) -> FinalLayout:
-    """Take the last layout of a stored run, called by the run's name unless another is given.
-
-    Raises
-    ------
-    ResultsError
-        If a file of the results cannot be read.
-    """
-    last = run.choose()
-    below, _ = run.map(last)
-    snapshot = OccupancySnapshot(last, 0, 0, "", below.cells, below.geometry)
-    rooms = run.table("rooms", ["track", "area_m2", "polygon_wkb"], last).to_pylist()
-    return FinalLayout(
-        name=name or run.name,
-        map=PlacedMap(snapshot, below.occupancy, parameters),
-        tracks=tuple(row["track"] for row in rooms),
-        shapes=tuple(run.shapes("rooms", [row["polygon_wkb"] for row in rooms])),
-        areas_m2=np.array([row["area_m2"] for row in rooms], float),
-        walls=run.found_walls(last),
-    )

@@ -8,7 +8,7 @@ from pathlib import Path
 from rose2_logs.drawing.drawing import ENDINGS
 from rose2_logs.errors import ParameterError
 from rose2_logs.outputs.exports.formats import planned_files, write_plan
-from rose2_logs.runs.run import Run
+from rose2_logs.runs.run import Run, named_run
 from rose2_logs.system.files import refuse_existing
 from rose2_logs.workflows import FIGURE_WIDTH_PX
 
@@ -22,6 +22,7 @@ def write_figure(
     back_projected: bool = False,
     width_px: int = FIGURE_WIDTH_PX,
     overwrite: bool = False,
+    names: Path | None = None,
 ) -> Path:
     """Draw the layout of a map.
 
@@ -40,6 +41,8 @@ def write_figure(
         Width of a PNG.
     overwrite : bool
         Whether a picture may be replaced.
+    names : path, optional
+        Other names for rooms, see `Run.rename`.
 
     Returns
     -------
@@ -55,7 +58,7 @@ def write_figure(
     OutputError
         If the picture exists and may not be replaced, or cannot be written.
     """
-    results = Run(folder)
+    results = named_run(folder, names)
     number = results.choose(snapshot, coverage)
     stem = f"{_stem(results, number)}.back_projected" if back_projected else _stem(results, number)
     out = folder / f"{stem}.figure.png" if out is None else out
@@ -73,6 +76,7 @@ def export_plan(
     coverage: float | None = None,
     *,
     overwrite: bool = False,
+    names: Path | None = None,
 ) -> list[Path]:
     """Write the floor plan of a map for other programs.
 
@@ -88,6 +92,8 @@ def export_plan(
         Which map, see `Run.choose`; its number is part of the files' names if it is not the last.
     overwrite : bool
         Whether files may be replaced.
+    names : path, optional
+        Other names for rooms, see `Run.rename`.
 
     Returns
     -------
@@ -99,7 +105,7 @@ def export_plan(
     LogError, ParameterError, OutputError
         As `write_figure`, or if there is no such format.
     """
-    results = Run(folder)
+    results = named_run(folder, names)
     number = results.choose(snapshot, coverage)
     out = folder if out is None else out
     stem = _stem(results, number)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -69,6 +70,10 @@ def test_compare_tells_what_differs(cli, results, tmp_path: Path):
     assert sum(missing) == pytest.approx(4, abs=0.6)
     with Image.open(tmp_path / "out" / "comparison.png") as picture:
         assert picture.width >= 900
+    page = (tmp_path / "out" / "comparison.html").read_text(encoding="utf-8")
+    assert page.count("<tr>") == 2 + len(walls) + 2  # rooms, walls, and the headings of both tables
+    assert "<strong>merged</strong>: several rooms of A are one of B" in page
+    assert not re.search(r"@import|url\(|https?://(?!www\.w3\.org/(?:2000/svg|1999/xlink)\b)", page)
     verified = subprocess.run(
         [BIN / "rerun", "rrd", "verify", tmp_path / "out" / "comparison.rrd"],
         capture_output=True,

@@ -35,6 +35,8 @@ from rose2_logs.model.room_plan import PlanRoom, RoomPlan
 from rose2_logs.model.rooms import Doorway
 
 SVG = "{http://www.w3.org/2000/svg}"
+XLINK = "{http://www.w3.org/1999/xlink}"
+INKSCAPE = "{http://www.inkscape.org/namespaces/inkscape}"
 
 
 def seen_color(number: int) -> np.ndarray:
@@ -64,20 +66,54 @@ def test_pixels_show_rooms_where_they_are(yaw_rad: float):
 
 
 def test_svg_is_xml_with_the_same_picture_and_shapes():
-    """The picture within holds the cells' colors, paths are rooms, texts their names; markup is escaped."""
+    """The picture within holds the gray map, paths are rooms, texts their names; markup is escaped."""
     plan = two_rooms_plan()
     text = as_svg(draw_plan(plan))
     root = ET.fromstring(text)
     assert root.get("aria-label") == plan.title == root.findtext(f"{SVG}title")
     (image,) = root.iter(f"{SVG}image")
-    pixels = np.asarray(Image.open(io.BytesIO(base64.b64decode(image.get("href").split(",")[1]))))
+    pixels = np.asarray(Image.open(io.BytesIO(base64.b64decode(image.get(f"{XLINK}href").split(",")[1]))))
     assert pixels.shape == (32, 62, 3)
-    assert (pixels[10, 10] == seen_color(LEFT)).all()
+    assert (pixels[10, 10] == FREE_GRAY).all()
     texts = [element.text for element in root.iter(f"{SVG}text")]
     assert {"Room 3", "Room 120", "12 m²", "predicted, unseen", "doorway"} <= set(texts)
     told = [element.text for element in root.iter(f"{SVG}title")]
     assert "Room 3: 12.0 m² seen of 12.0 m², 75% of its outline supported by walls" in told
     assert as_svg(draw_plan(two_rooms_plan())) == text
+
+
+def test_drawing_programs_find_each_room_and_each_kind_of_thing():
+    """A room is one path with an id and a title, in a layer of Inkscape; within a page there are no ids."""
+    plan = two_rooms_plan()
+    root = ET.fromstring(as_svg(draw_plan(plan)))
+    layers = {each.get(f"{INKSCAPE}label"): each for each in root.iter(f"{SVG}g")}
+    assert list(layers) == ["map", "unseen", "rooms", "outlines", "doorways", "names", "legend"]
+    assert all(each.get(f"{INKSCAPE}groupmode") == "layer" for each in layers.values())
+    rooms = {each.get("id"): each for each in layers["rooms"]}
+    assert list(rooms) == ["room-3", "room-120"]
+    assert rooms["room-3"].findtext(f"{SVG}title").startswith("Room 3: ")
+    assert rooms["room-3"].get("fill") != rooms["room-120"].get("fill")
+    assert {each.get("id") for each in layers["unseen"]} == {"room-120-unseen", "room-120-hatching"}
+    identities = [each.get("id") for each in root.iter() if each.get("id")]
+    assert len(set(identities)) == len(identities)
+    inline = ET.fromstring(as_svg(draw_plan(plan), is_inline=True))
+    assert not any(each.get("id") for each in inline.iter())
+
+
+def test_names_are_written_where_they_have_room():
+    """Along a corridor too; where a given name is too long, it is written smaller, then the number."""
+
+    def written(room: PlanRoom) -> dict[str, float]:
+        plan = RoomPlan("t", "map", (room,), ())
+        bounds = (0.0, 0.0, 20.0, 20.0)
+        texts = [each for each in draw_plan(plan, FIGURE, bounds).shapes if isinstance(each, Text)]
+        return {each.text: each.size for each in texts if each.y < 780}
+
+    corridor = PlanRoom(7, shapely.box(1, 9, 19, 10), 18.0, None, (), given_name="A long corridor")
+    assert written(corridor)["A long corridor"] == FIGURE.font
+    box = PlanRoom(7, shapely.box(5, 5, 7.1, 8), 6.3, None, (), given_name="Registry of all")
+    assert written(box)["Registry of all"] < FIGURE.font
+    assert "7" in written(dataclasses.replace(box, given_name="Registry of all the deeds"))
 
 
 def test_unsure_rooms_are_marked_and_the_legend_says_so():
@@ -183,10 +219,8 @@ def test_colors_of_rooms_may_be_given():
     """As where two layouts are compared, and partners have one color."""
     plan = two_rooms_plan()
     drawing = draw_plan(plan, PANEL, colors={LEFT: (200, 10, 10), RIGHT: (10, 10, 200)})
-    (picture,) = (each for each in drawing.shapes if isinstance(each, Picture))
-    red, blue = picture.pixels[10, 10].tolist(), picture.pixels[10, 50].tolist()
-    assert red[0] > red[2] + 50
-    assert blue[2] > blue[0] + 50
+    filled = [each for each in drawing.shapes if isinstance(each, Area) and each.opacity == SEEN_OPACITY]
+    assert [each.fill for each in filled] == [(200, 10, 10), (10, 10, 200)]
 
 
 def test_rooms_without_cells_are_filled_whole():
@@ -216,11 +250,15 @@ def test_walls_are_drawn_where_they_are_wanted():
 def test_a_segmentation_is_drawn_beside_its_map():
     """The same part of the world twice, once without rooms."""
     drawing = draw_segmentation(two_rooms_plan())
-    plain, colored = (each for each in drawing.shapes if isinstance(each, Picture))
-    assert plain.pixels.shape == colored.pixels.shape
-    assert np.ptp(plain.pixels.astype(int), axis=2).max() == 0
-    assert np.ptp(colored.pixels.astype(int), axis=2).max() > 50
-    assert np.abs(np.diff([plain.matrix[:, 2], colored.matrix[:, 2]], axis=0)).max() > 200
+    plain, below = (each for each in drawing.shapes if isinstance(each, Picture))
+    assert np.array_equal(plain.pixels, below.pixels)
+    apart = np.subtract(below.matrix[:, 2], plain.matrix[:, 2])
+    assert np.abs(apart).max() > 200
+    rooms = [each for each in drawing.shapes if isinstance(each, Area) and each.id in ("room-3", "room-120")]
+    assert len(rooms) == 2
+    x, y = np.min([shapely.bounds(each.shape)[:2] for each in rooms], axis=0)
+    assert x >= below.matrix[0, 2]
+    assert y >= below.matrix[1, 2] - plain.matrix[1, 2]
     with pytest.raises(ValueError, match="without a map"):
         draw_segmentation(dataclasses.replace(two_rooms_plan(), map=None))
 

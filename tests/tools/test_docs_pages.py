@@ -21,7 +21,7 @@ PROJECT = Path(__file__).parents[2]
 DOCS = PROJECT / "docs"
 PAGE_FILES = sorted(DOCS.rglob("*.md"))
 PICTURES_MAX_BYTES = 2_000_000
-ENDINGS = ("json", "parquet", "png", "rrd")
+ENDINGS = ("json", "parquet", "png", "rrd", "html")
 """Of files that are called like a block of parameters."""
 
 

@@ -12,6 +12,7 @@ from rich.markup import escape
 from rose2_logs.cli.messages import warning
 from rose2_logs.cli.printing import print_line, print_table
 from rose2_logs.config.parameters import Parameters
+from rose2_logs.model.room_names import short_name
 
 if TYPE_CHECKING:
     from rose2_logs.comparison.layouts import LayoutComparison
@@ -37,34 +38,30 @@ def compare(
         bool, typer.Option("--overwrite", help="Replace the results of an earlier comparison.")
     ] = False,
     no_rrd: Annotated[bool, typer.Option("--no-rrd", help="Write no Rerun recording.")] = False,
+    names: Annotated[
+        Path | None,
+        typer.Option(
+            "--names",
+            metavar="FILE",
+            help="Other names for the rooms of A, as for analyze.",
+            show_default=False,
+        ),
+    ] = None,
 ) -> None:
     """Compare the last layouts of two runs: rooms and walls that are new, missing or moved."""
     from rose2_logs.workflows.compare import compare_runs
 
-    result = compare_runs(a, b, out, recording=not no_rrd, overwrite=overwrite, parameters=parameters)
+    result = compare_runs(
+        a, b, out, recording=not no_rrd, overwrite=overwrite, parameters=parameters, names=names
+    )
     print_comparison(result)
 
 
 def print_comparison(result: ComparisonResult) -> None:
     """Print how the layouts are aligned, how rooms and walls changed, and where the results are."""
     found = result.comparison
-    if not found.same_building:
-        warning(
-            "these do not seem to be two runs in one building: hardly any walls agree, and what is changes "
-            "below means little"
-        )
-        if found.scale is not None:
-            cell_a_m, cell_b_m = found.a.map.resolution_m, found.b.map.resolution_m
-            warning(
-                f"B would fit if it were {found.scale:.2f} times as large: is the size of a cell right? With "
-                f"{cell_b_m * found.scale:.4f} m instead of {cell_b_m:.4f} m in B, or "
-                f"{cell_a_m / found.scale:.4f} m instead of {cell_a_m:.4f} m in A, they show one building"
-            )
-    elif found.ambiguous:
-        warning(
-            "the building fits about as well in another way, as when it looks the same turned by half a "
-            "circle: B may be misaligned with A"
-        )
+    for doubt in found.doubts:
+        warning(doubt)
     _print_overview(found)
     _print_rooms(found)
     _print_walls(found)
@@ -108,8 +105,8 @@ def _print_rooms(found: LayoutComparison) -> None:
     for change in found.rooms:
         table.add_row(
             change.status,
-            ", ".join(map(str, change.tracks_a)) or "-",
-            ", ".join(map(str, change.tracks_b)) or "-",
+            escape(", ".join(short_name(track, found.a.name_of) for track in change.tracks_a)) or "-",
+            escape(", ".join(short_name(track, found.b.name_of) for track in change.tracks_b)) or "-",
             f"{change.iou:.2f}",
             f"{change.explored_share:.0%}",
             f"{change.area_a_m2:.1f}",

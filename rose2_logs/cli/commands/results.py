@@ -47,6 +47,19 @@ Overwrite = Annotated[
 ]
 
 
+Names = Annotated[
+    Path | None,
+    typer.Option(
+        "--names",
+        metavar="FILE",
+        help="Other names for rooms, as for analyze: a table (CSV) with the columns name "
+        "and track, or name, x and y in meters of the last map; or GeoJSON or DXF with named outlines.",
+        show_default=False,
+        rich_help_panel=WHAT,
+    ),
+]
+
+
 def report(
     folder: Annotated[
         Path,
@@ -81,12 +94,13 @@ def report(
             rich_help_panel=WHAT,
         ),
     ] = None,
+    names: Names = None,
     overwrite: Overwrite = False,
 ) -> None:
     """Write the results of a run as one HTML page with pictures, curves and tables. It needs no network."""
     from rose2_logs.outputs.report.overview import write_reports
 
-    written = write_reports(folder, out, panels=panels, part=part, overwrite=overwrite)
+    written = write_reports(folder, out, panels=panels, part=part, overwrite=overwrite, names=names)
     for page in written.pages:
         print_file(page)
     for error in written.failed:
@@ -129,6 +143,7 @@ def figure(
             rich_help_panel=WHAT,
         ),
     ] = FIGURE_WIDTH_PX,
+    names: Names = None,
     overwrite: Overwrite = False,
 ) -> None:
     """Draw the layout of one map for print: rooms, predicted parts, doorways, scale bar."""
@@ -136,7 +151,7 @@ def figure(
 
     choice = _choice(snapshot, coverage, last)
     picture = write_figure(
-        folder, out, *choice, back_projected=back_projected, width_px=width, overwrite=overwrite
+        folder, out, *choice, back_projected=back_projected, width_px=width, overwrite=overwrite, names=names
     )
     print_file(picture)
 
@@ -149,7 +164,7 @@ def export(
             "--format",
             "-f",
             metavar="FORMAT",
-            help="geojson (GIS), dxf (CAD), svg, map_server (Nav2) or graph (networkx); may be repeated.",
+            help="geojson, qgis (layers), dxf (CAD), svg, map_server (Nav2), graph (networkx); repeatable.",
             rich_help_panel=WHAT,
         ),
     ],
@@ -167,13 +182,14 @@ def export(
             rich_help_panel=WHAT,
         ),
     ] = None,
+    names: Names = None,
     overwrite: Overwrite = False,
 ) -> None:
     """Write the floor plan of one map for other programs: GIS, CAD, Nav2, networkx."""
     from rose2_logs.workflows.figure import export_plan
 
     choice = _choice(snapshot, coverage, last)
-    for file in export_plan(folder, formats, out, *choice, overwrite=overwrite):
+    for file in export_plan(folder, formats, out, *choice, overwrite=overwrite, names=names):
         print_file(file)
 
 

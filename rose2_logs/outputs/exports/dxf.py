@@ -10,7 +10,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from rose2_logs.drawing.palette import track_color
-from rose2_logs.model.room_plan import RoomPlan, predicted_parts
+from rose2_logs.model.room_plan import RoomPlan, predicted_parts, wall_outlines
 from rose2_logs.system.files import replacing
 
 if TYPE_CHECKING:
@@ -25,6 +25,8 @@ TEXT_HEIGHT_M = 0.25
 """Readable on a print at 1:100 (2.5 mm)."""
 LABEL_RISE_M = 0.75 * TEXT_HEIGHT_M
 """The two lines of a label are centered this far above and below its point, half a line apart."""
+MARGIN = 1.05
+"""Of the view that a file is opened with, over all that is drawn."""
 HATCH_PATTERN, HATCH_SCALE = "ANSI31", 0.08
 """Lines at 45 degrees, about a quarter of a meter apart."""
 
@@ -37,7 +39,7 @@ def write_dxf(plan: RoomPlan, path: Path) -> None:
     OutputError
         If the file cannot be written.
     """
-    from ezdxf import options, units  # type: ignore[attr-defined]
+    from ezdxf import bbox, options, units, zoom  # type: ignore[attr-defined]
     from ezdxf.filemanagement import new
 
     # Without this the file would contain the time and random numbers; the same plan must give the same file.
@@ -46,7 +48,13 @@ def write_dxf(plan: RoomPlan, path: Path) -> None:
         document = new(VERSION, units=units.M)
         for name, color in LAYERS.items():
             document.layers.add(name, color=color)
-        _draw(plan, document.modelspace())
+        space = document.modelspace()
+        _draw(plan, space)
+        drawn = bbox.extents(space, fast=True)
+        if drawn.has_data:
+            # Programs open a file on the view in it; without one they show the surroundings of the origin.
+            space.reset_extents(drawn.extmin, drawn.extmax)
+            zoom.center(space, drawn.center, drawn.size * MARGIN)
         # By default ezdxf lists the classes in the order of a set, which changes from run to run.
         for name in sorted(document.entitydb.dxf_types_in_use()):
             document.classes.add_class(name)
@@ -85,8 +93,9 @@ def _draw(plan: RoomPlan, space: Modelspace) -> None:
     for door in plan.doorways:
         start, end = door.ends_m.tolist()
         space.add_line(start, end, dxfattribs={"layer": DOORWAYS})
-    for start, end in [] if plan.walls_m is None else plan.walls_m.tolist():
-        space.add_line(start, end, dxfattribs={"layer": WALLS})
+    for wall in wall_outlines(plan):
+        for ring in _rings(wall):
+            space.add_lwpolyline(ring, close=True, dxfattribs={"layer": WALLS})
 
 
 def _rings(shape: BaseGeometry) -> list[list[tuple[float, float]]]:

@@ -12,12 +12,15 @@ from rose2_logs.model.room_plan import RoomPlan
 from rose2_logs.outputs.exports.dxf import write_dxf
 from rose2_logs.outputs.exports.geojson import plan_geojson
 from rose2_logs.outputs.exports.graph import plan_graph
+from rose2_logs.outputs.exports.layers import ENDINGS as LAYER_ENDINGS
+from rose2_logs.outputs.exports.layers import write_layers
 from rose2_logs.outputs.exports.map_server import ENDINGS, write_labeled_map
 from rose2_logs.runs.summary import write_json
 from rose2_logs.system.files import replacing
 
 FORMATS: dict[str, tuple[str, ...]] = {
     "geojson": (".floor_plan.geojson",),
+    "qgis": LAYER_ENDINGS,
     "svg": (".floor_plan.svg",),
     "dxf": (".floor_plan.dxf",),
     "map_server": ENDINGS,
@@ -68,6 +71,7 @@ def write_plan(plan: RoomPlan, formats: Sequence[str], folder: Path, stem: str) 
     files = planned_files(formats, folder, stem)
     writers: dict[str, Callable[[Path], object]] = {
         "geojson": lambda path: write_json(path, plan_geojson(plan)),
+        "qgis": lambda path: write_layers(plan, folder, stem),
         "svg": lambda path: _write_text(path, as_svg(draw_plan(plan))),
         "dxf": lambda path: write_dxf(plan, path),
         "graph": lambda path: write_json(path, plan_graph(plan)),

@@ -248,7 +248,7 @@ class MessageMaker:
                     TEXT,
                     color=(0.0, 0.0, 0.0, 1.0),
                     width_m=sizes.label_m,
-                    text=f"{track}{sign}\n{rooms.areas_m2[number]:.0f} m2",
+                    text=f"{step.given_name(number) or track}{sign}\n{rooms.areas_m2[number]:.0f} m2",
                     position_m=(x, y),
                 ),
             ]

@@ -119,7 +119,7 @@ def run_charts(results: Run) -> list[Chart]:
         chart(
             "Area of the largest rooms, m²",
             "As far as they were seen.",
-            [(f"Room {numbers[k]}", areas[k], track_color(int(numbers[k]))) for k in largest],
+            [(results.name_of(int(numbers[k])), areas[k], track_color(int(numbers[k]))) for k in largest],
         )
         if len(largest)
         else None,

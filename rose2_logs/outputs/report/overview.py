@@ -9,11 +9,15 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
+from rose2_logs.comparison.final_layout import FinalLayout
+from rose2_logs.drawing.comparison_picture import draw_comparison
 from rose2_logs.drawing.pixels import as_pixels
 from rose2_logs.drawing.plan import PANEL, draw_plan
 from rose2_logs.drawing.svg import png_uri
 from rose2_logs.errors import LogError, ParameterError
 from rose2_logs.outputs.report import PANELS
+from rose2_logs.outputs.report.buildings import same_buildings
+from rose2_logs.outputs.report.comparison import changed_rooms, comparison_page
 from rose2_logs.outputs.report.facts import is_last
 from rose2_logs.outputs.report.page import REPORT_NAME, render, write_page, write_report
 from rose2_logs.outputs.report.words import (
@@ -27,6 +31,7 @@ from rose2_logs.outputs.report.words import (
     number,
     share,
 )
+from rose2_logs.runs.last_layout import read_final_layout
 from rose2_logs.runs.run import Run
 from rose2_logs.runs.stored_run import find_results
 from rose2_logs.system.files import refuse_existing
@@ -35,6 +40,16 @@ PICTURES_MOST = 100
 """Logs whose last layout is pictured on the page that lists them: about a megabyte."""
 PICTURE_PX = 320
 PICTURE = dataclasses.replace(PANEL, font=0.0)
+COMPARISON_ENDING = ".comparison.html"
+"""Of the page on what differs between a run and another of the same building; beside the run's own page."""
+BUILDING_COLUMNS = (
+    Column("log", is_number=False),
+    Column("rooms", "in the last map"),
+    Column("floor in both", "intersection over union of all rooms"),
+    Column("rooms alike", "mean overlap, by area"),
+    Column("walls agree", "where both have explored"),
+    Column("rooms by how they changed", is_number=False),
+)
 BATCH_FOLDER = "logs/"
 """Where a batch keeps the results of its logs; the names on the page leave it out."""
 BATCH_SUMMARY = "summary.csv"
@@ -58,6 +73,16 @@ class _Listed:
     name: str
     picture: str
     row: tuple[Cell, ...]
+    layout: FinalLayout
+
+
+@dataclass(frozen=True)
+class _Building:
+    """Runs of one building on the page that lists them: what they are compared with, their table."""
+
+    reference: str
+    table: Table
+    links: tuple[str, ...]
 
 
 def write_reports(
@@ -67,6 +92,7 @@ def write_reports(
     panels: int = PANELS,
     part: int | None = None,
     overwrite: bool = False,
+    names: Path | None = None,
 ) -> ReportsWritten:
     """Write the report of a log, or of all logs below a folder with a page that lists them.
 
@@ -76,8 +102,8 @@ def write_reports(
         What `analyze_log` or a batch has written.
     out : path, optional
         The page of one log; of several the folder for their pages. By default each goes next to its results.
-    panels, overwrite
-        As for `write_report`.
+    panels, overwrite, names
+        As for `write_report`; names are for the rooms of one log.
     part : int, optional
         As for `write_report`; only of one log.
 
@@ -96,36 +122,90 @@ def write_reports(
     """
     found = find_results(folder)
     if found == [folder]:
-        page = write_report(folder, out, panels=panels, part=part, overwrite=overwrite)
+        page = write_report(folder, out, panels=panels, part=part, overwrite=overwrite, names=names)
         return ReportsWritten((page,), ())
     if part is not None:
         raise ParameterError(f"{folder}: holds the results of several logs; part={part} is of one of them")
+    if names is not None:
+        raise ParameterError(f"{folder}: holds the results of {len(found)} logs; names are for those of one")
     base = folder if out is None else out
-    names = [each.relative_to(folder).as_posix() for each in found]
-    pages = [base / (f"{name}/{REPORT_NAME}" if out is None else f"{name}.html") for name in names]
+    below = [each.relative_to(folder).as_posix() for each in found]
+    pages = [base / (f"{name}/{REPORT_NAME}" if out is None else f"{name}.html") for name in below]
     listing = base / REPORT_NAME
     refuse_existing([listing, *pages], overwrite=overwrite)
     written: list[_Listed] = []
     failed: list[LogError] = []
-    for results_folder, name, page in zip(found, names, pages, strict=True):
+    for results_folder, name, page in zip(found, below, pages, strict=True):
         try:
             write_report(results_folder, page, panels=panels, overwrite=overwrite)
             results, shown = Run(results_folder), name.removeprefix(BATCH_FOLDER)
             picture = _picture(results) if len(written) < PICTURES_MOST else ""
             written.append(
-                _Listed(page, quote(page.relative_to(base).as_posix()), shown, picture, _row(results, shown))
+                _Listed(
+                    page,
+                    quote(page.relative_to(base).as_posix()),
+                    shown,
+                    picture,
+                    _row(results, shown),
+                    read_final_layout(results, shown),
+                )
             )
         except LogError as error:
             failed.append(error)
     if written:
+        buildings, not_compared = _buildings(written)
         title = f"Rooms of {len(written)} logs"
         table = _table([each.row for each in written])
         failures = _failures(folder)
-        write_page(
-            listing, render("overview.html.j2", title=title, table=table, logs=written, failures=failures)
+        page_text = render(
+            "overview.html.j2",
+            title=title,
+            table=table,
+            logs=written,
+            failures=failures,
+            buildings=buildings,
+            not_compared=not_compared,
         )
+        write_page(listing, page_text)
         return ReportsWritten((*(each.page for each in written), listing), tuple(failed))
     return ReportsWritten((), tuple(failed))
+
+
+def _buildings(written: list[_Listed]) -> tuple[list[_Building], int]:
+    """Compare the runs of each building with the one that shows most of it, on pages of their own.
+
+    Returns
+    -------
+    buildings : list of _Building
+    not_compared : int
+        Runs that were not compared with all others.
+    """
+    found, left_out = same_buildings([each.layout for each in written])
+    shown = []
+    for building in found:
+        rows, links = [], []
+        for place, comparison in sorted(building.others.items()):
+            each = written[place]
+            page = each.page.with_name(f"{each.page.stem}{COMPARISON_ENDING}")
+            write_page(page, comparison_page(comparison, draw_comparison(comparison)))
+            links.append(each.link.removesuffix(".html") + COMPARISON_ENDING)
+            rows.append(
+                (
+                    Cell(each.name),
+                    count(len(comparison.b.tracks)),
+                    share(comparison.floor_iou),
+                    share(comparison.rooms_iou),
+                    share(comparison.placement.agreement),
+                    Cell(changed_rooms(comparison)),
+                )
+            )
+        reference = written[building.reference].name
+        shown.append(
+            _Building(
+                reference, Table(f"Compared with {reference}", BUILDING_COLUMNS, tuple(rows)), tuple(links)
+            )
+        )
+    return shown, len(left_out)
 
 
 def _failures(folder: Path) -> list[tuple[str, str]]:

@@ -43,6 +43,7 @@ def write_report(
     panels: int = PANELS,
     part: int | None = None,
     overwrite: bool = False,
+    names: Path | None = None,
 ) -> Path:
     """Write the report of a run.
 
@@ -58,6 +59,8 @@ def write_report(
         The part to report on, of a run in which maps were begun anew; by default the last.
     overwrite : bool
         Whether an earlier page may be replaced.
+    names : path, optional
+        Other names for rooms, see `Run.rename`.
 
     Returns
     -------
@@ -79,6 +82,8 @@ def write_report(
     results = Run(folder, part=part)
     if part is None and results.parts:
         results = Run(folder, part=results.parts[-1])
+    if names is not None:
+        results.rename(names)
     text = render(
         "report.html.j2", **_content(results, panels, is_beside=out.parent.resolve() == folder.resolve())
     )
@@ -112,7 +117,7 @@ def render(template: str, **content: Any) -> str:
     return environment.get_template(template).render(version=__version__, **content)
 
 
-def _drawn(svg: str) -> str:
+def drawn(svg: str) -> str:
     """Put a picture into the page unchanged: SVG in which all names are already escaped."""
     from markupsafe import Markup
 
@@ -121,7 +126,7 @@ def _drawn(svg: str) -> str:
 
 def _content(results: Run, panels: int, *, is_beside: bool) -> dict[str, Any]:
     plan = results.plan(results.choose())
-    drawn_panels = [Panel(_drawn(svg), *caption) for svg, *caption in _panels(results, plan, panels)]
+    drawn_panels = [Panel(drawn(svg), *caption) for svg, *caption in _panels(results, plan, panels)]
     is_run = len(results.columns["snapshot"]) > 1
     parameters = tables.parameter_table(results)
     seen = seen_rooms(results)
@@ -131,19 +136,19 @@ def _content(results: Run, panels: int, *, is_beside: bool) -> dict[str, Any]:
         "tiles": facts.tiles(results, plan),
         "notes": facts.notes(results, plan),
         "meanings": facts.meanings(results),
-        "plan": _drawn(as_svg(draw_plan(plan, FIGURE), is_inline=True)),
+        "plan": drawn(as_svg(draw_plan(plan, FIGURE), is_inline=True)),
         "panels": drawn_panels,
         "maps": len(results.columns["snapshot"]),
         "charts": [
-            (chart, _drawn(chart.over_coverage), _drawn(chart.over_time))
+            (chart, drawn(chart.over_coverage), drawn(chart.over_time))
             for chart in (run_charts(results) if is_run else ())
         ],
         "seen": seen,
-        "seen_lanes": None if seen is None else _drawn(seen.lanes),
+        "seen_lanes": None if seen is None else drawn(seen.lanes),
         "marks": {kind for _, _, kind in run_marks(results)},
         "rooms": tables.room_table(results, plan),
         "doorways": tables.doorway_table(results, plan),
-        "unsure_borders": tables.unsure_border_table(plan),
+        "unsure_borders": tables.unsure_border_table(results, plan),
         "sure_from": percent(UNSURE_BORDER_BELOW),
         "events": tables.event_table(results),
         "parameters": parameters,

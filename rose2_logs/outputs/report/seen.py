@@ -38,7 +38,7 @@ def seen_rooms(results: Run) -> SeenRooms | None:
     coverage, time_s = (results.columns[name].astype(float).tolist() for name in ("coverage", "time_s"))
     rows = {
         each: (
-            room(int(tracks[each])),
+            room(int(tracks[each]), results.name_of),
             number(float(areas_m2[each])),
             *_seen_at(int(first[each]), coverage, time_s),
             *_seen_at(int(mostly[each]), coverage, time_s),

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from rose2_logs.config.parameters import describe_parameters
+from rose2_logs.model.room_names import short_name
 from rose2_logs.model.room_plan import RoomPlan
 from rose2_logs.outputs.report.words import (
     MISSING,
@@ -45,13 +46,14 @@ def room_table(results: Run, plan: RoomPlan) -> Table:
     shown = sorted(tracks[:ROWS_MOST], key=lambda row: (not row["in_last_map"], row["track"]))
     rows = [
         (
-            room(row["track"]),
+            room(row["track"], results.name_of),
+            Cell(row["kind_guess"] or MISSING),
             Cell("yes" if row["in_last_map"] else "no"),
             number(row["area_m2"]),
             number(row["predicted_area_m2"]),
             share(row["wall_support"]),
             number(row["frontier_m"]),
-            Cell(", ".join(str(other) for other in neighbors.get(row["track"], ())) or MISSING),
+            Cell(_others(neighbors.get(row["track"], ()), results)),
             share(row["first_coverage"]),
             when(row["first_time_s"]),
             *(
@@ -66,7 +68,8 @@ def room_table(results: Run, plan: RoomPlan) -> Table:
         for row in shown
     ]
     columns = (
-        Column("room", "its number over the run", is_number=False),
+        Column("room", "its number over the run, or the name that it was given", is_number=False),
+        Column("kind?", "guessed from its shape alone", is_number=False),
         Column("last map", "whether the last map shows it", is_number=False),
         Column("area, m²", "as far as it was seen"),
         Column("with predicted, m²", "area of its shape, the unseen part included"),
@@ -92,6 +95,11 @@ def room_table(results: Run, plan: RoomPlan) -> Table:
     return Table("Rooms", columns, tuple(rows), _cut(len(tracks), len(shown), "tracks.parquet"))
 
 
+def _others(tracks: Sequence[int], results: Run) -> str:
+    """List rooms in a narrow column."""
+    return ", ".join(short_name(track, results.name_of) for track in tracks) or MISSING
+
+
 def doorway_table(results: Run, plan: RoomPlan) -> Table:
     """Doorways of the last map, and since when their rooms were known as neighbors."""
     known = results.table("doorways", ["snapshot", "track_a", "track_b"])
@@ -105,8 +113,8 @@ def doorway_table(results: Run, plan: RoomPlan) -> Table:
     doors = sorted(plan.doorways, key=lambda door: (door.rooms, door.ends_m.tolist()))
     rows = [
         (
-            room(door.rooms[0]),
-            room(door.rooms[1]),
+            room(door.rooms[0], results.name_of),
+            room(door.rooms[1], results.name_of),
             number(door.width_m, 2),
             number(float(door.ends_m[:, 0].mean()), 2),
             number(float(door.ends_m[:, 1].mean()), 2),
@@ -125,13 +133,13 @@ def doorway_table(results: Run, plan: RoomPlan) -> Table:
     return Table("Doorways", headings, tuple(rows), _cut(len(doors), len(rows), "doorways.parquet"))
 
 
-def unsure_border_table(plan: RoomPlan) -> Table:
+def unsure_border_table(results: Run, plan: RoomPlan) -> Table:
     """Borders of the last map that may be read otherwise, the least sure ones first."""
     unsure = sorted((each.strength, each.rooms, each) for each in plan.borders if each.is_unsure)
     rows = [
         (
-            room(border.rooms[0]),
-            room(border.rooms[1]),
+            room(border.rooms[0], results.name_of),
+            room(border.rooms[1], results.name_of),
             Cell(border.kind),
             number(border.width_m, 2),
             share(border.strength),
@@ -187,9 +195,9 @@ def _event_row(results: Run, event: dict[str, Any]) -> tuple[Cell, ...]:
         count(event["snapshot"]),
         share(row["coverage"]),
         when(row["time_s"]),
-        room(event["track"]) if event["track"] else Cell("all"),
+        room(event["track"], results.name_of) if event["track"] else Cell("all"),
         Cell(text),
-        Cell(", ".join(str(other) for other in event["others"]) or MISSING),
+        Cell(_others(event["others"], results)),
         overlap,
     )
 

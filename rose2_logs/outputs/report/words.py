@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 
 from rose2_logs.drawing.palette import track_color
+from rose2_logs.model.room_names import NameOf, room_name
 from rose2_logs.system.text import percent
 
 CLOCK_FROM_NS = 10**18
@@ -88,9 +89,9 @@ def when(seconds: float | None) -> Cell:
     )
 
 
-def room(track: int) -> Cell:
+def room(track: int, name_of: NameOf = room_name) -> Cell:
     """Cell of a room, with its color."""
-    return Cell(f"Room {track}", float(track), css_color(track))
+    return Cell(name_of(track), float(track), css_color(track))
 
 
 def css_color(track: int) -> str:

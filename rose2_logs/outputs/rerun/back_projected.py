@@ -6,11 +6,10 @@ import numpy as np
 import rerun as rr
 
 from rose2_logs.drawing.palette import track_color
-from rose2_logs.model.room_names import room_name
+from rose2_logs.model.room_names import NameOf, room_name, short_name
 from rose2_logs.model.rooms import RoomMap
 from rose2_logs.outputs.rerun.columns import Label, Scalar, Strips
 from rose2_logs.outputs.rerun.layers import Layers
-from rose2_logs.outputs.rerun.names import NameOf, short_name
 from rose2_logs.outputs.rerun.pictures import MapPictures
 from rose2_logs.outputs.rerun.world import (
     FILLS,

@@ -8,9 +8,8 @@ import numpy as np
 import rerun as rr
 
 from rose2_logs.drawing.palette import FORMING, SETTLED, SHAPED, TEMPORARY, state_colors
-from rose2_logs.model.room_names import room_name
+from rose2_logs.model.room_names import NameOf, room_name
 from rose2_logs.outputs.rerun.layers import Instant, time_columns
-from rose2_logs.outputs.rerun.names import NameOf
 from rose2_logs.tracking.convergence import Convergence
 from rose2_logs.tracking.track_history import SnapshotRef
 

@@ -14,7 +14,7 @@ from rose2_logs.drawing.event_text import event_text
 from rose2_logs.drawing.extent import Extent
 from rose2_logs.drawing.palette import track_color
 from rose2_logs.errors import OutputError
-from rose2_logs.model.room_names import room_name
+from rose2_logs.model.room_names import NameOf, room_name
 from rose2_logs.outputs.rerun import viewer as rerun_viewer
 from rose2_logs.outputs.rerun.back_projected import BackProjectedWorld
 from rose2_logs.outputs.rerun.blueprint import make_blueprint, view_side_m
@@ -23,7 +23,6 @@ from rose2_logs.outputs.rerun.disk import abandon, require_space
 from rose2_logs.outputs.rerun.lanes import SHIFTS, TrackLanes
 from rose2_logs.outputs.rerun.layers import CHUNK_BYTES, Layers, whole_percent
 from rose2_logs.outputs.rerun.legend import CURVES, log_legend
-from rose2_logs.outputs.rerun.names import NameOf
 from rose2_logs.outputs.rerun.summary import summary_text
 from rose2_logs.outputs.rerun.world import World
 from rose2_logs.runs.history import RunSummary

@@ -6,9 +6,8 @@ import math
 import re
 from collections.abc import Mapping
 
-from rose2_logs.model.room_names import room_name
+from rose2_logs.model.room_names import NameOf, room_name, short_name
 from rose2_logs.model.room_quality import UNSURE_SIGN, is_unsure
-from rose2_logs.outputs.rerun.names import NameOf, short_name
 from rose2_logs.runs.history import RunSummary
 from rose2_logs.runs.sink import RunInfo
 from rose2_logs.system.text import counted, percent

@@ -14,11 +14,10 @@ from rose2_logs.drawing.palette import track_color
 from rose2_logs.drawing.robot_trail import GAP_M
 from rose2_logs.model.borders import UNSURE_BORDER_BELOW
 from rose2_logs.model.occupancy import FloatArray
-from rose2_logs.model.room_names import room_name
+from rose2_logs.model.room_names import NameOf, room_name, short_name
 from rose2_logs.model.room_quality import UNSURE_SIGN, is_unsure
 from rose2_logs.outputs.rerun.columns import Label, Strips
 from rose2_logs.outputs.rerun.layers import Layers
-from rose2_logs.outputs.rerun.names import NameOf, short_name
 from rose2_logs.outputs.rerun.pictures import MapPictures, spectrum_picture
 from rose2_logs.system.text import percent
 from rose2_logs.tracking.track_history import quality_of

@@ -24,9 +24,10 @@ from rose2_logs.config.parameters import OccupancyParameters
 from rose2_logs.errors import OutputError, ParameterError
 from rose2_logs.io import open_log
 from rose2_logs.model.occupancy import GridGeometry
-from rose2_logs.model.room_plan import PlanMap
+from rose2_logs.model.room_plan import PlanMap, wall_outlines
 from rose2_logs.outputs.exports.dxf import LAYERS
 from rose2_logs.outputs.exports.formats import FORMATS, planned_files, write_plan
+from rose2_logs.outputs.exports.layers import LAYERS as QGIS_LAYERS
 from rose2_logs.runs.run import Run
 
 
@@ -56,8 +57,9 @@ def test_geojson_is_read_by_shapely(plan, tmp_path: Path):
         "room": 2,
         "predicted": 1,
         "doorway": 1,
-        "wall": 2,
+        "wall": 1,
     }
+    assert 'LENGTHUNIT["metre",1]' in collection["crs"]["properties"]["name"]
     for feature, room in zip(found["room"], plan.rooms, strict=True):
         polygon = shape(feature["geometry"])
         assert polygon.symmetric_difference(room.shape).area < 1e-2
@@ -96,8 +98,51 @@ def test_dxf_passes_the_audit(plan, tmp_path: Path):
     assert len(space.query('HATCH[layer=="PREDICTED"]')) == 1
     (door,) = space.query('LINE[layer=="DOORWAYS"]')
     assert np.allclose([door.dxf.start.vec2, door.dxf.end.vec2], plan.doorways[0].ends_m)
-    assert len(space.query('LINE[layer=="WALLS"]')) == 2
+    # Two segments that meet are one wall, whose outline is as long as both and half a cell wide on each side.
+    (wall,) = space.query('LWPOLYLINE[layer=="WALLS"]')
+    assert shapely.Polygon(list(wall.vertices())).area == pytest.approx((8.0 + 3.0) * 0.05, rel=0.05)
     assert {each.dxf.text for each in space.query('TEXT[layer=="LABELS"]')} >= {"Room 3", "Room 120"}
+
+
+def test_dxf_opens_on_the_plan(plan, tmp_path: Path):
+    """Its extents and its view hold all that is drawn, and little more."""
+    (file,) = write_plan(plan, ["dxf"], tmp_path, "two")
+    document = ezdxf.readfile(file)
+    low, high = (np.array(document.header[name][:2]) for name in ("$EXTMIN", "$EXTMAX"))
+    x0, y0, x1, y1 = plan.bounds_m
+    assert [*low, *high] == pytest.approx([x0, y0, x1, y1], abs=0.1)
+    (view,) = document.viewports.get("*Active")
+    assert list(view.dxf.center.vec2) == pytest.approx((low + high) / 2, abs=0.01)
+    assert (high - low)[1] <= view.dxf.height <= 1.1 * max((high - low)[1], (high - low)[0] / 2)
+
+
+def test_overlapping_segments_are_one_wall():
+    """Rows of cells a cell apart, both faces of a wall, and walls that meet; not what is apart."""
+    rows = [[[0.0, y], [5.0, y]] for y in (0.0, 0.05, 0.1, 0.2)]
+    corner, apart = [[[5.0, 0.0], [5.0, 3.0]]], [[[0.0, 1.0], [2.0, 1.0]]]
+    plan = dataclasses.replace(two_rooms_plan(), walls_m=np.array(rows + corner + apart))
+    wide, thin = sorted(wall_outlines(plan), key=lambda wall: -wall.area)
+    assert wide.area == pytest.approx(5.05 * 0.25 + 2.8 * 0.05, rel=0.05)
+    assert thin.bounds == pytest.approx((-0.025, 0.975, 2.025, 1.025))
+    assert wall_outlines(dataclasses.replace(plan, walls_m=None)) == []
+
+
+def test_layers_hold_one_kind_of_thing_each(plan, tmp_path: Path):
+    """What the whole collection holds, each in a file with its style, whose colors are those of the rooms."""
+    (whole,) = write_plan(plan, ["geojson"], tmp_path, "two")
+    files = write_plan(plan, ["qgis"], tmp_path, "two")
+    assert {file.name for file in files} == {file.name for file in tmp_path.iterdir()} - {whole.name}
+    found = []
+    for name, layer in QGIS_LAYERS.items():
+        collection = json.loads((tmp_path / f"two.{name}.geojson").read_text())
+        assert {each["properties"]["kind"] for each in collection["features"]} == {layer.kind}
+        found += collection["features"]
+        style = ET.parse(tmp_path / f"two.{name}.qml")
+        colored = [each for each in style.iter("Option") if each.get("value") == "color"]
+        assert len(colored) == (layer.kind in ("room", "predicted"))
+        assert all("color" in each["properties"] for each in collection["features"]) == bool(colored)
+    everything = json.loads(whole.read_text())["features"]
+    assert sorted(found, key=lambda each: each["id"]) == sorted(everything, key=lambda each: each["id"])
 
 
 def test_the_same_plan_gives_the_same_files(plan, tmp_path: Path):
@@ -207,7 +252,7 @@ def test_a_real_plan_is_read_back(real_plan, tmp_path: Path):
     assert not document.audit().errors
     space = document.modelspace()
     assert len(space.query('LINE[layer=="DOORWAYS"]')) == len(real_plan.doorways) > 5
-    assert len(space.query('LINE[layer=="WALLS"]')) == len(real_plan.walls_m) > 100
+    assert 10 < len(space.query('LWPOLYLINE[layer=="WALLS"]')) < len(real_plan.walls_m) / 5
     features = json.loads((tmp_path / "real.floor_plan.geojson").read_text())["features"]
     areas = {
         each["properties"]["room"]: shape(each["geometry"]).area
@@ -222,7 +267,7 @@ def test_a_real_plan_is_read_back(real_plan, tmp_path: Path):
 
 
 def test_an_unknown_format_is_named(plan, tmp_path: Path):
-    with pytest.raises(ParameterError, match="choose one of geojson, svg, dxf, map_server, graph"):
+    with pytest.raises(ParameterError, match="choose one of geojson, qgis, svg, dxf, map_server, graph"):
         planned_files(["pdf"], tmp_path, "two")
 
 

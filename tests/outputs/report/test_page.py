@@ -164,7 +164,7 @@ def test_it_stands_alone(office_results: Path, tmp_path: Path):
     told = Reader(page)
     assert all(address.startswith(("data:", "#")) for address in told.addresses)
     assert not re.search(
-        r"@import|url\(|https?://(?!www\.w3\.org/2000/svg)", page.read_text(encoding="utf-8")
+        r"@import|url\(|https?://(?!www\.w3\.org/(?:2000/svg|1999/xlink)\b)", page.read_text(encoding="utf-8")
     )
     beside = shutil.copytree(office_results, tmp_path / "office")
     names = [link for link in Reader(write_report(beside)).addresses if not link.startswith(("data:", "#"))]
@@ -283,7 +283,12 @@ def test_many_logs_have_a_page_that_lists_them(office_results: Path, tmp_path: P
     told = Reader(tmp_path / "report.html")
     assert [row[0] for row in told.rows("logs-table")] == ["a", "b"]
     links = [link for link in told.addresses if not link.startswith("data:")]
-    assert links == ["logs/a/report.html", "logs/b/report.html"] * 2
+    pages = ["logs/a/report.html", "logs/b/report.html"]
+    assert links == [*pages, "logs/b/report.comparison.html", *pages]
+    ((name, rooms, *shares, changed),) = told.rows("building-1")
+    assert (name, changed) == ("b", f"{rooms} same")
+    assert all(float(share.rstrip("%")) > 99 for share in shares)
+    assert f"<strong>{rooms} and {rooms}</strong>" in (tmp_path / links[2]).read_text(encoding="utf-8")
     assert told.tags.count("img") == 2
     elsewhere = write_reports(tmp_path, tmp_path / "elsewhere", panels=1).pages
     assert [page.relative_to(tmp_path).as_posix() for page in elsewhere] == [

@@ -1,0 +1,43 @@
+"""Parameters of the guess what kind of room a room is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from rose2_logs.config.fields import ParameterBlock, number
+
+KINDS = ("corridor", "hall", "closet", "room")
+"""Kinds that are guessed; the first whose thresholds hold."""
+
+
+@dataclass(frozen=True, repr=False)
+class KindParameters(ParameterBlock):
+    """Guess of the kind of a room from its shape alone; no other result depends on it."""
+
+    block: ClassVar[str] = "kinds"
+
+    corridor_min_elongation: float = number(
+        3.5,
+        "1",
+        "Least length over width of a corridor; rooms seldom reach 3. Of the rectangle of the same area "
+        "and perimeter, so that corridors with bends count too.",
+        1.0,
+        1000.0,
+    )
+    corridor_max_width_m: float = number(
+        4.0, "m", "Greatest width of a corridor: twice that of a wide one in an office.", 0.1, 1000.0
+    )
+    hall_min_m2: float = number(
+        80.0, "m^2", "Least area of a hall: more than a classroom or a living room.", 0.1, 1e6
+    )
+    closet_max_m2: float = number(
+        3.0, "m^2", "Greatest area of a closet: less than the smallest bedroom or bathroom.", 0.0, 1e6
+    )
+    detail_m: float = number(
+        0.5,
+        "m",
+        "Notches and juts of an outline up to twice as wide do not count: furniture, doors.",
+        0.0,
+        10.0,
+    )
