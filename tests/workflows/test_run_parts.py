@@ -122,10 +122,10 @@ def test_a_recording_shows_one_part_behind_the_other_along_coverage(folder: Path
     steps = [
         step
         for batch in batches
-        if "coverage" in batch.schema.names
-        for step in batch["coverage"].to_pylist()
+        if "coverage_percent" in batch.schema.names
+        for step in batch["coverage_percent"].to_pylist()
     ]
-    assert sorted(steps) == [round(1e4 * (each + (k > 2))) for k, each in enumerate(coverage)]
+    assert sorted(steps) == [int(100 * each) + 100 * (k > 2) for k, each in enumerate(coverage)]
 
 
 def test_a_log_without_parts_has_none_in_its_results(tmp_path: Path):
