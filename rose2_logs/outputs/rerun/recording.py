@@ -200,7 +200,7 @@ class RerunRecording(Sink):
             self._extent.high_m,
             self._wanted,
             back_projected=self._back_projected is not None,
-            first_percent=self._first_percent,
+            first_percent=self._first_percent - 100 * (len(self._parts) - 1),
         )
         self._stream.send_blueprint(blueprint)
 
