@@ -107,10 +107,8 @@ def _explored_window(
     known = np.bincount(of_cell, minlength=height * width)
     filled = (known >= FILLED_SHARE * BLOCK_CELLS**2).astype(np.uint8).reshape(height, width)
     # A filled block and the filled ones around it are of one piece: in nearly all maps that decides.
-    nearby = np.pad((known.reshape(height, width) * filled), 1)
-    nearby = sum(
-        nearby[down : down + height, right : right + width] for down in range(3) for right in range(3)
-    )
+    padded = np.pad(known.reshape(height, width) * filled, 1)
+    nearby = np.lib.stride_tricks.sliding_window_view(padded, (3, 3)).sum(axis=(2, 3))
     sure = np.nonzero(filled * (nearby * resolution_m**2 >= parameters.far_min_area_m2))
     if len(sure[0]):
         low, high = (np.array([of(sure[1]), of(sure[0])]) for of in (np.min, np.max))
@@ -135,7 +133,7 @@ def _with_margin(
     resolution_m: float,
     parameters: OccupancyParameters,
 ) -> tuple[slice, slice]:
-    """Rows and columns of a canvas from the blocks `low` (2,), in x and y, to before `high`, with a margin."""
+    """Rows and columns of a canvas from blocks `low` (2,), in x and y, to before `high`, with a margin."""
     # A block more, for those at the border of a floor are not filled.
     margin = int(np.ceil(parameters.far_margin_m / (resolution_m * BLOCK_CELLS))) + 1
     columns, rows = (
@@ -146,5 +144,5 @@ def _with_margin(
 
 
 def _cells_of(window: tuple[slice, slice]) -> int:
-    rows, columns = window
-    return (rows.stop - rows.start) * (columns.stop - columns.start)
+    rows, columns = (int(along.stop - along.start) for along in window)
+    return rows * columns
