@@ -19,7 +19,7 @@ from typing import Any
 import pyarrow as pa
 import typer
 
-from rose2_logs.cli.main import app
+from rose2_logs.cli.main import app, commands
 from rose2_logs.config.parameters import Parameters, describe_parameters
 from rose2_logs.config.run_options import RunOptions, options_of
 from rose2_logs.runs import table_schemas
@@ -61,7 +61,7 @@ def commands_page() -> str:
     lines = ["# Commands", "", _text(group.help), ""]
     lines += ["Exit codes: 0 done; 1 internal error; 2 a log, a file or an option cannot be used (one line"]
     lines += ["says which); 130 interrupted.", "", *_options_table(group.params)]
-    for name, command in group.commands.items():
+    for name, command in commands().items():
         lines += ["", f"## {name}", "", _text(command.help), ""]
         given = " ".join(_argument(param) for param in command.params if not _is_option(param))
         lines += ["```text", f"{NAME} {name} [OPTIONS] {given}", "```", ""]

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 import re
+from functools import cache
+from typing import TYPE_CHECKING
 
-from rose2_logs.batch.options import BatchOptions
-from rose2_logs.config.run_options import Option, RunOptions, options_of
+if TYPE_CHECKING:
+    from rose2_logs.config.run_options import Option
 
 OTHERS = {"web=True": "--web", "resolution_m=": "--resolution "}
 """Options of single commands that messages of the library name."""
@@ -17,7 +19,12 @@ def flag_of(name: str, about: Option) -> str:
     return about.flag or f"--{name.replace('_', '-')}"
 
 
+@cache
 def _flags() -> dict[str, str]:
+    """Options as messages of the library write them, and as the command line does."""
+    from rose2_logs.batch.options import BatchOptions
+    from rose2_logs.config.run_options import RunOptions, options_of
+
     flags = dict(OTHERS)
     for kind in (RunOptions, BatchOptions):
         defaults = {each.name: each.default for each in dataclasses.fields(kind)}
@@ -32,9 +39,6 @@ def _flags() -> dict[str, str]:
     return flags
 
 
-FLAGS = _flags()
-"""Options as messages of the library write them, and as the command line does."""
-_OPTION = re.compile(r"(?<![\w/])(?:" + "|".join(map(re.escape, FLAGS)) + ")")
 _PARAMETER = re.compile(r"\bthe parameter (\w+\.\w+)")
 
 
@@ -43,4 +47,6 @@ def with_flags(message: str) -> str:
 
     The library knows no flags: its messages name options as Python writes them, ``overwrite=True``.
     """
-    return _PARAMETER.sub(r"--set \1", _OPTION.sub(lambda found: FLAGS[found[0]], message))
+    flags = _flags()
+    options = re.compile(r"(?<![\w/])(?:" + "|".join(map(re.escape, flags)) + ")")
+    return _PARAMETER.sub(r"--set \1", options.sub(lambda found: flags[found[0]], message))

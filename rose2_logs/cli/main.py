@@ -2,29 +2,85 @@
 
 from __future__ import annotations
 
+import importlib
 import sys
 from contextlib import suppress
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from rose2_logs import __version__
 from rose2_logs.cli import messages
-from rose2_logs.cli.commands import analyze, batch, compare, evaluate, info, results, segment, view
-from rose2_logs.cli.options import (
-    EXIT_CODES,
-    EXIT_FAULT,
-    EXIT_INTERRUPTED,
-    EXIT_KNOWN,
-    EXIT_SIGNALED,
-    App,
-    Debug,
-)
+from rose2_logs.cli.exit_codes import EXIT_CODES, EXIT_FAULT, EXIT_INTERRUPTED, EXIT_KNOWN, EXIT_SIGNALED
+from rose2_logs.cli.help import Group
+from rose2_logs.cli.message_options import Debug
 from rose2_logs.errors import Rose2LogsError
 from rose2_logs.system.signals import heeded
 
-app = App(
+COMMANDS = {
+    "info": ("info", "Show what a log holds: topics, duration, map sizes, resolution, coverage."),
+    "analyze": (
+        "analyze",
+        "Find and track the rooms in all maps of a log; write a recording, an annotated MCAP, and tables.",
+    ),
+    "batch": (
+        "batch",
+        "Analyze many logs, each into its own folder, with one data set and one summary of all.",
+    ),
+    "view": ("view", "Open a recording in the Rerun viewer."),
+    "serve": ("view", "Serve the recordings of all logs as one Rerun catalog, until Ctrl-C is pressed."),
+    "report": (
+        "results",
+        "Write the results of a run as one HTML page with pictures, curves and tables. It needs no network.",
+    ),
+    "figure": (
+        "results",
+        "Draw the layout of one map for print: rooms, predicted parts, doorways, scale bar.",
+    ),
+    "export": ("results", "Write the floor plan of one map for other programs: GIS, CAD, Nav2, networkx."),
+    "compare": (
+        "compare",
+        "Compare the last layouts of two runs: rooms and walls that are new, missing or moved.",
+    ),
+    "segment": ("segment", "Segment one map: label image, floor plan as GeoJSON, picture."),
+    "evaluate": (
+        "evaluate",
+        "Segment maps whose true rooms are known, and print how well the rooms agree.",
+    ),
+}
+"""Each command: its module in the folder ``commands``, and what it does, told without importing it."""
+
+
+class Commands(Group):
+    """The commands, of which only the one that is called is imported."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """Return their names."""
+        return list(COMMANDS)
+
+    def about(self, ctx: Any, name: str) -> str:
+        """Return what a command does, in one line."""
+        return COMMANDS[name][1]
+
+    def get_command(self, ctx: Any, name: str) -> Any:
+        """Return a command, None for another name."""
+        # Typer suggests the nearest of those that are made.
+        for each in [name] if name in COMMANDS else COMMANDS:
+            if each not in self.commands:
+                self.commands[each] = _made(each)
+        return self.commands.get(name)
+
+
+def _made(name: str) -> Any:
+    from rose2_logs.cli.options import built
+
+    module = importlib.import_module(f"rose2_logs.cli.commands.{COMMANDS[name][0]}")
+    return built(getattr(module, name), module.EXAMPLES[name])
+
+
+app = typer.Typer(
     name="rose2-logs",
+    cls=Commands,
     help="Find and track rooms in the maps of robot logs.\n\n"
     "Begin with [bold]rose2-logs analyze run.mcap -o results[/bold]. Then "
     "[bold]rose2-logs view results/run[/bold] shows what was found, and "
@@ -32,20 +88,14 @@ app = App(
     epilog=EXIT_CODES,
     no_args_is_help=True,
     pretty_exceptions_enable=False,
-    rich_markup_mode="rich",
+    rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-app.command(epilog=info.EXAMPLE)(info.info)
-app.command(epilog=analyze.EXAMPLE)(analyze.analyze)
-app.command(epilog=batch.EXAMPLE)(batch.batch)
-app.command(epilog=view.VIEW_EXAMPLE)(view.view)
-app.command(epilog=view.SERVE_EXAMPLE)(view.serve)
-app.command(epilog=results.REPORT_EXAMPLE)(results.report)
-app.command(epilog=results.FIGURE_EXAMPLE)(results.figure)
-app.command(epilog=results.EXPORT_EXAMPLE)(results.export)
-app.command(epilog=compare.EXAMPLE)(compare.compare)
-app.command(epilog=segment.EXAMPLE)(segment.segment)
-app.command(epilog=evaluate.EXAMPLE)(evaluate.evaluate)
+
+
+def commands() -> dict[str, Any]:
+    """Return all commands with their arguments and options, as the documentation lists them."""
+    return {name: _made(name) for name in COMMANDS}
 
 
 def main() -> None:

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import json
 import logging
 import sys
-import traceback
 from collections import Counter
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from typing import Any
 
 from rich.console import Console
@@ -98,6 +95,9 @@ def show(level: str, message: str, **fields: Any) -> None:
     """Show one line; the further fields go into JSON only."""
     text = printable(with_flags(message))
     if style.as_json:
+        import json
+        from datetime import UTC, datetime
+
         now = datetime.now(UTC).isoformat(timespec="milliseconds")
         entry = {"time": now, "level": level, "message": text} | {name: fields.get(name) for name in FIELDS}
         errors.file.write(json.dumps(entry | fields) + "\n")
@@ -114,6 +114,8 @@ def printable(text: str) -> str:
 def error(message: str, **fields: Any) -> None:
     """Show one line about an error, after the traceback of the one being handled if that was requested."""
     if style.debug and sys.exc_info()[0] is not None:
+        import traceback
+
         if style.as_json:
             fields["traceback"] = traceback.format_exc()
         else:

@@ -14,59 +14,14 @@ from typer.models import OptionInfo
 
 from rose2_logs.batch.options import BatchOptions
 from rose2_logs.cli.flags import flag_of
-from rose2_logs.cli.messages import show_messages, style
+from rose2_logs.cli.help import Command
+from rose2_logs.cli.message_options import MESSAGE_OPTIONS
+from rose2_logs.cli.messages import show_messages
 from rose2_logs.config.parameters import Parameters, load_parameters
 from rose2_logs.config.run_options import METHOD, Option, RunOptions, options_of
 
-MESSAGES = "Messages on stderr"
 VALUES = {bool: "", int: "N", str: "NAME", Path: "PATH"}
 """Placeholder in a command's help for the value of an option of this type, where it declares none."""
-EXIT_FAULT, EXIT_KNOWN, EXIT_INTERRUPTED = 1, 2, 130
-EXIT_SIGNALED = 128
-"""Plus the number of the signal, as shells have it."""
-EXIT_CODES = (
-    "[bold]Exit codes:[/bold] 0 done, also with warnings, which summary.json counts; 1 internal error of "
-    "rose2-logs; 2 a log, a file or an option cannot be used, or there was a warning with --strict, and one "
-    "line says which; 130 interrupted, 143 ended by TERM, 129 by HUP."
-)
-
-
-def _set_debug(value: bool) -> None:
-    style.debug = value or style.debug
-
-
-Quiet = Annotated[
-    bool,
-    typer.Option(
-        "--quiet", "-q", help="Show only errors: no progress, no warnings.", rich_help_panel=MESSAGES
-    ),
-]
-Verbose = Annotated[
-    bool,
-    typer.Option(
-        "--verbose", "-v", help="Also show what is being done, and every warning.", rich_help_panel=MESSAGES
-    ),
-]
-JsonLog = Annotated[
-    bool,
-    typer.Option(
-        "--json-log",
-        help="Write each message as one line of JSON for programs: time, level, message, kind, file, topic, "
-        "index of the message.",
-        rich_help_panel=MESSAGES,
-    ),
-]
-Debug = Annotated[
-    bool,
-    typer.Option(
-        "--debug",
-        help="Show the traceback of an error, for a bug report.",
-        callback=_set_debug,
-        is_eager=True,
-        rich_help_panel=MESSAGES,
-    ),
-]
-MESSAGE_OPTIONS = {"quiet": Quiet, "verbose": Verbose, "json_log": JsonLog, "debug": Debug}
 Config = Annotated[
     Path | None,
     typer.Option(
@@ -98,17 +53,22 @@ def option_of(name: str) -> Any:
     return _typer_option(name, declared.metadata["option"], declared.default)
 
 
-class App(typer.Typer):
-    """A Typer application whose commands all have the options about messages.
+def built(command: Callable[..., Any], epilog: str) -> Any:
+    """Make a command of Typer from a function, with the options about messages.
 
-    A parameter of a command that is annotated with one of `MADE_FROM` stands for all the options of that
-    class; the command is called with an object made from the given values.
+    A parameter of the function that is annotated with one of `MADE_FROM` stands for all the options of that
+    class; the function is called with an object made from the given values.
+
+    Parameters
+    ----------
+    command : callable
+        What the command does.
+    epilog : str
+        Examples, below its help.
     """
-
-    def command(self, *arguments: Any, **options: Any) -> Callable[[Any], Any]:
-        """Register a command."""
-        register = super().command(*arguments, **options)
-        return lambda command: register(_with_options(command))
+    alone = typer.Typer(add_completion=False, rich_markup_mode=None)
+    alone.command(cls=Command, epilog=epilog)(_with_options(command))
+    return typer.main.get_command(alone)
 
 
 def _with_options(command: Callable[..., Any]) -> Callable[..., Any]:

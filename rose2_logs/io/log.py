@@ -25,7 +25,7 @@ from rose2_logs.io.parts import Part, Parts, find_parts, find_saved_parts
 from rose2_logs.io.poses import RobotPath
 from rose2_logs.io.saved_maps import MapFilesSource
 from rose2_logs.io.scan_topics import mappable_topics
-from rose2_logs.io.source import DamagedMessageError, LoggedMap, LogInfo, MessageSource, TopicInfo
+from rose2_logs.io.source import DamagedMessageError, LoggedMap, LogInfo, MessageSource, TopicInfo, distinct
 from rose2_logs.model.occupancy import OccupancySnapshot
 from rose2_logs.system.warnings import log_warning
 
@@ -117,14 +117,14 @@ class LogReader:
         if self._occupancy.values != "auto":
             return read_as(self._occupancy)
         counts = count_values(np.zeros((0, 0), np.int8))
-        times = [np.unique(self.source.log_times(topic)) for topic in self._topics]
+        times = [distinct(self.source.log_times(topic)) for topic in self._topics]
         spread = [
             each[np.linspace(0, len(each) - 1, MAPS_LOOKED_AT).round().astype(int)]
             for each in times
             if len(each)
         ]
         for message in self.source.read(
-            self._topics, np.unique(np.concatenate([[], *spread]).astype(np.int64))
+            self._topics, distinct(np.concatenate([[], *spread]).astype(np.int64))
         ):
             with suppress(LogError):  # it is told of where the map is needed
                 if (decoded := message.decode()) is not None:
@@ -170,7 +170,7 @@ class LogReader:
             If the topic has no map in the time range, or none can be read.
         """
         times = self._times_in_range()
-        chosen = self._selection.thin(np.unique(times))
+        chosen = self._selection.thin(distinct(times))
         taken = int(np.isin(times, chosen).sum())
         self.counts = ReadCounts(messages=len(times), skipped=len(times) - taken)
         snapshot = None
@@ -188,7 +188,7 @@ class LogReader:
             As for `snapshots`.
         """
         counts = ReadCounts()
-        snapshot = next(self._read(np.unique(self._times_in_range()), counts), None)
+        snapshot = next(self._read(distinct(self._times_in_range()), counts), None)
         if snapshot is None:
             raise self._no_map(counts)
         return snapshot
@@ -204,7 +204,7 @@ class LogReader:
             As for `snapshots`.
         """
         counts = ReadCounts()
-        found = self._last_of(np.unique(self._times_in_range()), counts)
+        found = self._last_of(distinct(self._times_in_range()), counts)
         if found is None:
             raise self._no_map(counts)
         return found
@@ -219,7 +219,7 @@ class LogReader:
         """
         if self.part_count == 1:
             return {None: self.last()}
-        times = np.unique(self._times_in_range())
+        times = distinct(self._times_in_range())
         parts = np.array([self.part_at(time) for time in times.tolist()])
         lasts: dict[int | None, OccupancySnapshot] = {}
         for number in self._parts:
@@ -314,14 +314,14 @@ class LogReader:
         """
         if len(self._topics) == 1 or not len(chosen):
             return chosen
-        grids, patches = (np.unique(self.source.log_times(topic)) for topic in self._topics)
+        grids, patches = (distinct(self.source.log_times(topic)) for topic in self._topics)
         last_grid = np.searchsorted(grids, chosen, "right") - 1
         begins = np.where(last_grid >= 0, grids[last_grid], chosen) if len(grids) else chosen
         # A patch is needed if it lies between the full grid that a chosen map starts from and that map.
         following = np.searchsorted(chosen, patches, "left")
         inside = following < len(chosen)
         patches, following = patches[inside], following[inside]
-        return np.unique(np.concatenate([chosen, begins, patches[begins[following] <= patches]]))
+        return distinct(np.concatenate([chosen, begins, patches[begins[following] <= patches]]))
 
     @property
     def _parts(self) -> dict[int, Part]:
@@ -335,7 +335,7 @@ class LogReader:
         if len(times) > 1 and isinstance(self.source, MapFilesSource):
             return self._chosen(find_saved_parts(self.source.names, times, self._grid, self._occupancy))
         whole = Parts((Part(times, 0.0, len(times)),))
-        if len(np.unique(times)) < len(times):
+        if len(distinct(times)) < len(times):
             return self._chosen(whole)  # maps of one time cannot be told apart
         publishers = self.source.publishers(self.topic)
         found = find_parts(times, self._grid, self._occupancy, publishers)

@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from rose2_logs.config.parameters import OccupancyParameters
 from rose2_logs.config.selection import Times
 from rose2_logs.errors import LogError
@@ -180,3 +182,19 @@ class MessageSource(ABC):
     @abstractmethod
     def close(self) -> None:
         """Release the files; may be called more than once."""
+
+
+def distinct(times: Times) -> Times:
+    """Return the different ones of some log times, ascending.
+
+    As `numpy.unique` does, which loads the module of masked arrays first.
+
+    Examples
+    --------
+    >>> distinct(np.array([3, 1, 3])).tolist()
+    [1, 3]
+    """
+    ordered: Times = np.sort(times)
+    is_new = np.ones(len(ordered), bool)
+    is_new[1:] = ordered[1:] != ordered[:-1]
+    return ordered[is_new]

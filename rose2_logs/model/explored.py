@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
-import shapely
 from numpy.typing import NDArray
-from shapely.geometry.base import BaseGeometry
 
 from rose2_logs.config.parameters import OccupancyParameters
 from rose2_logs.model.far_cells import find_far_cells
 from rose2_logs.model.labels import known_window
 from rose2_logs.model.occupancy import BoolArray, CellValues, FloatArray, GridGeometry, Scalar, classify
+
+if TYPE_CHECKING:
+    from shapely.geometry.base import BaseGeometry
 
 NEIGHBORS = ((0, -1), (0, 1), (-1, 0), (1, 0), (-1, -1), (-1, 1), (1, -1), (1, 1))
 """Where a coarse cell without a room looks for one: cells with a common side first."""
@@ -102,6 +104,8 @@ class ExploredPart:
 
     def shape(self, geometry: BaseGeometry) -> BaseGeometry:
         """Shapely geometry in the world."""
+        import shapely
+
         return shapely.transform(geometry, self.points)
 
     def occupied_cells(self) -> NDArray[np.int32]:

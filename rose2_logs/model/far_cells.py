@@ -78,8 +78,8 @@ def find_far_cells(
     # A window that is full enough cannot shrink so much.
     if len(known) > most:
         return None
-    window = _explored_window(row, column, cells.shape, resolution_m, parameters)
-    if window is None or np.prod([along.stop - along.start for along in window]) > most:
+    window = _explored_window(row, column, cells.shape, resolution_m, parameters, most)
+    if window is None:
         return None
     down, right = (
         np.maximum(np.maximum(along.start - place, place - along.stop + 1), 0)
@@ -95,28 +95,54 @@ def _explored_window(
     shape: tuple[int, ...],
     resolution_m: float,
     parameters: OccupancyParameters,
+    most: float,
 ) -> tuple[slice, slice] | None:
-    """Rows and columns of a canvas around all filled blocks that could hold a room; None without any.
+    """Rows and columns of a canvas around all filled blocks that could hold a room.
 
-    They begin and end with blocks of the canvas, so that the part of a map that stays is left as it is.
+    They begin and end with blocks of the canvas, so that the part of a map that stays is left as it is. None
+    without such blocks, and where there would be more than `most` cells.
     """
-    import cv2
-
     height, width = (-(-side // BLOCK_CELLS) for side in shape)
     of_cell = (row // BLOCK_CELLS) * width + column // BLOCK_CELLS
     known = np.bincount(of_cell, minlength=height * width)
     filled = (known >= FILLED_SHARE * BLOCK_CELLS**2).astype(np.uint8).reshape(height, width)
+    # A filled block and the filled ones around it are of one piece: in nearly all maps that decides.
+    padded = np.pad(known.reshape(height, width) * filled, 1)
+    nearby = np.lib.stride_tricks.sliding_window_view(padded, (3, 3)).sum(axis=(2, 3))
+    sure = np.nonzero(filled * (nearby * resolution_m**2 >= parameters.far_min_area_m2))
+    if len(sure[0]):
+        low, high = (np.array([of(sure[1]), of(sure[0])]) for of in (np.min, np.max))
+        if _cells_of(_with_margin(low, high + 1, shape, resolution_m, parameters)) > most:
+            return None
+    import cv2
+
     count, piece, boxes, _ = cv2.connectedComponentsWithStats(filled, connectivity=8)
     cells = np.bincount(piece.reshape(-1), known, count)
     boxes = boxes[1:][cells[1:] * resolution_m**2 >= parameters.far_min_area_m2]
     if not len(boxes):
         return None
+    low, high = boxes[:, :2].min(axis=0), (boxes[:, :2] + boxes[:, 2:4]).max(axis=0)
+    window = _with_margin(low, high, shape, resolution_m, parameters)
+    return None if _cells_of(window) > most else window
+
+
+def _with_margin(
+    low: NDArray[np.intp],
+    high: NDArray[np.intp],
+    shape: tuple[int, ...],
+    resolution_m: float,
+    parameters: OccupancyParameters,
+) -> tuple[slice, slice]:
+    """Rows and columns of a canvas from blocks `low` (2,), in x and y, to before `high`, with a margin."""
     # A block more, for those at the border of a floor are not filled.
     margin = int(np.ceil(parameters.far_margin_m / (resolution_m * BLOCK_CELLS))) + 1
-    low = (boxes[:, :2].min(axis=0) - margin) * BLOCK_CELLS
-    high = ((boxes[:, :2] + boxes[:, 2:4]).max(axis=0) + margin) * BLOCK_CELLS
     columns, rows = (
-        slice(max(int(begin), 0), min(int(end), side))
+        slice(max(int(begin - margin) * BLOCK_CELLS, 0), min(int(end + margin) * BLOCK_CELLS, side))
         for begin, end, side in zip(low, high, shape[::-1], strict=True)
     )
     return rows, columns
+
+
+def _cells_of(window: tuple[slice, slice]) -> int:
+    rows, columns = (int(along.stop - along.start) for along in window)
+    return rows * columns

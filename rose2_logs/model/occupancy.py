@@ -198,8 +198,8 @@ class OccupancySnapshot:
     def __post_init__(self) -> None:
         if not isinstance(self.geometry, GridGeometry):
             raise InvalidMapError(f"map {self.index} of {self.topic}: {self.geometry!r} is no GridGeometry")
-        given = np.ma.filled(self.cells, UNKNOWN) if isinstance(self.cells, np.ma.MaskedArray) else self.cells
-        given = np.asarray(given)
+        fill = getattr(self.cells, "filled", None)  # of a masked array
+        given = np.asarray(self.cells if fill is None else fill(UNKNOWN))
         if given.shape != self.geometry.shape:
             raise InvalidMapError(
                 f"map {self.index} of {self.topic}: data of shape {given.shape} "

@@ -6,9 +6,7 @@ import re
 import shlex
 from pathlib import Path
 
-import typer
-
-from rose2_logs.cli.main import app
+from rose2_logs.cli import main as command_line
 from rose2_logs.outputs.mcap.ros_messages import ROOM_DEFINITION, ROOMS_DEFINITION
 
 PROJECT = Path(__file__).parents[2]
@@ -41,7 +39,7 @@ def test_commands_are_found():
 
 def test_their_options_and_arguments_are_taken():
     """By the command line itself, which is not run."""
-    known = typer.main.get_command(app).commands
+    known = command_line.commands()
     wrong = []
     for page, command in SHOWN:
         name, *words = shlex.split(command)[1:]

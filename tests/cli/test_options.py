@@ -7,15 +7,14 @@ import re
 from pathlib import Path
 
 import pytest
-import typer
 
 from rose2_logs.batch.options import BatchOptions
 from rose2_logs.cli.flags import flag_of, with_flags
-from rose2_logs.cli.main import app
+from rose2_logs.cli.main import commands
 from rose2_logs.config.run_options import RunOptions, options_of
 
 PACKAGE = Path(__file__).parents[2] / "rose2_logs"
-COMMANDS = typer.main.get_command(app).commands
+COMMANDS = commands()
 OTHERS = [path for path in sorted(PACKAGE.rglob("*.py")) if not path.is_relative_to(PACKAGE / "cli")]
 
 

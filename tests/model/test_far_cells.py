@@ -7,13 +7,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 from reader_logs import START_NS, Map, McapLog
 from saved_maps import FREE, WALL, two_rooms
+from scipy import ndimage
 
 import rose2_logs as rl
 from rose2_logs.config.parameters import OccupancyParameters
 from rose2_logs.io import open_log
-from rose2_logs.model.far_cells import find_far_cells
+from rose2_logs.model.far_cells import BLOCK_CELLS, find_far_cells
 from rose2_logs.model.labels import known_window
 from rose2_logs.system.warnings import StrictError, collect_warnings
 
@@ -95,6 +99,34 @@ def test_what_stays_has_nothing_far_in_it():
     found = find_far_cells(canvas, RESOLUTION_M, USUAL)
     assert found is not None
     assert find_far_cells(canvas[found.window], RESOLUTION_M, USUAL) is None
+
+
+@settings(deadline=None, max_examples=150)
+@given(
+    arrays(np.bool_, (9, 14), elements=st.booleans()),
+    st.sampled_from([0.02, 0.05, 0.1]),
+    st.sampled_from([1.0, 1.1, 1.5, 3.0]),
+)
+def test_what_stays_is_around_the_pieces_that_could_be_a_room(blocks: np.ndarray, side_m: float, gain: float):
+    """As labels of all blocks say, also where a few of them settle that nothing is left out."""
+    used = OccupancyParameters(far_min_gain=gain, far_margin_m=0.0)
+    cells = np.where(np.kron(blocks, np.ones((BLOCK_CELLS, BLOCK_CELLS), bool)), 0, -1).astype(np.int8)
+    piece, count = ndimage.label(blocks, np.ones((3, 3)))
+    areas_m2 = np.bincount(piece.ravel(), minlength=count + 1)[1:] * (BLOCK_CELLS * side_m) ** 2
+    rooms = np.isin(piece, 1 + np.flatnonzero(areas_m2 >= used.far_min_area_m2))
+    found = find_far_cells(cells, side_m, used)
+    if not rooms.any():
+        assert found is None
+        return
+    # A block more on each side, within the canvas.
+    stays = tuple(
+        slice(max(along.start - 1, 0) * BLOCK_CELLS, min(along.stop + 1, count) * BLOCK_CELLS)
+        for along, count in zip(known_window(rooms), blocks.shape, strict=True)
+    )
+    spans = [along.stop - along.start for along in known_window(cells >= 0)]
+    is_worth = np.prod([along.stop - along.start for along in stays]) * gain <= np.prod(spans)
+    is_sparse = np.count_nonzero(cells >= 0) * gain <= np.prod(spans)
+    assert (None if found is None else found.window) == (stays if is_worth and is_sparse else None)
 
 
 def test_they_can_be_kept():

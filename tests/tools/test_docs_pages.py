@@ -10,11 +10,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import typer
 import yaml
 from docs_pages import PAGES, TABLES, commands_page, parameters_page, tables_page
 
-from rose2_logs.cli.main import app
+from rose2_logs.cli.main import commands
 from rose2_logs.config.parameters import Parameters, describe_parameters, load_parameters
 
 PROJECT = Path(__file__).parents[2]
@@ -62,9 +61,8 @@ def test_every_command_and_option_is_told():
     """As the command line knows them; no markup of the terminal is left."""
     page = commands_page()
     parts = {part.split("\n")[0]: part for part in page.split("\n## ")[1:]}
-    commands = typer.main.get_command(app).commands
-    assert list(parts) == list(commands)
-    for name, command in commands.items():
+    assert list(parts) == list(commands())
+    for name, command in commands().items():
         assert command.help.strip().splitlines()[0] in parts[name]
         for param in command.params:
             for option in (

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.markup import escape
 
+from rose2_logs.cli.exit_codes import EXIT_KNOWN
 from rose2_logs.cli.messages import show_error
-from rose2_logs.cli.options import EXIT_KNOWN
 from rose2_logs.cli.printing import (
     duration,
     megabytes,
@@ -38,6 +38,7 @@ EXAMPLE = (
     "A first look at a long log: [bold]rose2-logs analyze run.mcap -o look --max-snapshots 20[/bold]\n\n"
     "A log of laser scans without maps: [bold]rose2-logs analyze run.bag -o results --map-from /scan[/bold]"
 )
+EXAMPLES = {"analyze": EXAMPLE}
 
 
 def analyze(

@@ -10,8 +10,8 @@ import typer
 from rich.markup import escape
 
 from rose2_logs.batch.options import BatchOptions
+from rose2_logs.cli.exit_codes import EXIT_KNOWN
 from rose2_logs.cli.messages import error, style, warning
-from rose2_logs.cli.options import EXIT_KNOWN
 from rose2_logs.cli.printing import print_line, print_table, progress_bar
 
 if TYPE_CHECKING:
@@ -27,6 +27,7 @@ EXAMPLE = (
     "[bold]rose2-logs batch /data/robots -o /data/results --scheduler tcp://HOST:8786[/bold]\n\n"
     "The same command again continues where it was stopped, and adds logs that are new."
 )
+EXAMPLES = {"batch": EXAMPLE}
 MOST_BARS = 10
 """At most this many logs in progress have their own bar; a cluster may work on hundreds."""
 COLORS = {"done": "green", "up to date": "green", "failed": "bold red"}

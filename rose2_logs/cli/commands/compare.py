@@ -12,7 +12,6 @@ from rich.markup import escape
 from rose2_logs.cli.messages import warning
 from rose2_logs.cli.printing import print_line, print_table
 from rose2_logs.config.parameters import Parameters
-from rose2_logs.model.room_names import short_name
 
 if TYPE_CHECKING:
     from rose2_logs.comparison.layouts import LayoutComparison
@@ -23,6 +22,7 @@ EXAMPLE = (
     "The robot may have started anywhere in the building: B is aligned with A by its walls. Coordinates in "
     "the results are in A's frame."
 )
+EXAMPLES = {"compare": EXAMPLE}
 WALLS_SHOWN = 12
 """Walls that are printed, the longest of each kind first; the table holds all."""
 
@@ -97,6 +97,8 @@ def _print_overview(found: LayoutComparison) -> None:
 
 def _print_rooms(found: LayoutComparison) -> None:
     from rich.table import Table
+
+    from rose2_logs.model.room_names import short_name
 
     table = Table(box=None, pad_edge=False)
     table.add_column("rooms", no_wrap=True)

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from rose2_logs.workflows.evaluate import Evaluation, OnCase
 
 EXAMPLE = "Example: [bold]rose2-logs evaluate cases.json --pictures pictures --json figures.json[/bold]"
+EXAMPLES = {"evaluate": EXAMPLE}
 ALONG_FIGURES = ("iou_seg", "iou_gt", "iou_sym")
 METHOD, DETAIL, WORKERS = option_of("method"), option_of("detail"), option_of("workers")
 

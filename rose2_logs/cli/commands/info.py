@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from rose2_logs.workflows.info import LogFacts, MapFacts
 
 EXAMPLE = "Example: [bold]rose2-logs info run.mcap[/bold]"
+EXAMPLES = {"info": EXAMPLE}
 
 
 def info(

@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
+from rose2_logs.cli.exit_codes import EXIT_KNOWN
 from rose2_logs.cli.messages import show_error
-from rose2_logs.cli.options import EXIT_KNOWN
 from rose2_logs.cli.printing import print_file
 from rose2_logs.outputs.report import PANELS
 from rose2_logs.workflows import FIGURE_WIDTH_PX
@@ -19,6 +19,7 @@ REPORT_EXAMPLE = (
 )
 FIGURE_EXAMPLE = "Example: [bold]rose2-logs figure results/run --coverage 0.5 -o half.svg[/bold]"
 EXPORT_EXAMPLE = "Example: [bold]rose2-logs export results/run --format dxf --format geojson -o plans[/bold]"
+EXAMPLES = {"report": REPORT_EXAMPLE, "figure": FIGURE_EXAMPLE, "export": EXPORT_EXAMPLE}
 WHICH_MAP, WHAT = "Which map", "What to write"
 
 Results = Annotated[

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from rose2_logs.workflows.segment import StaticMapResult
 
 EXAMPLE = "Example: [bold]rose2-logs segment map.png --resolution 0.05 -o rooms[/bold]"
+EXAMPLES = {"segment": EXAMPLE}
 METHOD, DETAIL = option_of("method"), option_of("detail")
 
 

@@ -20,6 +20,7 @@ SERVE_EXAMPLE = (
     "Example: [bold]rose2-logs serve results[/bold], then [bold]rose2-logs view "
     f"rerun+http://127.0.0.1:{CATALOG_PORT}[/bold]"
 )
+EXAMPLES = {"view": VIEW_EXAMPLE, "serve": SERVE_EXAMPLE}
 
 
 def view(
