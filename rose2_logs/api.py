@@ -22,13 +22,8 @@ from rose2_logs.config.selection import Selection
 from rose2_logs.errors import InvalidMapError, ParameterError
 from rose2_logs.io import map_topics as map_topics_of_log
 from rose2_logs.io import open_log as open_log_reader
-from rose2_logs.io.cell_values import (
-    LEAST_CELLS,
-    MAPS_LOOKED_AT,
-    CellReading,
-    reading_of,
-    stored_bytes,
-)
+from rose2_logs.io.cell_values import MAPS_LOOKED_AT, reading_of, stored_bytes
+from rose2_logs.io.given_maps import decided_reading, in_percent
 from rose2_logs.io.log import LogReader
 from rose2_logs.model.occupancy import UNKNOWN, GridGeometry, OccupancySnapshot, free_area_m2
 from rose2_logs.runs.run import Run
@@ -201,32 +196,10 @@ def _tracked(maps: LogReader | Iterable[OccupancySnapshot], options: RunOptions)
         final_m2, reading = None, None
         if isinstance(maps, Sequence) and len(maps):
             some = np.unique(np.linspace(0, len(maps) - 1, MAPS_LOOKED_AT).round().astype(int)).tolist()
-            reading = _decided_reading([_checked_map(maps[k]) for k in some], parameters.occupancy)
-            final_m2 = free_area_m2(_in_percent(maps[-1], reading), parameters.occupancy)
-        read = _all_in_percent(map(_checked_map, maps), reading, parameters.occupancy)
+            reading = decided_reading([_checked_map(maps[k]) for k in some], parameters.occupancy)
+            final_m2 = free_area_m2(in_percent(maps[-1], reading), parameters.occupancy)
+        read = all_in_percent(map(_checked_map, maps), reading, parameters.occupancy)
         yield from TrackedStream(read, final_m2, workers, parameters)
-
-
-def _all_in_percent(
-    maps: Iterable[OccupancySnapshot], reading: CellReading | None, occupancy: OccupancyParameters
-) -> Iterator[OccupancySnapshot]:
-    """Read the numbers of all maps alike; of an iterator, as the first that knows enough says."""
-    for each in maps:
-        if reading is None and np.count_nonzero(each.cells != UNKNOWN) >= LEAST_CELLS:
-            reading = _decided_reading([each], occupancy)
-        yield _in_percent(each, reading)
-
-
-def _decided_reading(maps: Sequence[OccupancySnapshot], occupancy: OccupancyParameters) -> CellReading | None:
-    """What the numbers of maps mean; None if a reader has decided it already."""
-    undecided = [each.cells for each in maps if not each.is_percent]
-    return reading_of(undecided, occupancy, maps[0].topic) if undecided else None
-
-
-def _in_percent(snapshot: OccupancySnapshot, reading: CellReading | None) -> OccupancySnapshot:
-    if reading is None or reading.table is None or snapshot.is_percent:
-        return snapshot
-    return dataclasses.replace(snapshot, cells=reading.percent_of(snapshot.cells), is_percent=True)
 
 
 def _checked_map(given: OccupancySnapshot) -> OccupancySnapshot:
@@ -288,7 +261,7 @@ def segment(
     """
     used = with_detail(Parameters.from_any(parameters), detail, method)
     if isinstance(map_, OccupancySnapshot):
-        snapshot = _in_percent(map_, _decided_reading([map_], used.occupancy))
+        snapshot = in_percent(map_, decided_reading([map_], used.occupancy))
     elif isinstance(map_, str | Path | bytes):
         snapshot = _read_map(map_, resolution_m, used)  # type: ignore[arg-type]
     else:
