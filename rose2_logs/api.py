@@ -23,7 +23,7 @@ from rose2_logs.errors import InvalidMapError, ParameterError
 from rose2_logs.io import map_topics as map_topics_of_log
 from rose2_logs.io import open_log as open_log_reader
 from rose2_logs.io.cell_values import MAPS_LOOKED_AT, reading_of, stored_bytes
-from rose2_logs.io.given_maps import decided_reading, in_percent
+from rose2_logs.io.given_maps import all_in_percent, decided_reading, in_percent
 from rose2_logs.io.log import LogReader
 from rose2_logs.model.occupancy import UNKNOWN, GridGeometry, OccupancySnapshot, free_area_m2
 from rose2_logs.runs.run import Run

@@ -12,7 +12,7 @@ from rose2_logs.io.cell_values import LEAST_CELLS, CellReading, reading_of
 from rose2_logs.model.occupancy import UNKNOWN, OccupancySnapshot
 
 
-def allin_percent(
+def all_in_percent(
     maps: Iterable[OccupancySnapshot], reading: CellReading | None, occupancy: OccupancyParameters
 ) -> Iterator[OccupancySnapshot]:
     """Read the numbers of all maps alike; of an iterator, as the first that knows enough says."""
