@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -102,7 +102,8 @@ class RoomNames:
         tracks : sequence of R int
             Their tracks.
         shapes : sequence of R shapely geometry
-            Their shapes, world meters.
+            Their shapes, world meters. None, if the places are those of another building: then names of
+            tracks alone count.
 
         Returns
         -------
@@ -128,8 +129,8 @@ class RoomNames:
         shared: NDArray[np.bool_] = shapely.area(shapely.intersection(places, rooms)) >= INSIDE_SHARE * least
         return shared
 
-    def unused(self, names: Sequence[str], tracks: Sequence[int]) -> list[str]:
+    def unused(self, names: Collection[str], tracks: Collection[int]) -> list[str]:
         """List what was given and names none of some rooms, whose names `of` gave."""
-        used = {part for name in names for part in name.split(JOINED)}
+        used = {*names, *(part for name in names for part in name.split(JOINED))}
         given = [*(name for track, name in self.by_track.items() if track not in tracks), *self.of_place]
         return sorted({name for name in given if name not in used})

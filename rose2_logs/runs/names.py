@@ -63,5 +63,5 @@ def tell_unused(path: Path, unused: Sequence[str]) -> None:
     if unused:
         shown = ", ".join(repr(name) for name in unused[:TOLD_MOST])
         more = f" and {len(unused) - TOLD_MOST} more" if len(unused) > TOLD_MOST else ""
-        text = f"{path}: no room of the last map has these names: {shown}{more}"
+        text = f"{path}: no room has these names: {shown}{more}"
         log_warning(logger, "unused_names", text, file=path)

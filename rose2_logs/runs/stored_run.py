@@ -140,7 +140,8 @@ class StoredRun:
         Parameters
         ----------
         path : path
-            As for the option ``names`` of `RunOptions`; points and outlines are those of the last map.
+            As for the option ``names`` of `RunOptions`; points and outlines are those of the last map, and
+            name rooms of its part alone.
 
         Raises
         ------
@@ -153,10 +154,17 @@ class StoredRun:
         below, _ = self.map(last)
         snapshot = OccupancySnapshot(last, 0, 0, "", below.cells, below.geometry)
         given = names_in(snapshot, path, self.parameters, below.occupancy)
-        rows = self.table("tracks", ["track", "polygon_wkb"]).to_pylist()
+        rows = self.table("tracks").to_pylist()
         tracks = [row["track"] for row in rows]
-        found = given.of(tracks, self.shapes("tracks", [row["polygon_wkb"] for row in rows]))
-        tell_unused(path, given.unused(found, tracks))
+        shapes = self.shapes("tracks", [row["polygon_wkb"] for row in rows])
+        named = self.part or next(reversed(self.parts), None)
+        in_frame = [
+            shape if row.get("part") == named else shapely.Polygon()
+            for row, shape in zip(rows, shapes, strict=True)
+        ]
+        found = given.of(tracks, in_frame)
+        all_tracks = tracks if self.part is None else StoredRun(self.folder).table("tracks")["track"].to_pylist()
+        tell_unused(path, given.unused(found, all_tracks))
         self.names.update({track: name for track, name in zip(tracks, found, strict=True) if name})
 
     @property

@@ -70,7 +70,7 @@ class TrackedStream:
         Returns the part of the run that the map of a log time is of, None if the run has no parts. Each part
         has its own coverage and tracks.
     names : RoomNames, optional
-        What rooms are called.
+        What rooms are called; its points and outlines are those of the last part.
 
     Attributes
     ----------
@@ -197,11 +197,18 @@ class TrackedStream:
         change = self._layout.update(analysis.rooms, track_ids, map_motion(events))
         coverage = self._coverage(analysis.free_area_m2)
         poses = None if self._path is None else self._path.until(snapshot.log_time_ns)
-        names = () if self._names is None else self._names.of(track_ids, analysis.polygons)
+        names = self._named(track_ids, analysis)
         quality = analysis.quality
         return TrackedSnapshot(
             snapshot, analysis, coverage, track_ids, begun + events, quality, change, poses, self._part, names
         )
+
+    def _named(self, track_ids: tuple[int, ...], analysis: SnapshotAnalysis) -> tuple[str, ...]:
+        """Name the rooms of a map. What lies at a point of the last part may be anything in another one."""
+        if self._names is None:
+            return ()
+        is_of_last = self._part == next(reversed(self._final_free_m2), None)
+        return self._names.of(track_ids, analysis.polygons if is_of_last else ())
 
     def _begun_part(self, snapshot: OccupancySnapshot) -> tuple[RoomEvent, ...]:
         """Begin a part anew if the map is the first of one; an event unless the run begins with it."""

@@ -228,6 +228,8 @@ def _follow(
         back_project=options.back_project,
         has_parts=reader.part_count > 1,
     )
+    tracks: set[int] = set()
+    used: set[str] = set()
     with store, abandoned_on_error(sinks):
         for sink in sinks:
             sink.begin(info)
@@ -235,6 +237,8 @@ def _follow(
             history.add(step)
             store.write(step, history)
             called.add(step.track_ids, step.names)
+            tracks.update(step.track_ids)
+            used.update(step.names)
             for sink in sinks:
                 sink.write(step)
             _tell_progress(step, history, stream, on_snapshot)
@@ -246,9 +250,7 @@ def _follow(
         if note is not None:
             logger.warning("%s: in the last map, %s", info.origin or info.log_path, note)
         if options.names is not None and names is not None:
-            last = history.histories.in_last_map
-            used = [history.histories.tracks[track].name for track in last]
-            tell_unused(Path(options.names), names.unused(used, last))
+            tell_unused(Path(options.names), names.unused(used, tracks))
         summary = store.finish(history)
         for sink in sinks:
             sink.finish(summary)

@@ -24,6 +24,11 @@ def test_points_and_outlines_name_the_rooms_that_hold_them():
     assert both.unused(("Office", "Hall"), (1, 2)) == ["Gone", "Kitchen", "Nowhere", "Pantry"]
 
 
+def test_a_name_with_a_plus_is_used():
+    names = RoomNames({}, (shapely.Point(1, 1),), ("Lab + Office",))
+    assert names.unused(names.of((1,), (LEFT,)), (1,)) == []
+
+
 def test_an_outline_that_reaches_a_little_into_a_room_does_not_name_it():
     names = RoomNames({}, (shapely.box(0, 0, 4.5, 3),), ("Kitchen",))
     assert names.of((1, 2), (LEFT, RIGHT)) == ("Kitchen", "")

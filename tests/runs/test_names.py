@@ -76,7 +76,7 @@ def test_names_are_kept_with_the_run_until_others_are_given(run: Run, tmp_path: 
     file.write_text(f"name,track,x,y\nKitchen,{first.number},,\nHall,,{x},{y}\nNowhere,,999,999\n")
     run.rename(file)
     assert (run.name_of(first.number), run.name_of(second.number)) == ("Kitchen", "Hall")
-    assert "no room of the last map has these names: 'Nowhere'" in caplog.text
+    assert "no room has these names: 'Nowhere'" in caplog.text
     assert Run(run.folder).name_of(first.number) == f"Room {first.number}"
 
 

@@ -69,6 +69,27 @@ def test_every_table_says_the_part_and_only_that_more(folder: Path):
         }
 
 
+def test_points_name_rooms_of_the_last_part_and_tracks_those_of_any(folder: Path, tmp_path: Path, caplog):
+    """Where the map was begun anew, a point is another place than it was before."""
+    names = tmp_path / "names.csv"
+    names.write_text("name,track,x,y\nHall,1,,\nOld,,2,2\nNew,,32,2\n")
+    told = "no room has these names: 'Old'"
+
+    def named(run: Run) -> set[tuple[int, str]]:
+        parts = {row["track"]: row["part"] for row in run.table("tracks").to_pylist()}
+        return {(parts[track], name) for track, name in run.names.items() if track in parts}
+
+    stored = rl.analyze(folder.parent / "run.mcap", tmp_path / "run", names=str(names), layers=(), annotated_log=False)
+    assert named(stored) == {(1, "Hall"), (2, "New")}
+    assert [text for text in caplog.messages if "has these names" in text] == [f"{names}: {told}"]
+    for part, expected in ((None, {(1, "Hall"), (2, "New")}), (2, {(2, "New")}), (1, {(1, "Hall")})):
+        caplog.clear()
+        run = Run(folder, part=part)
+        run.rename(names)
+        assert named(run) == expected
+        assert ("'Hall'" in caplog.text, told in caplog.text) == (False, part != 1)
+
+
 def test_a_part_taken_alone_is_what_an_analysis_of_it_finds(folder: Path, tmp_path: Path):
     whole = Run(folder)
     assert whole.parts == (1, 2)
