@@ -7,13 +7,14 @@ import glob
 import json
 import logging
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from rose2_logs.config.run_options import RunOptions
-from rose2_logs.errors import InvalidMapError, OutputError, ParameterError
+from rose2_logs.errors import AlreadyWholeError, InvalidMapError, OutputError, ParameterError
 from rose2_logs.io import open_log
 from rose2_logs.io.discovery import stem_of
 from rose2_logs.io.log import LogReader
@@ -27,6 +28,7 @@ from rose2_logs.runs.output_folder import OutputFolder
 from rose2_logs.runs.provenance import fingerprint, software_versions
 from rose2_logs.runs.sink import RunInfo, Sink, abandoned_on_error, as_sinks
 from rose2_logs.runs.store import RunStore, table_path
+from rose2_logs.runs.stored_run import StoredRun
 from rose2_logs.runs.stream import SnapshotWorkers, TrackedStream, start_workers
 from rose2_logs.runs.summary import SUMMARY, write_summary
 from rose2_logs.runs.tables import BACK_PROJECTED, TABLES
@@ -154,7 +156,7 @@ def _analyze_log(
         )
         info = _run_info(path, reader, options)
         prepared = output.prepared(_facts(info, options), overwrite=options.overwrite, resume=options.resume)
-        with prepared as (work, journal):
+        with _refused_if_named_otherwise(folder, options), prepared as (work, journal):
             planned = _planned_files(work, path, options)
             called = TrackNames()
             outputs = [*sinks, *_make_sinks(planned, options, reader, called)]
@@ -177,6 +179,24 @@ def _analyze_log(
                 workers=options.workers,
             )
     return RunResult(folder, output.files, summary, seconds, warnings)
+
+
+@contextmanager
+def _refused_if_named_otherwise(folder: Path, options: RunOptions) -> Iterator[None]:
+    """Refuse to leave complete results as they are if their rooms were to get other names."""
+    try:
+        yield
+    except AlreadyWholeError:
+        if options.names is not None:
+            run = StoredRun(folder)
+            before = dict(run.names)
+            run.rename(Path(options.names))
+            if run.names != before:
+                raise OutputError(
+                    f"{folder}: is whole already, with other names of rooms; overwrite=True analyzes it again, "
+                    "and report, figure and export take names, too"
+                ) from None
+        raise
 
 
 def _facts_of(sinks: Sequence[Sink]) -> dict[str, Any]:

@@ -191,6 +191,19 @@ def test_the_recording_of_a_run_that_went_on_holds_what_that_of_a_fresh_one_does
     assert names(tmp_path) == ["out"]
 
 
+def test_whole_results_are_not_taken_for_those_with_other_names(log: Path, tmp_path: Path):
+    """Names decide nothing about the maps, and yet they are in all outputs."""
+    out, names = tmp_path / "out", tmp_path / "names.csv"
+    names.write_text("name,track\nKitchen,1\n")
+    analyze_log(log, out, RunOptions(**OPTIONS))
+    again = RunOptions(**OPTIONS, resume=True, names=str(names))
+    with pytest.raises(OutputError, match="other names of rooms"):
+        analyze_log(log, out, again)
+    analyze_log(log, out, RunOptions(**OPTIONS, names=str(names), overwrite=True))
+    with pytest.raises(AlreadyWholeError, match="nothing is left to do"):
+        analyze_log(log, out, again)
+
+
 def test_a_run_killed_after_all_is_in_place_is_whole(log: Path, fresh, tmp_path: Path):
     """What is left to do is to remove the journal."""
     kill_at("journal", log, tmp_path / "out")

@@ -69,6 +69,11 @@ def print_log_facts(facts: LogFacts) -> None:
     if not facts.maps and facts.map_from:
         scans = escape(printable(facts.map_from[0]))
         print_line(f"no occupancy grids: analyze --map-from {scans} builds maps from its laser scans")
+    elif not facts.maps and (untyped := [each.name for each in info.topics if not each.message_type]):
+        print_line(
+            f"no occupancy grids that say so: if those on {escape(printable(untyped[0]))} are maps, "
+            "analyze --type nav_msgs/OccupancyGrid reads them"
+        )
     elif not facts.maps:
         print_line("no occupancy grids: analyze cannot use this log")
 
