@@ -54,6 +54,13 @@ def names_in(
         raise ParameterError(
             f"{path}: its outlines do not fit the walls of the last map; give points in a table instead"
         )
+    if placement.runner_up_score >= parameters.comparison.ambiguous_share * placement.score:
+        text = (
+            f"{path}: its outlines fit the last map about as well in another way, as in a building that "
+            "looks the same turned by half a circle: the names may be those of other rooms; points in a "
+            "table are sure"
+        )
+        log_warning(logger, "ambiguous_plan", text, file=path)
     moved = shapely.transform(np.array(names.places, object), placement.motion.points)
     return dataclasses.replace(names, places=tuple(moved.tolist()))
 

@@ -163,7 +163,9 @@ class StoredRun:
             for row, shape in zip(rows, shapes, strict=True)
         ]
         found = given.of(tracks, in_frame)
-        all_tracks = tracks if self.part is None else StoredRun(self.folder).table("tracks")["track"].to_pylist()
+        all_tracks = (
+            tracks if self.part is None else StoredRun(self.folder).table("tracks")["track"].to_pylist()
+        )
         tell_unused(path, given.unused(found, all_tracks))
         self.names.update({track: name for track, name in zip(tracks, found, strict=True) if name})
 

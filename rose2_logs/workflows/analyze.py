@@ -193,8 +193,8 @@ def _refused_if_named_otherwise(folder: Path, options: RunOptions) -> Iterator[N
             run.rename(Path(options.names))
             if run.names != before:
                 raise OutputError(
-                    f"{folder}: is whole already, with other names of rooms; overwrite=True analyzes it again, "
-                    "and report, figure and export take names, too"
+                    f"{folder}: is whole already, with other names of rooms; overwrite=True analyzes it "
+                    "again, and report, figure and export take names, too"
                 ) from None
         raise
 

@@ -7,13 +7,27 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from reader_logs import SHARED, START_NS, Map, McapLog, Text
+from reader_logs import SHARED, START_NS, Map, McapLog, Text, serialized
 
 import rose2_logs as rl
 from rose2_logs.errors import NoMapTopicError
 
 TOPICS = {"/map": 90, "/a/map": 50, "/a_map": 70}
 QUIET = ("--no-rrd", "--no-mcap")
+
+
+def test_what_has_no_schema_is_told_with_the_option_that_reads_it(cli, tmp_path: Path):
+    """By info, by analyze, and in the table of batch."""
+    log = McapLog(tmp_path / "run.mcap")
+    log.raw("/map", START_NS, ("", "", b""), "cdr", serialized(Map(np.zeros((60, 100), np.int8)), 2))
+    path = log.close()
+    code, out, _ = cli("info", path)
+    assert (code, "if those on /map are maps, analyze --type nav_msgs/OccupancyGrid" in out) == (0, True)
+    code, out, err = cli("batch", path, "-o", tmp_path / "batch", *QUIET)
+    assert code == 2
+    for told in (out, err):
+        assert "--type" in told
+        assert "message_type" not in told
 
 
 @pytest.fixture

@@ -12,9 +12,12 @@ import numpy as np
 import pytest
 import shapely
 
+from rose2_logs.config.parameters import Parameters
 from rose2_logs.errors import ParameterError
+from rose2_logs.model.occupancy import GridGeometry, OccupancySnapshot
 from rose2_logs.outputs.exports.formats import write_plan
 from rose2_logs.outputs.exports.geojson import plan_geojson
+from rose2_logs.runs.names import names_in
 from rose2_logs.runs.run import Run, named_run
 
 
@@ -55,6 +58,28 @@ def test_a_drawing_names_rooms_by_the_texts_in_their_outlines(run: Run, tmp_path
     document.saveas(file)
     names = {room.number: room.name for room in named_run(run.folder, file)[-1].plan().rooms}
     assert names == {room.number: room.name for room in named}
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_plan_that_fits_in_two_ways_is_told_unless_it_lies_where_it_belongs(turned, tmp_path: Path, caplog):
+    """Two equal rooms beside each other look the same turned by half a circle."""
+    cells = np.full((120, 240), -1, np.int8)
+    cells[10:110, 10:230] = 100
+    cells[12:108, 12:118] = cells[12:108, 122:228] = 0
+    cells[50:70, 118:122] = 0
+    last = OccupancySnapshot(0, 0, 0, "map", cells, GridGeometry(0.05, (0.0, 0.0), 0.0, "map", cells.shape))
+    boxes = [shapely.box(0.6, 0.6, 5.9, 5.4), shapely.box(6.1, 0.6, 11.4, 5.4)]
+    if turned:
+        boxes = [shapely.transform(box, lambda xy: xy @ [[0, 1], [-1, 0]] + (40, 7)) for box in boxes]
+    features = [
+        {"type": "Feature", "geometry": shapely.geometry.mapping(box), "properties": {"name": name}}
+        for box, name in zip(boxes, ("Left", "Right"), strict=True)
+    ]
+    file = tmp_path / "plan.geojson"
+    file.write_text(json.dumps({"type": "FeatureCollection", "features": features}))
+    names = names_in(last, file, Parameters(), Parameters().occupancy)
+    assert set(names.of_place) == {"Left", "Right"}
+    assert ("in another way" in caplog.text) == turned
 
 
 def test_a_plan_of_another_building_is_refused(run: Run, tmp_path: Path):

@@ -79,7 +79,9 @@ def test_points_name_rooms_of_the_last_part_and_tracks_those_of_any(folder: Path
         parts = {row["track"]: row["part"] for row in run.table("tracks").to_pylist()}
         return {(parts[track], name) for track, name in run.names.items() if track in parts}
 
-    stored = rl.analyze(folder.parent / "run.mcap", tmp_path / "run", names=str(names), layers=(), annotated_log=False)
+    stored = rl.analyze(
+        folder.parent / "run.mcap", tmp_path / "run", names=str(names), layers=(), annotated_log=False
+    )
     assert named(stored) == {(1, "Hall"), (2, "New")}
     assert [text for text in caplog.messages if "has these names" in text] == [f"{names}: {told}"]
     for part, expected in ((None, {(1, "Hall"), (2, "New")}), (2, {(2, "New")}), (1, {(1, "Hall")})):

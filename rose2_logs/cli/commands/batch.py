@@ -11,6 +11,7 @@ from rich.markup import escape
 
 from rose2_logs.batch.options import BatchOptions
 from rose2_logs.cli.exit_codes import EXIT_KNOWN
+from rose2_logs.cli.flags import with_flags
 from rose2_logs.cli.messages import error, style, warning
 from rose2_logs.cli.printing import print_line, print_table, progress_bar
 
@@ -148,7 +149,7 @@ def print_batch(result: BatchResult) -> None:
         ]
         seconds = "" if row["run_s"] is None else f"{row['run_s']:.1f}"
         status = f"[{color}]{state.status}[/]"
-        table.add_row(escape(state.name), status, *figures, seconds, escape(row["reason"] or ""))
+        table.add_row(escape(state.name), status, *figures, seconds, escape(with_flags(row["reason"] or "")))
     print_table(table)
     counts = {status: sum(state.status == status for state in result.states) for status in COLORS}
     print_line(", ".join(f"{count} {status}" for status, count in counts.items() if count))
