@@ -19,8 +19,6 @@ from rose2_logs.model.room_names import RoomNames
 PLAN_ENDINGS = (".geojson", ".json", ".dxf")
 """Files with outlines; all others are tables."""
 HELP = "a table of names needs a first line with the columns name and track, or name, x and y"
-NO_PLAN = (ValueError, LookupError, TypeError, AttributeError, RecursionError, shapely.errors.ShapelyError)
-"""Errors that content of other kinds gives."""
 MOST_BYTES = 50_000_000
 """A building has some hundred rooms; a larger file is another one."""
 

@@ -82,7 +82,7 @@ class StoredRun:
             of_part = next((each for each in self._parts if each["part"] == part), None)
             if of_part is None:
                 has = f"it has {', '.join(map(str, self.parts))}" if self._parts else "it has no parts"
-                raise ParameterError(f"{folder}: no part {part}; {has}")
+                raise ParameterError(f"{folder}: no part {part!r}; {has}")
             results = self.summary["results"] | of_part["results"]
             self.summary |= {"results": results, "layout": of_part["layout"]}
         self._require_parameters()

@@ -111,8 +111,9 @@ def test_a_part_taken_alone_is_what_an_analysis_of_it_finds(folder: Path, tmp_pa
             assert part.tracks[name].tolist() == alone.tracks[name].tolist()
         assert (part.tracks["track"] - more).tolist() == alone.tracks["track"].tolist()
         assert part[-1].coverage == 1
-    with pytest.raises(ParameterError, match="no part 3; it has 1, 2"):
-        Run(folder, part=3)
+    for wrong in (3, "1"):
+        with pytest.raises(ParameterError, match=f"no part {wrong!r}; it has 1, 2"):
+            Run(folder, part=wrong)
 
 
 def test_pictures_and_reports_are_of_the_last_part_unless_another_is_named(folder: Path, tmp_path: Path):
@@ -123,7 +124,7 @@ def test_pictures_and_reports_are_of_the_last_part_unless_another_is_named(folde
     page = write_report(folder, tmp_path / "last.html").read_text("utf-8")
     assert "2 of 2, maps 3 to 6" in page
     assert "the map was begun anew" in page
-    assert "a report of part 1 is written if it is named" in page
+    assert "rose2-logs report --part 1 is about part 1" in page
     assert write_report(folder, part=1).name == "report_part_1.html"
     assert "1 of 2, maps 0 to 2" in (folder / "report_part_1.html").read_text("utf-8")
     with pytest.raises(ParameterError, match=r"no part 9; it has 1, 2"):
