@@ -75,8 +75,8 @@ class LayoutComparison:
                 "circle: B may be misaligned with A"
             ]
         doubts = [
-            "these do not seem to be two runs in one building: their walls agree too little, and what "
-            "changes below means little"
+            "these do not seem to be two runs in one building: their walls agree too little, and what is "
+            "changed below means little"
         ]
         if self.scale is not None:
             cell_a_m, cell_b_m = self.a.map.resolution_m, self.b.map.resolution_m
