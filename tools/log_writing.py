@@ -21,10 +21,12 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
 from rose2_logs.model.occupancy import GridGeometry
+from simulation.lidar import Lidar
 
 NANOSECONDS = 1_000_000_000
-MAP, TF, ODOM = "/map", "/tf", "/odom"
+MAP, TF, ODOM, SCAN = "/map", "/tf", "/odom", "/scan"
 TOPICS = {MAP: "nav_msgs/msg/OccupancyGrid", TF: "tf2_msgs/msg/TFMessage", ODOM: "nav_msgs/msg/Odometry"}
+TOPICS_WITH_SCANS = TOPICS | {SCAN: "sensor_msgs/msg/LaserScan"}
 DURATION_FOREVER = QosTime(9223372036, 854775807)
 """No deadline, as rmw spells it."""
 
@@ -58,13 +60,14 @@ class _Storage(Protocol):
 
 
 class _McapStorage:
-    def __init__(self, path: Path, start_ns: int, origin: dict[str, str]) -> None:
+    def __init__(self, path: Path, start_ns: int, origin: dict[str, str], topics: dict[str, str]) -> None:
+        self._topics = topics
         self.typestore = get_typestore(Stores.ROS2_HUMBLE)
         self._stream = path.open("wb")
         self._writer = McapFileWriter(self._stream, compression=CompressionType.ZSTD)
         self._writer.start(profile="ros2", library="rose2_logs tools")
-        self._channels = {topic: self._channel(topic, kind) for topic, kind in TOPICS.items()}
-        self._sequence = dict.fromkeys(TOPICS, 0)
+        self._channels = {topic: self._channel(topic, kind) for topic, kind in topics.items()}
+        self._sequence = dict.fromkeys(topics, 0)
         # One metadata record and one attachment: without them the summary has groups that are empty, which
         # strict readers report.
         self._writer.add_metadata("origin", origin)
@@ -78,7 +81,7 @@ class _McapStorage:
         return self._writer.register_channel(topic, "cdr", schema, {"offered_qos_profiles": qos})
 
     def put(self, topic: str, log_time_ns: int, message: Any) -> None:
-        data = bytes(self.typestore.serialize_cdr(message, TOPICS[topic]))
+        data = bytes(self.typestore.serialize_cdr(message, self._topics[topic]))
         sequence = self._sequence[topic] = self._sequence[topic] + 1
         self._writer.add_message(self._channels[topic], log_time_ns, data, log_time_ns, sequence)
 
@@ -88,7 +91,8 @@ class _McapStorage:
 
 
 class _Bag1Storage:
-    def __init__(self, path: Path, start_ns: int, origin: dict[str, str]) -> None:
+    def __init__(self, path: Path, start_ns: int, origin: dict[str, str], topics: dict[str, str]) -> None:
+        self._topics = topics
         self.typestore = get_typestore(Stores.ROS1_NOETIC)
         transforms = "geometry_msgs/TransformStamped[] transforms\n"  # the noetic store lacks tf2_msgs
         self.typestore.register(get_types_from_msg(transforms, TOPICS[TF]))
@@ -99,11 +103,11 @@ class _Bag1Storage:
             topic: self._writer.add_connection(
                 topic, kind, typestore=self.typestore, latching=1 if topic == MAP else None
             )
-            for topic, kind in TOPICS.items()
+            for topic, kind in topics.items()
         }
 
     def put(self, topic: str, log_time_ns: int, message: Any) -> None:
-        data = self.typestore.serialize_ros1(message, TOPICS[topic])
+        data = self.typestore.serialize_ros1(message, self._topics[topic])
         self._writer.write(self._connections[topic], log_time_ns, data)
 
     def close(self) -> None:
@@ -111,7 +115,8 @@ class _Bag1Storage:
 
 
 class _Bag2Storage:
-    def __init__(self, path: Path, start_ns: int, origin: dict[str, str]) -> None:
+    def __init__(self, path: Path, start_ns: int, origin: dict[str, str], topics: dict[str, str]) -> None:
+        self._topics = topics
         self.typestore = get_typestore(Stores.ROS2_HUMBLE)
         self._writer = Bag2FileWriter(path, version=8, storage_plugin=StoragePlugin.SQLITE3)
         self._writer.set_compression(CompressionMode.MESSAGE, CompressionFormat.ZSTD)
@@ -122,11 +127,11 @@ class _Bag2Storage:
             topic: self._writer.add_connection(
                 topic, kind, typestore=self.typestore, offered_qos_profiles=[quality_of_service(topic)]
             )
-            for topic, kind in TOPICS.items()
+            for topic, kind in topics.items()
         }
 
     def put(self, topic: str, log_time_ns: int, message: Any) -> None:
-        data = self.typestore.serialize_cdr(message, TOPICS[topic])
+        data = self.typestore.serialize_cdr(message, self._topics[topic])
         self._writer.write(self._connections[topic], log_time_ns, data)
 
     def close(self) -> None:
@@ -216,6 +221,37 @@ class RobotLog:
         )
         self._storage.put(ODOM, time_ns, message)
 
+    def write_scan(
+        self, time_s: float, lidar: Lidar, ranges_m: NDArray[np.float64], *, sweep_s: float, period_s: float
+    ) -> None:
+        """Write one scan of a lidar in the middle of the robot to ``/scan``, where the log has that topic.
+
+        Parameters
+        ----------
+        time_s : float
+            When the first beam was measured, seconds since the log's start.
+        lidar : Lidar
+            Bearings and range.
+        ranges_m : (B,) float
+            Measured ranges; infinite or NaN where nothing returned.
+        sweep_s, period_s : float
+            Time from the first beam to the last, and from scan to scan.
+        """
+        time_ns, bearings = self._time_ns(time_s), lidar.bearings_rad
+        message = self._types[TOPICS_WITH_SCANS[SCAN]](
+            header=self._header(time_ns, "base_link"),
+            angle_min=float(bearings[0]),
+            angle_max=float(bearings[-1]),
+            angle_increment=lidar.field_of_view_rad / (lidar.beams - 1),
+            time_increment=sweep_s / (lidar.beams - 1),
+            scan_time=period_s,
+            range_min=0.05,
+            range_max=lidar.max_range_m,
+            ranges=np.where(np.isnan(ranges_m), np.inf, ranges_m).astype(np.float32),
+            intensities=np.zeros(0, np.float32),
+        )
+        self._storage.put(SCAN, time_ns, message)
+
     def _time_ns(self, time_s: float) -> int:
         return self._start_ns + round(time_s * NANOSECONDS)
 
@@ -240,7 +276,9 @@ class RobotLog:
 
 
 @contextmanager
-def robot_log(path: Path, start_ns: int, origin: dict[str, str]) -> Iterator[RobotLog]:
+def robot_log(
+    path: Path, start_ns: int, origin: dict[str, str], *, topics: dict[str, str] = TOPICS
+) -> Iterator[RobotLog]:
     """Open a log for writing; it appears under its name when it is whole, and replaces what was there.
 
     Parameters
@@ -252,6 +290,8 @@ def robot_log(path: Path, start_ns: int, origin: dict[str, str]) -> Iterator[Rob
         Time zero of the log, nanoseconds since the epoch.
     origin : dict of str
         Where the log comes from: kept as a metadata record in an MCAP and as custom data in a rosbag2.
+    topics : dict of str
+        Topics of the log and their types: `TOPICS` or `TOPICS_WITH_SCANS`.
 
     Yields
     ------
@@ -274,7 +314,7 @@ def robot_log(path: Path, start_ns: int, origin: dict[str, str]) -> Iterator[Rob
     shutil.rmtree(unfinished, ignore_errors=True)
     unfinished.mkdir(parents=True)
     try:
-        storage = kinds[path.suffix](unfinished / path.name, start_ns, origin)
+        storage = kinds[path.suffix](unfinished / path.name, start_ns, origin, topics)
         try:
             yield RobotLog(storage, start_ns)
         finally:

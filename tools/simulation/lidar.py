@@ -48,14 +48,15 @@ class Lidar:
         return np.linspace(-0.5, 0.5, self.beams) * self.field_of_view_rad
 
     def scan(self, building: Building, pose: FloatArray, rng: np.random.Generator) -> FloatArray:
-        """Measure once.
+        """Measure once: at one pose, or while the robot moves.
 
         Parameters
         ----------
         building : Building
             Where the lidar is.
-        pose : (3,) float
-            x, y in meters and heading in radians.
+        pose : (3,) or (P, 3) float
+            x, y in meters and heading in radians; of several, each holds for an equal share of the beams,
+            in their order.
         rng : numpy Generator
             Source of the sensor's errors.
 
@@ -64,8 +65,11 @@ class Lidar:
         (B,) float
             Ranges in meters; NaN where nothing returned.
         """
-        angles = pose[2] + self.bearings_rad
-        ranges = cast_rays(building, pose[:2], angles, self.max_range_m, rng)
+        poses = np.atleast_2d(pose)
+        sectors = zip(poses, np.array_split(self.bearings_rad, len(poses)), strict=True)
+        ranges = np.concatenate(
+            [cast_rays(building, at[:2], at[2] + part, self.max_range_m, rng) for at, part in sectors]
+        )
         hit = np.isfinite(ranges)
         beside = np.roll(ranges, 1)
         edge = hit & np.isfinite(beside)
