@@ -13,9 +13,11 @@ The columns of the table, for the last map of each log:
 - `walls`: occupied cells of the recorded map that are, within one cell, occupied in the built one, %
 - `known`: cells known in the recorded map that are known in the built one, too, %
 - `rooms`: found in the recorded map and in the built one, and their `iou_sym` in %
-- `speed`: how many times as long the log lasts as processor time is needed to open it and build all of its maps
+- `scans/s`: scans per second of processor time that is needed to open the log and build all of its maps
+- `speed`: how many times as long the log lasts as this takes
 
-CARMEN logs hold no map: of these the table has the rooms in the last built map and the speed.
+CARMEN logs hold no map: of these the table has the rooms in the last built map and the speed. Where the stamps of
+a log are damaged, its scans count as one second apart, and its speed says nothing.
 """
 
 from __future__ import annotations
@@ -63,8 +65,8 @@ class Row:
     Attributes
     ----------
     name : str
-    duration_s, processor_s : float
-        How long the log lasts, and what building its maps takes.
+    cost : Cost
+        Of building its maps.
     rooms : int
         In the last built map.
     agreement : Agreement or None
@@ -72,8 +74,7 @@ class Row:
     """
 
     name: str
-    duration_s: float
-    processor_s: float
+    cost: Cost
     rooms: int
     agreement: Agreement | None = None
 
@@ -85,7 +86,18 @@ class Row:
         if a is not None:
             rooms = f"{a.rooms.rooms_gt:.0f} / {self.rooms}"
             compared = (f"{a.agree:.2f}", f"{a.walls:.1f}", f"{a.known:.1f}", rooms, f"{a.rooms.iou_sym:.1f}")
-        return (self.name, f"{self.duration_s:.0f}", *compared, f"{self.duration_s / self.processor_s:.0f}")
+        cost = self.cost
+        rates = (f"{rate / cost.processor_s:.0f}" for rate in (cost.scans, cost.duration_s))
+        return (self.name, f"{cost.duration_s:.0f}", *compared, *rates)
+
+
+@dataclass(frozen=True)
+class Cost:
+    """What building the maps of a log takes: scans, seconds that the log lasts, seconds of processor time."""
+
+    scans: int
+    duration_s: float
+    processor_s: float
 
 
 @dataclass(frozen=True)
@@ -160,14 +172,16 @@ def write_run(path: Path, building: Building, seed: int, max_time_s: float) -> N
                 log.write_map(at, steps[k].cells, steps[k].geometry)
 
 
-def built_map(path: Path, topic: str) -> tuple[OccupancySnapshot, float, float]:
-    """Build all maps of a log; returns the last one, how long the log lasts, and the processor time in s."""
+def built_map(path: Path, topic: str) -> tuple[OccupancySnapshot, Cost]:
+    """Build all maps of a log and return the last one."""
     begin = time.process_time()
     with rl.open_log(path, map_from=topic) as reader:
         *_, last = reader.snapshots()
         info = reader.info
     assert info.start_ns is not None and info.end_ns is not None
-    return last, (info.end_ns - info.start_ns) / 1e9, time.process_time() - begin
+    processor_s = time.process_time() - begin
+    scans = next(each.message_count for each in info.topics if each.name == topic)
+    return last, Cost(scans or 0, (info.end_ns - info.start_ns) / 1e9, processor_s)
 
 
 def agreement(recorded: OccupancySnapshot, built: OccupancySnapshot) -> Agreement:
@@ -200,16 +214,16 @@ def measure_simulated(seed: int, style: str, folder: Path, max_time_s: float) ->
     """Simulate a run and measure its maps."""
     path = folder / f"{style}_{seed}.mcap"
     write_run(path, simulate_building(seed, style), seed, max_time_s)
-    built, duration_s, processor_s = built_map(path, SCAN)
+    built, cost = built_map(path, SCAN)
     with rl.open_log(path, topic=MAP) as reader:
         found = agreement(reader.last(), built)
-    return Row(f"{style}, seed {seed}", duration_s, processor_s, round(found.rooms.rooms_seg), found)
+    return Row(f"{style}, seed {seed}", cost, round(found.rooms.rooms_seg), found)
 
 
 def measure_carmen(path: Path) -> Row:
     """Measure the maps of a CARMEN log."""
-    built, duration_s, processor_s = built_map(path, SCAN_TOPIC)
-    return Row(path.name, duration_s, processor_s, len(rl.segment(built).rooms))
+    built, cost = built_map(path, SCAN_TOPIC)
+    return Row(path.name, cost, len(rl.segment(built).rooms))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -225,8 +239,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--carmen", type=Path, nargs="*", default=[], help="CARMEN logs")
     parser.add_argument("--logs", type=Path, help="folder that keeps the simulated logs")
     given = parser.parse_args(arguments)
-    print("| log | s | agree, % | walls, % | known, % | rooms | iou_sym | speed |")
-    print("|---|---:|---:|---:|---:|---:|---:|---:|")
+    print("| log | s | agree, % | walls, % | known, % | rooms | iou_sym | scans/s | speed |")
+    print("|---|---:|---:|---:|---:|---:|---:|---:|---:|")
     with TemporaryDirectory(prefix="rose2_logs_") as temporary:
         folder = given.logs or Path(temporary)
         folder.mkdir(parents=True, exist_ok=True)
