@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from simulation.building import Building, FloatArray
 
@@ -104,6 +105,10 @@ def cast_rays(
     nearest = start + np.clip(-(start * along).sum(1) / length2, 0, 1)[:, None] * along
     close = (nearest**2).sum(1) < max_range_m**2
     start, along, transmission = start[close], along[close], building.transmission[close]
+    is_glass = transmission > 0
+    passes = rng.random((len(angles_rad), int(is_glass.sum()))) < transmission[is_glass]
+    met = _within(start, start + along, angles_rad)
+    start, along, is_glass, passes = start[met], along[met], is_glass[met], passes[:, met[is_glass]]
     rays = np.stack([np.cos(angles_rad), np.sin(angles_rad)], 1)
 
     across = rays[:, :1] * along[:, 1] - rays[:, 1:] * along[:, 0]  # (B, S)
@@ -111,9 +116,16 @@ def cast_rays(
         distance = (start[:, 0] * along[:, 1] - start[:, 1] * along[:, 0]) / across
         share = (start[:, 0] * rays[:, 1:] - start[:, 1] * rays[:, :1]) / across
     distance[~((share >= 0) & (share <= 1) & (distance > 1e-6))] = np.inf
-    passes = rng.random((len(rays), int((transmission > 0).sum()))) < transmission[transmission > 0]
-    glass = distance[:, transmission > 0]
-    distance[:, transmission > 0] = np.where(passes, np.inf, glass)
+    distance[:, is_glass] = np.where(passes, np.inf, distance[:, is_glass])
     result: FloatArray = distance.min(axis=1, initial=np.inf)
     result[result > max_range_m] = np.inf
     return result
+
+
+def _within(starts: FloatArray, ends: FloatArray, angles_rad: FloatArray) -> NDArray[np.bool_]:
+    """Whether segments (S, 2), seen from the origin, may lie between the first and the last of sorted angles."""
+    first, last = angles_rad[0] - 1e-6, angles_rad[-1] + 1e-6
+    if not 0 < last - first < np.pi:
+        return np.ones(len(starts), bool)
+    inward = np.array([[-np.sin(first), np.cos(first)], [np.sin(last), -np.cos(last)]])
+    return ((starts @ inward.T >= 0) | (ends @ inward.T >= 0)).all(1)
