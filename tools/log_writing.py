@@ -19,9 +19,9 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as Bag2FileWriter
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
+from simulation.lidar import Lidar
 
 from rose2_logs.model.occupancy import GridGeometry
-from simulation.lidar import Lidar
 
 NANOSECONDS = 1_000_000_000
 MAP, TF, ODOM, SCAN = "/map", "/tf", "/odom", "/scan"

@@ -2,9 +2,9 @@
 
 OMP_NUM_THREADS=1 python tools/measure_scan_maps.py --seeds 1 2 3 4 5 --carmen ../shared/carmen/*.log.gz
 
-For each seed a robot explores a simulated building. Its log holds the maps of the run as its mapper made them,
-the transforms, and the scans of its lidar: 360 beams, ten times a second, each beam measured from where the
-robot was at that moment. The mapper uses one scan every 35 cm, as those of SLAM packages do; the maps built
+For each seed a robot explores a simulated building. Its log holds the maps of the run as its mapper made
+them, the transforms, and the scans of its lidar: 360 beams, ten times a second, each beam measured from where
+the robot was at that moment. The mapper uses one scan every 35 cm, as those of SLAM packages do; the maps built
 from scans use them all, so the two maps are of the same run, but not of the same measurements.
 
 The columns of the table, for the last map of each log:
@@ -16,8 +16,8 @@ The columns of the table, for the last map of each log:
 - `scans/s`: scans per second of processor time that is needed to open the log and build all of its maps
 - `speed`: how many times as long the log lasts as this takes
 
-CARMEN logs hold no map: of these the table has the rooms in the last built map and the speed. Where the stamps of
-a log are damaged, its scans count as one second apart, and its speed says nothing.
+CARMEN logs hold no map: of these the table has the rooms in the last built map and the speed. Where the
+stamps of a log are damaged, its scans count as one second apart, and its speed says nothing.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ import sys
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -115,7 +116,7 @@ class Trajectory:
 
     def __init__(self, samples: Sequence[PoseSample], robot: RobotSettings) -> None:
         times, rows = [samples[0].time_s], [_row(samples[0])]
-        for one, other in zip(samples, samples[1:], strict=False):
+        for one, other in pairwise(samples):
             before, after = rows[-1], _row(other)
             for heading in (2, 8):  # of the truth and of the odometry, without jumps by whole turns
                 turns = np.round((after[heading] - before[heading]) / (2 * np.pi))
@@ -178,7 +179,8 @@ def built_map(path: Path, topic: str) -> tuple[OccupancySnapshot, Cost]:
     with rl.open_log(path, map_from=topic) as reader:
         *_, last = reader.snapshots()
         info = reader.info
-    assert info.start_ns is not None and info.end_ns is not None
+    assert info.start_ns is not None
+    assert info.end_ns is not None
     processor_s = time.process_time() - begin
     scans = next(each.message_count for each in info.topics if each.name == topic)
     return last, Cost(scans or 0, (info.end_ns - info.start_ns) / 1e9, processor_s)

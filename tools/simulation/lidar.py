@@ -123,9 +123,10 @@ def cast_rays(
 
 
 def _within(starts: FloatArray, ends: FloatArray, angles_rad: FloatArray) -> NDArray[np.bool_]:
-    """Whether segments (S, 2), seen from the origin, may lie between the first and the last of sorted angles."""
+    """Whether segments (S, 2) may be seen from the origin between the first and the last of sorted angles."""
     first, last = angles_rad[0] - 1e-6, angles_rad[-1] + 1e-6
     if not 0 < last - first < np.pi:
         return np.ones(len(starts), bool)
     inward = np.array([[-np.sin(first), np.cos(first)], [np.sin(last), -np.cos(last)]])
-    return ((starts @ inward.T >= 0) | (ends @ inward.T >= 0)).all(1)
+    seen: NDArray[np.bool_] = ((starts @ inward.T >= 0) | (ends @ inward.T >= 0)).all(1)
+    return seen
