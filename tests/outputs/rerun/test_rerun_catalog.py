@@ -44,7 +44,7 @@ def test_all_runs_are_segments_of_one_data_set_in_our_layout(results):
         assert dataset.name == "results"
         assert sorted(each.rpartition("-")[0] for each in dataset.segment_ids()) == ["first", "second"]
         table = dataset.segment_table().to_pandas()
-        assert list(table["coverage:end"]) == [10000, 10000]
+        assert list(table["coverage_percent:end"]) == [100, 100]
         assert dataset.default_blueprint() in dataset.blueprints()
 
 
