@@ -112,8 +112,8 @@ def main() -> None:
         if ended.code == EXIT_INTERRUPTED:
             with suppress(OSError):  # the terminal may be gone
                 messages.error("interrupted; unfinished results were removed")
-            # CPython ends by SIGINT, whatever the exit code, if the interrupt came while text was executed, as
-            # named tuples are when a module is imported; unless text is executed after it.
+            # CPython ends by SIGINT, whatever the exit code, if the interrupt came while text was executed,
+            # as named tuples are when a module is imported, and no text is executed after it.
             exec("")  # noqa: S102
             if came:
                 sys.exit(EXIT_SIGNALED + came[0])
