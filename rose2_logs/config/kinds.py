@@ -26,13 +26,13 @@ class KindParameters(ParameterBlock):
         1000.0,
     )
     corridor_max_width_m: float = number(
-        4.0, "m", "Greatest width of a corridor: twice that of a wide one in an office.", 0.1, 1000.0
+        4.0, "m", "Greatest width of a corridor: twice that of a wide one in an office.", 0.1, 50.0
     )
     hall_min_m2: float = number(
-        80.0, "m^2", "Least area of a hall: more than a classroom or a living room.", 0.1, 1e6
+        80.0, "m2", "Least area of a hall: more than a classroom or a living room.", 0.1, 1e6
     )
     closet_max_m2: float = number(
-        3.0, "m^2", "Greatest area of a closet: less than the smallest bedroom or bathroom.", 0.0, 1e6
+        3.0, "m2", "Greatest area of a closet: less than the smallest bedroom or bathroom.", 0.0, 1e6
     )
     detail_m: float = number(
         0.5,

@@ -89,7 +89,7 @@ class OccupancyParameters(ParameterBlock):
         "all between were explored.",
     )
     far_margin_m: float = number(
-        5.0, "m", "What is nearer to explored floor always stays: rays into the next room.", 0.0, 1000.0
+        5.0, "m", "What is nearer to explored floor always stays: rays into the next room.", 0.0, 100.0
     )
     far_min_area_m2: float = number(
         3.0, "m2", "Floor of this area stays wherever it is: the smallest room.", 0.0

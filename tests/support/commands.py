@@ -36,12 +36,21 @@ def heed_ctrl_c() -> None:
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+def _heed_hangups() -> None:
+    """Heed HUP, which what runs the tests may ignore, as under ``nohup``; a program inherits that."""
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
+
+
 @contextmanager
 def started(*command: object, **options: Any) -> Iterator[subprocess.Popen[str]]:
     """Start a program in a session of its own; at the end of the block it and all below it are killed."""
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     with subprocess.Popen(
-        [str(part) for part in command], text=True, start_new_session=True, **(pipes | options)
+        [str(part) for part in command],
+        text=True,
+        start_new_session=True,
+        preexec_fn=_heed_hangups if hasattr(signal, "SIGHUP") else None,  # noqa: PLW1509
+        **(pipes | options),
     ) as process:
         try:
             yield process
