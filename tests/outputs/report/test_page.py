@@ -70,9 +70,10 @@ def test_it_says_what_the_tables_say(office_results: Path, tmp_path: Path):
     assert len(by_name) == len(tracks)
     for track in tracks:
         row = by_name[f"Room {track['track']}"]
-        assert row[1] == ("yes" if track["in_last_map"] else "no")
-        assert row[2:4] == [f"{track['area_m2']:.1f}", f"{track['predicted_area_m2']:.1f}"]
-        assert row[7] == f"{track['first_coverage']:.0%}"
+        assert row[1] == (track["kind_guess"] or "–")
+        assert row[2] == ("yes" if track["in_last_map"] else "no")
+        assert row[3:5] == [f"{track['area_m2']:.1f}", f"{track['predicted_area_m2']:.1f}"]
+        assert row[8] == f"{track['first_coverage']:.0%}"
     doorways = pq.read_table(office_results / "doorways.parquet").to_pylist()
     assert len(told.rows("doorways-table")) == len([door for door in doorways if door["snapshot"] == 5])
     events = pq.read_table(office_results / "events.parquet").to_pylist()
@@ -138,8 +139,8 @@ def test_a_room_that_is_gone_in_the_end_never_settled(office_results: Path, tmp_
     pq.write_table(tracks.set_column(place, tracks.field(place), [in_last]), folder / "tracks.parquet")
     page = write_report(folder)
     rows = {row[0]: row for row in Reader(page).rows("rooms-table")}
-    assert rows[f"Room {gone}"][9:12] == ["–"] * 3
-    assert all("–" not in row[9:12] for name, row in rows.items() if name != f"Room {gone}")
+    assert rows[f"Room {gone}"][10:13] == ["–"] * 3
+    assert all("–" not in row[10:13] for name, row in rows.items() if name != f"Room {gone}")
     titles = set(re.findall(rf"<title>{gone}\??: ([a-z ]+)</title>", page.read_text(encoding="utf-8")))
     assert titles == {"not in the last map"}
 
@@ -243,7 +244,7 @@ def test_long_tables_are_cut_and_say_so(office_results: Path, tmp_path: Path, mo
     page = write_report(office_results, tmp_path / "page.html")
     told = Reader(page)
     assert [len(told.rows(name)) for name in ("rooms-table", "doorways-table", "events-table")] == [4, 4, 4]
-    assert {row[1] for row in told.rows("rooms-table")} == {"yes"}
+    assert {row[2] for row in told.rows("rooms-table")} == {"yes"}
     kinds = {row["kind"] for row in pq.read_table(office_results / "events.parquet").to_pylist()}
     if "split" in kinds:
         assert "split" in {row[4] for row in told.rows("events-table")}
