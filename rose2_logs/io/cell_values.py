@@ -19,7 +19,7 @@ from rose2_logs.config.parameters import OccupancyParameters
 from rose2_logs.errors import InvalidMapError
 from rose2_logs.io.grids import Cells, Grid, MapWarning, Patch, percent
 from rose2_logs.model.explored import is_scattered, sides_per_cell
-from rose2_logs.model.labels import cells_where, label_sizes
+from rose2_logs.model.labels import COUNTED_AT_ONCE, label_sizes
 from rose2_logs.model.occupancy import HIGHEST_PERCENT, UNKNOWN, OccupancySnapshot, classify
 from rose2_logs.system.text import percent as as_percent
 from rose2_logs.system.warnings import log_warning
@@ -179,9 +179,11 @@ def read_as(parameters: OccupancyParameters) -> CellReading:
 def count_values(cells: Cells) -> Counts:
     """Count the cells (H, W) by the byte that they are stored as."""
     flat = cells.reshape(-1).view(np.uint8)
-    known = cells_where(flat, lambda part: part != UNKNOWN_BYTE)  # of a large canvas mostly few
-    counts = label_sizes(flat[known], UNKNOWN_BYTE)
-    counts[UNKNOWN_BYTE] = flat.size - known.size
+    counts = np.zeros(UNKNOWN_BYTE + 1, np.int64)
+    for begin in range(0, flat.size, COUNTED_AT_ONCE):
+        part = flat[begin : begin + COUNTED_AT_ONCE]
+        counts += label_sizes(part[part != UNKNOWN_BYTE], UNKNOWN_BYTE)  # of a large canvas few are known
+    counts[UNKNOWN_BYTE] = flat.size - counts.sum()
     return counts
 
 

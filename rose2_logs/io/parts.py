@@ -339,12 +339,12 @@ def _around(grid: Grid, points_m: FloatArray, reach_m: float) -> NDArray[np.int8
     # Of finer cells not all are looked at: walls are thicker than they are.
     steps = np.unique(np.linspace(-reach, reach, 2 * min(reach, MOST_STEPS) + 1).round().astype(np.intp))
     row, column = np.moveaxis(grid.geometry.world_to_cell(points_m), -1, 0)
-    row = (row[:, None, None] + steps[:, None]).repeat(len(steps), axis=2)
-    column = (column[:, None, None] + steps).repeat(len(steps), axis=1)
+    row, column = row[:, None, None] + steps[:, None], column[:, None, None] + steps
     height, width = grid.cells.shape
-    is_inside = (row >= 0) & (row < height) & (column >= 0) & (column < width)
     cells = grid.cells[row.clip(0, height - 1), column.clip(0, width - 1)]
-    return np.where(is_inside, cells, np.int8(UNKNOWN)).reshape(len(points_m), len(steps) ** 2)
+    is_outside = (row < 0) | (row >= height) | (column < 0) | (column >= width)
+    cells[is_outside] = UNKNOWN
+    return cells.reshape(len(points_m), len(steps) ** 2)
 
 
 def _has_moved(before: Grid, now: Grid, occupancy: OccupancyParameters) -> bool:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rose2_logs.config.parameters import OccupancyParameters
-from rose2_logs.model.labels import cells_where
+from rose2_logs.model.labels import COUNTED_AT_ONCE, cells_where
 
 BLOCK_CELLS = 16
 """Side of the blocks in cells: a ray through one leaves it nearly empty."""
@@ -69,15 +69,13 @@ def find_far_cells(
     """
     if parameters.far_cells == "keep" or cells.shape[0] * cells.shape[1] == 0:
         return None
-    known = cells_where(cells, lambda part: part >= 0)
-    if len(known) == 0:
-        return None
-    row, column = np.divmod(known, cells.shape[1])
-    spans = (int(row[-1]) - int(row[0]) + 1) * (int(column.max()) - int(column.min()) + 1)
+    count, spans = _known_extent(cells)
     most = spans / parameters.far_min_gain
-    # A window that is full enough cannot shrink so much.
-    if len(known) > most:
+    # A window that is full enough cannot shrink so much: nearly no map goes on from here to lists of its cells.
+    if count == 0 or count > most:
         return None
+    known = cells_where(cells, lambda part: part >= 0)
+    row, column = np.divmod(known, cells.shape[1])
     window = _explored_window(row, column, cells.shape, resolution_m, parameters, most)
     if window is None:
         return None
@@ -87,6 +85,22 @@ def find_far_cells(
     )
     away = np.hypot(down, right)
     return FarCells(window, int(np.count_nonzero(away)), float(away.max()) * resolution_m)
+
+
+def _known_extent(cells: NDArray[np.int8]) -> tuple[int, int]:
+    """Count the known cells, and all cells of the smallest rectangle around them; 0 and 0 if there are none."""
+    count = 0
+    rows, columns = (np.zeros(side, bool) for side in cells.shape)
+    at_once = max(1, COUNTED_AT_ONCE // cells.shape[1])
+    for top in range(0, cells.shape[0], at_once):
+        known = cells[top : top + at_once] >= 0
+        count += int(np.count_nonzero(known))
+        rows[top : top + at_once] = known.any(1)
+        columns |= known.any(0)
+    if count == 0:
+        return 0, 0
+    height, width = (int(np.ptp(np.flatnonzero(each))) + 1 for each in (rows, columns))
+    return count, height * width
 
 
 def _explored_window(

@@ -149,7 +149,7 @@ def test_costs_of_nav2_become_percent_in_their_order():
 
 @pytest.mark.parametrize(
     ("message_type", "encoding"),
-    [("nav2_msgs/msg/Costmap", "json"), ("sensor_msgs/msg/Image", "cdr"), ("foxglove.Grid", "flatbuffer")],
+    [("nav2_msgs/msg/Costmap", "json"), ("sensor_msgs/msg/Image", "cdr"), ("foxglove.Grid", "ros1")],
 )
 def test_other_types_and_encodings_are_not_maps(message_type, encoding):
     assert decoder(message_type, encoding) is None
