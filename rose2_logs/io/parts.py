@@ -341,7 +341,7 @@ def _around(grid: Grid, points_m: FloatArray, reach_m: float) -> NDArray[np.int8
     row, column = np.moveaxis(grid.geometry.world_to_cell(points_m), -1, 0)
     row, column = row[:, None, None] + steps[:, None], column[:, None, None] + steps
     height, width = grid.cells.shape
-    cells = grid.cells[row.clip(0, height - 1), column.clip(0, width - 1)]
+    cells: NDArray[np.int8] = grid.cells[row.clip(0, height - 1), column.clip(0, width - 1)]
     is_outside = (row < 0) | (row >= height) | (column < 0) | (column >= width)
     cells[is_outside] = UNKNOWN
     return cells.reshape(len(points_m), len(steps) ** 2)

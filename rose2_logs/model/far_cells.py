@@ -71,7 +71,7 @@ def find_far_cells(
         return None
     count, spans = _known_extent(cells)
     most = spans / parameters.far_min_gain
-    # A window that is full enough cannot shrink so much: nearly no map goes on from here to lists of its cells.
+    # A window that is full enough cannot shrink so much: hardly a map goes on from here to lists of cells.
     if count == 0 or count > most:
         return None
     known = cells_where(cells, lambda part: part >= 0)
@@ -88,7 +88,7 @@ def find_far_cells(
 
 
 def _known_extent(cells: NDArray[np.int8]) -> tuple[int, int]:
-    """Count the known cells, and all cells of the smallest rectangle around them; 0 and 0 if there are none."""
+    """Count the known cells, and all cells of the smallest rectangle around them; 0, 0 if there are none."""
     count = 0
     rows, columns = (np.zeros(side, bool) for side in cells.shape)
     at_once = max(1, COUNTED_AT_ONCE // cells.shape[1])
