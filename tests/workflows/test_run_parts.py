@@ -124,7 +124,7 @@ def test_pictures_and_reports_are_of_the_last_part_unless_another_is_named(folde
     page = write_report(folder, tmp_path / "last.html").read_text("utf-8")
     assert "2 of 2, maps 3 to 6" in page
     assert "the map was begun anew" in page
-    assert "rose2-logs report --part 1 is about part 1" in page
+    assert "part 1 can have a report of its own" in page
     assert write_report(folder, part=1).name == "report_part_1.html"
     assert "1 of 2, maps 0 to 2" in (folder / "report_part_1.html").read_text("utf-8")
     with pytest.raises(ParameterError, match=r"no part 9; it has 1, 2"):

@@ -68,7 +68,7 @@ def _part(results: Run) -> list[tuple[str, str]]:
         return []
     numbers = results.columns["snapshot"]
     others = [number for number in results.parts if number != results.part]
-    more = "".join(f"; rose2-logs report --part {number} is about part {number}" for number in others[:1])
+    more = "".join(f"; part {number} can have a report of its own" for number in others[:1])
     count = results.summary.get("decided", {}).get("parts", {}).get("count", len(results.parts))
     return [("Part of the log", f"{results.part} of {count}, maps {numbers[0]} to {numbers[-1]}{more}")]
 
