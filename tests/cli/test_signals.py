@@ -17,7 +17,12 @@ import pytest
 from commands import ROSE2_LOGS, WAIT_S, below, is_running, started, wait_for
 from saved_maps import save_run
 
-pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="needs signals of POSIX")
+pytestmark = [
+    pytest.mark.skipif(sys.platform == "win32", reason="needs signals of POSIX"),
+    pytest.mark.skipif(
+        "PYTEST_XDIST_WORKER" in os.environ, reason="commands do not start below xdist; run it alone"
+    ),
+]
 SIGNALS = [signal.SIGTERM, signal.SIGHUP]
 IDLE_S, IDLE_MOST_SHARE = 5.0, 0.05
 """Time that a viewer is watched for, and the share of a processor that it may use meanwhile."""
