@@ -10,30 +10,26 @@ import sys
 import time
 import urllib.error
 import urllib.request
+from collections.abc import Iterator
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from urllib.parse import parse_qs, urlsplit
 
 import pytest
 from commands import ROSE2_LOGS, WAIT_S, below, is_running, started, wait_for
 from saved_maps import save_run
 
-pytestmark = [
-    pytest.mark.skipif(sys.platform == "win32", reason="needs signals of POSIX"),
-    pytest.mark.skipif(
-        "PYTEST_XDIST_WORKER" in os.environ, reason="commands do not start below xdist; run it alone"
-    ),
-]
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="needs signals of POSIX")
 SIGNALS = [signal.SIGTERM, signal.SIGHUP]
 IDLE_S, IDLE_MOST_SHARE = 5.0, 0.05
 """Time that a viewer is watched for, and the share of a processor that it may use meanwhile."""
 
 
 @pytest.fixture
-def temporary(tmp_path: Path) -> Path:
-    """The folder for temporary files, which is to be empty again."""
-    folder = tmp_path / "temporary"
-    folder.mkdir()
-    return folder
+def temporary() -> Iterator[Path]:
+    """The folder for temporary files, which is to be empty again; names of sockets in it must be short."""
+    with TemporaryDirectory() as folder:
+        yield Path(folder)
 
 
 @pytest.fixture(scope="module")
