@@ -13,6 +13,8 @@ from typing import IO, Any
 
 import zstandard
 
+from rose2_logs.io.discovery import ZSTD_MAGIC
+
 COPIED_AT_ONCE = 1 << 20
 """Bytes that are in memory while a file is decompressed into another one."""
 
@@ -179,7 +181,7 @@ def _open_lz4(source: IO[bytes]) -> Any:
 
 _PACKED: dict[bytes, Callable[[IO[bytes]], Any]] = {
     GZIP_MAGIC: lambda source: gzip.GzipFile(fileobj=source),
-    b"\x28\xb5\x2f\xfd": _open_zstd,
+    ZSTD_MAGIC: _open_zstd,
     b"BZh": bz2.BZ2File,
     XZ_MAGIC: lzma.LZMAFile,
     LZ4_MAGIC: _open_lz4,
