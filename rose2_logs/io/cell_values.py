@@ -10,6 +10,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
@@ -295,17 +296,26 @@ def oddity(snapshot: OccupancySnapshot, parameters: OccupancyParameters) -> tupl
     return None if text is None else ("few_walls", text)
 
 
-def reading_of(maps: Iterable[Cells], parameters: OccupancyParameters, name: str) -> CellReading:
-    """Decide what the numbers of maps mean that are given as arrays, by the same rule, and tell it.
+def reading_of(
+    maps: Iterable[Cells],
+    parameters: OccupancyParameters,
+    name: str,
+    *,
+    file: Path | None = None,
+    topic: str | None = None,
+) -> CellReading:
+    """Decide what the numbers of the maps of a run mean, by one rule for all of them, and tell it.
 
     Parameters
     ----------
     maps : iterable of (H, W) int8
-        Some maps of a run; of an endless one the first that are enough are taken.
+        Some maps of the run, as they are stored; not looked at where the parameters decide.
     parameters : OccupancyParameters
         Thresholds that are named there win.
     name : str
         What the maps are called in what is told.
+    file, topic : optional
+        Of the warning.
     """
     if parameters.values != "auto":
         return read_as(parameters)
@@ -314,7 +324,7 @@ def reading_of(maps: Iterable[Cells], parameters: OccupancyParameters, name: str
         counts += count_values(cells)
     found = decide(counts)
     if found.why:
-        log_warning(logger, "values", f"{name}: {found.why}; {OVERRULED}")
+        log_warning(logger, "values", f"{name}: {found.why}; {OVERRULED}", file=file, topic=topic)
     return found
 
 

@@ -17,8 +17,8 @@ import numpy as np
 from rose2_logs.config.parameters import OccupancyParameters
 from rose2_logs.config.selection import Selection, Times
 from rose2_logs.errors import InvalidMapError, LogError, NoMapTopicError
-from rose2_logs.io.cell_values import MAPS_LOOKED_AT, OVERRULED, CellReading, count_values, decide, read_as
-from rose2_logs.io.grids import Grid, MapWarning, Patch
+from rose2_logs.io.cell_values import MAPS_LOOKED_AT, CellReading, reading_of
+from rose2_logs.io.grids import Cells, Grid, MapWarning, Patch
 from rose2_logs.io.map_stream import MapChecks, MapStream, ReadCounts, without_far_cells
 from rose2_logs.io.messages import is_called_map, is_patch_type, ros_type
 from rose2_logs.io.parts import Part, Parts, find_parts, find_saved_parts
@@ -114,9 +114,11 @@ class LogReader:
     @cached_property
     def cell_reading(self) -> CellReading:
         """What the numbers in the cells mean: decided once for the whole log, whatever is selected of it."""
-        if self._occupancy.values != "auto":
-            return read_as(self._occupancy)
-        counts = count_values(np.zeros((0, 0), np.int8))
+        name = f"{self.info.path}: {self.topic}"
+        return reading_of(self._some_cells(), self._occupancy, name, file=self.info.path, topic=self.topic)
+
+    def _some_cells(self) -> Iterator[Cells]:
+        """Yield the cells of maps and patches spread over the log, as they are stored."""
         times = [distinct(self.source.log_times(topic)) for topic in self._topics]
         spread = [
             each[np.linspace(0, len(each) - 1, MAPS_LOOKED_AT).round().astype(int)]
@@ -128,12 +130,7 @@ class LogReader:
         ):
             with suppress(LogError):  # it is told of where the map is needed
                 if (decoded := message.decode()) is not None:
-                    counts += count_values(decoded.cells)
-        found = decide(counts)
-        if found.why:
-            text = f"{self.info.path}: {self.topic}: {found.why}; {OVERRULED}"
-            log_warning(logger, "values", text, file=self.info.path, topic=self.topic)
-        return found
+                    yield decoded.cells
 
     @property
     def decided(self) -> dict[str, Any]:
