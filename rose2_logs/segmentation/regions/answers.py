@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from rose2_logs.config.regions import RegionParameters
 from rose2_logs.segmentation.regions.plan_raster import (
     OFFSETS,
     OUTPUTS,
@@ -28,8 +29,6 @@ TILE_CELLS = 1536
 """Larger plans are looked at in tiles of this side, so that memory does not grow with the map."""
 OVERLAP_CELLS = 192
 """Tiles see this far beyond what they answer for; what lies further hardly matters to an answer."""
-VIEWS = 2
-"""The network sees a map as it is and turned by half: it errs in different places, and the mean errs less."""
 
 
 class AnsweringNetwork:
@@ -38,8 +37,12 @@ class AnsweringNetwork:
     def __init__(self, path: Path) -> None:
         self._network = cv2.dnn.readNetFromONNX(str(path))
 
-    def __call__(self, raster: PlanRaster, views: int = VIEWS) -> NDArray[np.float32]:
-        """Answers (OUTPUTS, H, W) in [0, 1] for a raster (H, W), the mean of those for one or two views."""
+    def __call__(self, raster: PlanRaster, views: int = RegionParameters.answer_views) -> NDArray[np.float32]:
+        """Answers (OUTPUTS, H, W) in [0, 1] for a raster (H, W).
+
+        With two views the network sees the map as it is and turned by half: it errs in different places, and
+        the mean of both answers errs less.
+        """
         height, width = raster.wall.shape
         if max(height, width) <= TILE_CELLS:
             return self._answers(raster, views)
