@@ -10,7 +10,7 @@ from functools import cached_property
 import shapely
 
 from rose2_logs.comparison.final_layout import FinalLayout
-from rose2_logs.comparison.placement import Placement, fits, fitting_scale, place
+from rose2_logs.comparison.placement import Placement, fits, fitting_scale, is_ambiguous, place
 from rose2_logs.comparison.room_changes import RoomChange, RoomStatus, compare_rooms
 from rose2_logs.comparison.wall_changes import WallComparison, compare_walls
 
@@ -61,8 +61,7 @@ class LayoutComparison:
     @property
     def ambiguous(self) -> bool:
         """Whether another placement fits about as well."""
-        share = self.a.map.parameters.comparison.ambiguous_share
-        return self.placement.runner_up_score >= share * self.placement.score
+        return is_ambiguous(self.placement, self.a.map.parameters.comparison)
 
     @property
     def doubts(self) -> list[str]:

@@ -184,6 +184,11 @@ def fits(placement: Placement, parameters: ComparisonParameters) -> bool:
     return placement.score >= parameters.same_building_min_score or in_parts
 
 
+def is_ambiguous(placement: Placement, parameters: ComparisonParameters) -> bool:
+    """Whether two maps fit about as well in another way, as buildings do that look the same when turned."""
+    return placement.runner_up_score >= parameters.ambiguous_share * placement.score
+
+
 def placement_by(moving: PlacedMap, fixed: PlacedMap, motion: RigidMotion) -> Placement:
     """Measure how far two maps agree that a motion brings together."""
     agreement, common_share, score = _Agreement(moving, fixed).of(motion)

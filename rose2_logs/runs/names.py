@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import shapely
 
-from rose2_logs.comparison.placement import PlacedMap, fits
+from rose2_logs.comparison.placement import PlacedMap, fits, is_ambiguous
 from rose2_logs.comparison.reference_plan import place_outlines
 from rose2_logs.config.parameters import OccupancyParameters, Parameters
 from rose2_logs.errors import ParameterError
@@ -54,7 +54,7 @@ def names_in(
         raise ParameterError(
             f"{path}: its outlines do not fit the walls of the last map; give points in a table instead"
         )
-    if placement.runner_up_score >= parameters.comparison.ambiguous_share * placement.score:
+    if is_ambiguous(placement, parameters.comparison):
         text = (
             f"{path}: its outlines fit the last map about as well in another way, as in a building that "
             "looks the same turned by half a circle: the names may be those of other rooms; points in a "
