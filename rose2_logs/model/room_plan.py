@@ -268,7 +268,7 @@ def _unknown_within(shape: BaseGeometry, below: PlanMap) -> BaseGeometry:
     # Corners are between cells; fillPoly counts from their centers.
     rings = [
         np.round(shapely.get_coordinates(ring) - (x0 + 0.5, y0 + 0.5)).astype(np.int32)
-        for ring in shapely.get_rings(in_cells)
+        for ring in shapely.get_rings(shapely.get_parts(in_cells))
     ]
     cv2.fillPoly(inside, rings, 1)
     known = np.zeros((height, width), np.bool_)

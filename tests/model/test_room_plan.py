@@ -20,6 +20,15 @@ def test_the_unknown_half_of_a_room_is_predicted(yaw_rad):
     assert true.intersection(parts[RIGHT]).area / true.union(parts[RIGHT]).area > 0.9
 
 
+def test_the_unknown_half_of_a_room_in_several_pieces_is_predicted():
+    plan = two_rooms_plan()
+    (room,) = (each for each in plan.rooms if each.number == RIGHT)
+    pieces = shapely.MultiPolygon([*shapely.get_parts(room.shape), shapely.box(-0.5, 2.5, -0.3, 2.7)])
+    several = dataclasses.replace(room, shape=pieces)
+    found = predicted_parts(dataclasses.replace(plan, rooms=(several,)))
+    assert found[RIGHT].area == pytest.approx(predicted_parts(plan)[RIGHT].area, rel=0.02)
+
+
 def test_thin_unknown_strips_are_walls():
     """The inside of a wall is never seen and is no part of a room that was not."""
     plan = two_rooms_plan()
