@@ -13,12 +13,12 @@ import tempfile
 import threading
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, nullcontext, suppress
+from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from functools import partial
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 from urllib.parse import quote
 
 from rose2_logs.errors import LogError, OutputError
@@ -146,18 +146,32 @@ def served_page(recording: str, port: int | None = None) -> Iterator[tuple[str, 
     if port is not None and listens(port):
         raise OutputError(f"port {port} is in use; choose another port")
     page = port or _free_port(PAGE_PORT)
+    with ExitStack() as stack:
+        try:
+            served = stack.enter_context(_served_at(page, recording))
+        except OutputError:
+            # Another viewer that starts at the same time may have taken the usual port.
+            if port is not None or page != PAGE_PORT:
+                raise
+            served = stack.enter_context(_served_at(_free_port(), recording))
+        yield served
+
+
+@contextmanager
+def _served_at(page: int, recording: str) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
+    """Serve the web viewer at a port; as `served_page`."""
     origin = f"http://127.0.0.1:{page}"
     # The page takes the file itself: Rerun's own server of recordings is never idle.
     at_address = nullcontext(recording) if "://" in recording else served_file(Path(recording), origin)
-    with at_address as source, tempfile.TemporaryFile() as said:
-        options = ["--serve-web", "--web-viewer-port", str(page), "--port", str(_free_port(VIEWER_PORT))]
+    with at_address as source, tempfile.TemporaryDirectory() as folder:
+        said = Path(folder) / "said"
+        options = ["--serve-web", "--web-viewer-port", str(page), "--port", str(_free_port())]
         with _running([*RERUN, source, *options], said) as server:
             latest = time.monotonic() + VIEWER_START_S
-            while not listens(page):
+            # Its own word, as something else may listen there.
+            while f"{origin} " not in (text := said.read_text("utf-8", "replace")):
                 if server.poll() is not None or time.monotonic() > latest:
-                    said.seek(0)
-                    lines = said.read().decode(errors="replace").strip().splitlines()
-                    told = lines[-1] if lines else "it ended"
+                    told = (text.strip().splitlines() or ["it ended"])[-1]
                     raise OutputError(f"the web viewer cannot be started: {told}")
                 time.sleep(0.1)
             yield f"{origin}/?url={quote(source, safe='')}", server
@@ -215,9 +229,14 @@ class _OneFile(BaseHTTPRequestHandler):
 
 
 @contextmanager
-def _running(command: Sequence[str], said: IO[bytes] | None = None) -> Iterator[subprocess.Popen[bytes]]:
-    """Run a command until the end of the block, then end it with all that it started."""
-    process = subprocess.Popen(command, stdout=said, stderr=said, start_new_session=True)
+def _running(command: Sequence[str], said: Path | None = None) -> Iterator[subprocess.Popen[bytes]]:
+    """Run a command until the end of the block, then end it with all that it started.
+
+    What it says goes to the file `said`, if given, and it says where it listens, whatever RUST_LOG is.
+    """
+    with said.open("wb") if said else nullcontext() as file:
+        env = {**os.environ, "RUST_LOG": "info"} if said else None
+        process = subprocess.Popen(command, stdout=file, stderr=file, env=env, start_new_session=True)
     try:
         yield process
     finally:
@@ -235,9 +254,9 @@ def end(process: subprocess.Popen[bytes]) -> None:
     process.wait()
 
 
-def _free_port(wished: int) -> int:
+def _free_port(wished: int = 0) -> int:
     """Return the port if nothing listens there, else a free one."""
-    if not listens(wished):
+    if wished and not listens(wished):
         return wished
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))

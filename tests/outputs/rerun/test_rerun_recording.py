@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import threading
+import urllib.request
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
+from http import HTTPStatus
 from pathlib import Path
 
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from commands import wait_for
+import rerun as rr
+from commands import WAIT_S, wait_for
 from looking import free_port, needs_vulkan
 from saved_maps import save_run
 
@@ -266,3 +271,24 @@ def test_a_run_opens_on_its_last_map_and_plays_in_some_seconds():
         assert panel.timeline == "coverage_percent"
         assert (100 - first) / panel.fps <= PLAY_S
     assert (100 - 28) / make_blueprint(np.zeros(2), np.ones(2), first_percent=28).time_panel.fps == PLAY_S
+
+
+def test_pages_that_are_served_at_the_same_time_have_ports_of_their_own(tmp_path):
+    """Each finds the usual port free, and only one of them gets it."""
+    from rose2_logs.outputs.rerun import viewer
+
+    recording = tmp_path / "empty.rrd"
+    with rr.RecordingStream("test") as stream:
+        stream.save(recording)
+    all_serve = threading.Barrier(3)
+
+    def serve(_: int) -> str:
+        with viewer.served_page(str(recording)) as (url, server):
+            all_serve.wait(timeout=WAIT_S)
+            assert server.poll() is None
+            assert urllib.request.urlopen(url).status == HTTPStatus.OK
+            all_serve.wait(timeout=WAIT_S)
+            return url.partition("?")[0]
+
+    with ThreadPoolExecutor(3) as pool:
+        assert len(set(pool.map(serve, range(3)))) == 3
