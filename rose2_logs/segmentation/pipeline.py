@@ -38,6 +38,7 @@ from rose2_logs.segmentation.rose.stage import CleanMap, StructureResult, find_s
 from rose2_logs.segmentation.topology.splitting import split_rooms
 from rose2_logs.segmentation.topology.voronoi import voronoi_lines
 from rose2_logs.segmentation.walls.stage import WallCounter, WallResult, find_walls
+from rose2_logs.segmentation.walls.strips import WallCells
 
 Analysis = TypeVar("Analysis", bound=SnapshotAnalysis)
 
@@ -144,13 +145,14 @@ def _analyze_by_rose2(
     # A: dominant directions and clean map
     scored = find_structure(occupied, cell_m, parameters.spectrum)
     directions = scored.directions_rad
-    count_walls = WallCounter(directions, cell_m, parameters.walls)
+    supported = WallCells(scored.supported, directions, cell_m)
+    count_walls = WallCounter(supported, parameters.walls)
     clean = make_clean_map(scored, explored.free_area_m2, count_walls, parameters.spectrum)
     structure = _structure(scored, clean, explored)
     watch.lap("structure")
 
     # B: wall segments, wall clusters, representative lines
-    built = find_walls(scored.supported, clean.cells, clean.attached, directions, cell_m, parameters.walls)
+    built = find_walls(supported, clean.cells, clean.attached, parameters.walls)
     walls = built.walls
     watch.lap("walls")
 
@@ -159,12 +161,13 @@ def _analyze_by_rose2(
     by_borders = parameters.floor_plan.grouping == "fitted"
     tree = None
     if by_borders:
-        tree = _grow_tree(explored, scored, strongest, parameters, watch)
-        del scored, clean  # the rest needs their memory
+        tree = _grow_tree(explored, scored, supported, strongest, parameters, watch)
+        del scored, supported, count_walls, clean  # the rest needs their memory
         found = tree.rooms(parameters.regions.detail)
     else:
+        del supported, count_walls, clean  # the rest needs their memory
         found = _rooms_by_walls(explored, scored, built, strongest, parameters, watch)
-        del scored, clean
+        del scored
     watch.lap("rooms")
 
     graph = None
@@ -254,13 +257,14 @@ class RoomTree:
 def _grow_tree(
     explored: ExploredPart,
     scored: StructureResult,
+    supported: WallCells,
     strongest_rad: float,
     parameters: Parameters,
     watch: _StopWatch,
 ) -> RoomTree:
     """Cut the floor into atoms, by faces and by basins of the clearance, and judge their borders."""
     free, occupied, cell_m = explored.free, explored.occupied, explored.resolution_m
-    generous = generous_walls(scored, cell_m, parameters)
+    generous = generous_walls(scored, supported, parameters)
     plan = generous_floor_plan(generous, free, strongest_rad, cell_m, parameters)
     watch.lap("floor_plan")
     atoms = find_atoms(

@@ -26,6 +26,7 @@ from rose2_logs.segmentation.regions.strengths import FittedStrength
 from rose2_logs.segmentation.rose.clean_map import attached_cells
 from rose2_logs.segmentation.rose.stage import StructureResult
 from rose2_logs.segmentation.walls.stage import WallResult, find_walls
+from rose2_logs.segmentation.walls.strips import WallCells
 
 EVEN_ODDS = 0.0
 """Log odds of what is as likely one room as two."""
@@ -168,7 +169,7 @@ class RegionTree:
         return RegionsResult(labels, borders, outside_m2)
 
 
-def generous_walls(scored: StructureResult, resolution_m: float, parameters: Parameters) -> WallResult:
+def generous_walls(scored: StructureResult, supported: WallCells, parameters: Parameters) -> WallResult:
     """Walls of a clean map that keeps every wall, by one low threshold.
 
     Where faces are no rooms but what rooms are joined from, a wall too many does no harm: the threshold needs
@@ -178,9 +179,7 @@ def generous_walls(scored: StructureResult, resolution_m: float, parameters: Par
     clean = scored.supported & (scored.score >= least)
     candidates = scored.supported & (scored.score >= parameters.spectrum.attached_share * least)
     attached = attached_cells(clean, candidates)
-    return find_walls(
-        scored.supported, clean, attached, scored.directions_rad, resolution_m, parameters.walls
-    )
+    return find_walls(supported, clean, attached, parameters.walls)
 
 
 def generous_floor_plan(

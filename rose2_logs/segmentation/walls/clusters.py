@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,27 +42,12 @@ class WallClusters:
 
 
 def cluster_segments(segments: Segments, parameters: WallParameters) -> WallClusters:
-    """Join the segments of one direction that are close to each other by DBSCAN.
+    """Join the segments of one direction that are close to each other, see `group_segments`.
 
-    With min_samples of 1 no segment is noise, and the clusters of DBSCAN are the connected components of the
-    segments nearer than 1 to each other. SciPy finds these. Importing DBSCAN from scikit-learn would take a
-    second in every process, several times as long as a usual map.
-
-    Distance is lateral offset over `cluster_lateral_m` or gap along the wall over `cluster_gap_m`, the larger
-    of the two. Each cluster is at the median offset of its segments, weighted
-    by their length.
+    Each cluster is at the median offset of its segments, weighted by their length.
     """
     direction, offset, start, end = segments.direction, segments.offset, segments.start, segments.end
-    of_segment = np.full(len(offset), -1, np.int32)
-    count = 0
-    for index in range(len(segments.directions_rad)):
-        chosen = np.flatnonzero(direction == index)
-        if len(chosen):
-            pair = _near_intervals(offset[chosen], start[chosen], end[chosen], parameters)
-            near = coo_matrix((np.ones(len(pair[0]), bool), pair), shape=(len(chosen), len(chosen)))
-            more, labels = connected_components(near, directed=False)
-            of_segment[chosen] = count + labels
-            count += more
+    count, of_segment = group_segments(segments, parameters)
     length = np.maximum(end - start, 1e-9)
     first = np.full(count, np.inf)
     last = np.full(count, -np.inf)
@@ -79,17 +65,44 @@ def cluster_segments(segments: Segments, parameters: WallParameters) -> WallClus
     )
 
 
+def group_segments(segments: Segments, parameters: WallParameters) -> tuple[int, NDArray[np.int32]]:
+    """Number the clusters of segments of one direction that are close to each other, as DBSCAN finds them.
+
+    With min_samples of 1 no segment is noise, and the clusters of DBSCAN are the connected components of the
+    segments nearer than 1 to each other. SciPy finds these. Importing DBSCAN from scikit-learn would take a
+    second in every process, several times as long as a usual map.
+
+    Distance is lateral offset over `cluster_lateral_m` or gap along the wall over `cluster_gap_m`, the larger
+    of the two.
+
+    Returns
+    -------
+    count : int
+        Number of clusters.
+    of_segment : (N,) int32
+        Cluster of each segment, by their first segments.
+    """
+    count = len(segments.offset)
+    one, other = _near_intervals(segments, parameters)
+    near = coo_matrix((np.ones(len(one), bool), (one, other)), shape=(count, count))
+    clusters, of_segment = connected_components(near, directed=False)
+    return int(clusters), of_segment
+
+
 def _near_intervals(
-    offset: FloatArray, start: FloatArray, end: FloatArray, parameters: WallParameters
+    segments: Segments, parameters: WallParameters
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Pairs of intervals that are close enough both across and along, found among those sorted by offset."""
-    order = np.argsort(offset, kind="stable")
-    sorted_offset = offset[order]
-    here = np.arange(len(offset))
-    count = (
-        np.searchsorted(sorted_offset, sorted_offset + parameters.cluster_lateral_m, side="right") - here - 1
-    )
-    first = np.repeat(here, count)
+    """Pairs of segments of one direction that are close enough both across and along."""
+    start, end, direction = segments.start, segments.end, segments.direction
+    order = np.lexsort((segments.offset, direction))
+    offset = segments.offset[order]
+    count = np.empty(len(order), np.intp)
+    bounds = np.searchsorted(direction[order], np.arange(len(segments.directions_rad) + 1))
+    for low, high in itertools.pairwise(bounds.tolist()):
+        own = offset[low:high]
+        reach = np.searchsorted(own, own + parameters.cluster_lateral_m, side="right")
+        count[low:high] = reach - np.arange(1, len(own) + 1)
+    first = np.repeat(np.arange(len(order)), count)
     second = first + 1 + np.arange(len(first)) - np.repeat(np.cumsum(count) - count, count)
     one, other = order[first], order[second]
     gap = np.maximum(start[one], start[other]) - np.minimum(end[one], end[other])

@@ -7,7 +7,6 @@ transform is read at these directions only, and every straight run of cells is f
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import cv2
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 
 from rose2_logs.config.parameters import WallParameters
 from rose2_logs.model.occupancy import BoolArray, FloatArray
+from rose2_logs.segmentation.walls.strips import WallCells
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,25 +55,19 @@ def line_ends(angle_rad: FloatArray, offset: FloatArray, start: FloatArray, end:
 
 
 def detect_segments(
-    clean: BoolArray,
-    directions_rad: FloatArray,
-    resolution_m: float,
-    min_length_m: float,
-    parameters: WallParameters,
+    among: WallCells, clean: BoolArray, min_length_m: float, parameters: WallParameters
 ) -> tuple[Segments, BoolArray]:
     """Find the straight runs of cells along some directions.
 
     A cell belongs to the direction of the longest run through it, so that the cells of a thick wall make no
-    segments across it.
+    segments across it. Where two directions fit alike, the earlier one wins.
 
     Parameters
     ----------
+    among : WallCells
+        Cells that those of walls are chosen from, and the directions, from 0 to pi.
     clean : (H, W) bool
         Cells of walls.
-    directions_rad : (D,) float
-        From 0 to pi; where two fit alike, the earlier one wins.
-    resolution_m : float
-        Side of a cell.
     min_length_m : float
         Shortest segment.
     parameters : WallParameters
@@ -82,97 +76,36 @@ def detect_segments(
     Returns
     -------
     segments : Segments
-        Along `directions_rad`, by direction, offset and place.
+        By direction, offset and place.
     members : (H, W) bool
         The cells on segments.
     """
-    cell = np.flatnonzero(clean)
-    points = np.column_stack(np.divmod(cell, clean.shape[1])[::-1]).astype(float)
-    points *= resolution_m
-    points += resolution_m / 2
+    chosen = clean.ravel()[among.index]
+    count = len(chosen)
+    longest, best = np.zeros(count), np.zeros(count, np.int32)
+    for part, cells in among.sorted_parts():
+        directions = range(len(among.directions_rad))[part]
+        reached = np.zeros(len(directions) * count)
+        every = np.broadcast_to(chosen, (len(directions), count))
+        for runs in cells.runs(every, parameters):
+            length = np.where(runs.covered, runs.end - runs.start, 0.0)[runs.of_cell]
+            reached[runs.slot] = np.maximum(reached[runs.slot], length)
+        for number, reach in zip(directions, reached.reshape(len(directions), count), strict=True):
+            better = reach > longest + among.resolution_m / 2
+            best[better], longest[better] = number, reach[better]
+    chosen &= longest >= min_length_m
     members = np.zeros(clean.shape, bool)
-    longest = np.zeros(len(points))
-    best = np.zeros(len(points), np.int32)
-    for number, angle in enumerate(directions_rad.tolist()):
-        reached = np.zeros(len(points))
-        for runs in _straight_runs(points, angle, resolution_m, parameters):
-            length = np.where(runs.covered, runs.end - runs.start, 0.0)
-            reached[runs.point] = np.maximum(reached[runs.point], length[runs.run])
-        better = reached > longest + resolution_m / 2
-        best[better], longest[better] = number, reached[better]
-    segments = [np.zeros((0, 4))]
-    for number, angle in enumerate(directions_rad.tolist()):
-        own = np.flatnonzero((best == number) & (longest >= min_length_m))
-        rows = [np.zeros((0, 4))]
-        for runs in _straight_runs(points[own], angle, resolution_m, parameters):
+    rows = [np.zeros((0, 5))]
+    for part, cells in among.sorted_parts():
+        own = chosen & (best == np.arange(len(among.directions_rad))[part, None])
+        for runs in cells.runs(own, parameters):
             keep = runs.covered & (runs.end - runs.start >= min_length_m)
-            rows.append(np.column_stack([runs.strip, runs.offset, runs.start, runs.end])[keep])
-            on_run = own[runs.point[keep[runs.run]]]
-            members.ravel()[cell[on_run]] = True
-        of_strip = np.concatenate(rows)
-        of_strip = of_strip[np.lexsort((of_strip[:, 2], of_strip[:, 0]))]
-        of_strip[:, 0] = number
-        segments.append(of_strip)
-    direction, offset, start, end = np.concatenate(segments).T
-    return Segments(directions_rad, direction.astype(np.int32), offset, start, end), members
-
-
-@dataclass(frozen=True, eq=False)
-class _Runs:
-    """Runs of points in the strips along one direction: values (R,), lengths in meters.
-
-    `point` (P,) are the points' indices, run after run, and `run` (P,) the run of each.
-    """
-
-    strip: NDArray[np.intp]
-    offset: FloatArray
-    start: FloatArray
-    end: FloatArray
-    covered: BoolArray
-    point: NDArray[np.intp]
-    run: NDArray[np.intp]
-
-
-def _straight_runs(
-    points: FloatArray, angle: float, resolution_m: float, parameters: WallParameters
-) -> Iterator[_Runs]:
-    """Cut the points (P, 2), meters, sorted into strips along a direction, where the gaps are too long.
-
-    The strips are two cells wide. They come in two sets, the second of which lies a cell further across, so
-    that no wall falls between two strips; each point is once in each set.
-    """
-    if len(points) == 0:
-        return
-    c, s = np.cos(angle), np.sin(angle)
-    x, y = points.T
-    along, across = x * c + y * s, y * c - x * s
-    cell = np.floor(across / resolution_m).astype(np.int32)
-    by_place = np.argsort(along, kind="stable")
-    for shift in (0, 1):
-        strip = (cell + shift) // 2
-        # Small integers are sorted by radix.
-        rank = (strip - strip.min()).astype(np.uint16 if np.ptp(strip) < 2**16 else np.int32)
-        point = by_place[np.argsort(rank[by_place], kind="stable")]
-        position, strip = along[point], strip[point]
-        gap = position[1:] - position[:-1]
-        new = np.ones(len(point), bool)
-        new[1:] = (gap > parameters.segment_max_gap_m + resolution_m) | (strip[1:] != strip[:-1])
-        run = np.cumsum(new) - 1
-        first = np.flatnonzero(new)
-        last = np.append(first[1:], len(point)) - 1
-        cover = np.full(len(point), resolution_m)
-        np.minimum(np.abs(gap), parameters.segment_cover_cells * resolution_m, out=cover[1:], where=~new[1:])
-        covered = np.bincount(run, weights=cover)
-        start, end = position[first] - resolution_m / 2, position[last] + resolution_m / 2
-        yield _Runs(
-            2 * strip[first] - shift,
-            np.bincount(run, weights=across[point]) / (last - first + 1),
-            start,
-            end,
-            covered >= parameters.segment_min_fill * (end - start),
-            point,
-            run,
-        )
+            direction = runs.direction + part.start
+            rows.append(np.column_stack([direction, runs.strip, runs.offset, runs.start, runs.end])[keep])
+            members.ravel()[among.index[runs.slot[keep[runs.of_cell]] % count]] = True
+    found = np.concatenate(rows)
+    direction, _, offset, start, end = found[np.lexsort((found[:, 3], found[:, 1], found[:, 0]))].T
+    return Segments(among.directions_rad, direction.astype(np.int32), offset, start, end), members
 
 
 def long_pieces(

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rose2_logs.config.parameters import WallParameters
 from rose2_logs.model.occupancy import BoolArray, FloatArray
-from rose2_logs.segmentation.walls.clusters import cluster_segments
+from rose2_logs.segmentation.walls.clusters import cluster_segments, group_segments
 from rose2_logs.segmentation.walls.lines import RepresentativeLines, representative_lines
 from rose2_logs.segmentation.walls.segments import (
     detect_segments,
@@ -17,6 +17,7 @@ from rose2_logs.segmentation.walls.segments import (
     local_directions,
     long_pieces,
 )
+from rose2_logs.segmentation.walls.strips import WallCells
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,24 +49,25 @@ class WallResult:
 
 
 def find_walls(
-    occupied: BoolArray,
-    clean: BoolArray,
-    attached: BoolArray,
-    dominant_rad: FloatArray,
-    resolution_m: float,
-    parameters: WallParameters,
+    supported: WallCells, clean: BoolArray, attached: BoolArray, parameters: WallParameters
 ) -> WallResult:
-    """Segments, wall clusters and representative lines of a clean map (H, W) and what is attached to it."""
-    along, _ = detect_segments(clean, dominant_rad, resolution_m, parameters.segment_min_length_m, parameters)
+    """Segments, wall clusters and representative lines of a clean map and what is attached to it.
+
+    Parameters
+    ----------
+    supported : WallCells
+        Cells that may be walls, and the dominant directions.
+    clean, attached : (H, W) bool
+        The clean map, chosen from them, and with what is attached to it.
+    parameters : WallParameters
+    """
+    dominant_rad = supported.directions_rad
+    along, _ = detect_segments(supported, clean, parameters.segment_min_length_m, parameters)
     # Off the dominant directions, only its length distinguishes a wall from furniture.
     length_m = parameters.local_segment_min_length_m
-    local, local_walls = detect_segments(
-        long_pieces(occupied & ~clean, resolution_m, length_m, parameters),
-        local_directions(dominant_rad, parameters),
-        resolution_m,
-        length_m,
-        parameters,
-    )
+    rest = long_pieces(supported.cells & ~clean, supported.resolution_m, length_m, parameters)
+    others = WallCells(rest, local_directions(dominant_rad, parameters), supported.resolution_m)
+    local, local_walls = detect_segments(others, rest, length_m, parameters)
     segments = join_segments(along, local)
     clusters = cluster_segments(segments, parameters)
     lines = representative_lines(clusters, segments.directions_rad, len(dominant_rad), parameters)
@@ -85,21 +87,16 @@ class WallCounter:
 
     Attributes
     ----------
-    directions_rad : (D,) float
-        The dominant directions.
-    resolution_m : float
-        Side of a cell.
+    supported : WallCells
+        Cells that may be walls, and the dominant directions.
     parameters : WallParameters
     """
 
-    directions_rad: FloatArray
-    resolution_m: float
+    supported: WallCells
     parameters: WallParameters
 
     def __call__(self, clean: BoolArray) -> int:
         """Number of wall clusters along the dominant directions of a clean map (H, W)."""
         length_m = self.parameters.segment_min_length_m
-        segments, _ = detect_segments(
-            clean, self.directions_rad, self.resolution_m, length_m, self.parameters
-        )
-        return len(cluster_segments(segments, self.parameters).offset)
+        segments, _ = detect_segments(self.supported, clean, length_m, self.parameters)
+        return group_segments(segments, self.parameters)[0]

@@ -9,6 +9,7 @@ from rose2_logs.config.parameters import WallParameters
 from rose2_logs.segmentation.walls.clusters import cluster_segments, covered_length, weighted_median
 from rose2_logs.segmentation.walls.lines import representative_lines
 from rose2_logs.segmentation.walls.segments import Segments, detect_segments, local_directions
+from rose2_logs.segmentation.walls.strips import WallCells
 
 PARAMETERS = WallParameters()
 DIRECTIONS = np.array([0.0, np.pi / 2])
@@ -96,7 +97,7 @@ def drawn(*cells):
 
 
 def segments_of(clean, directions=DIRECTIONS, least=0.4):
-    return detect_segments(clean, directions, 0.05, least, PARAMETERS)
+    return detect_segments(WallCells(clean, directions, 0.05), clean, least, PARAMETERS)
 
 
 def test_segments_of_a_drawn_wall_cover_it():
