@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Generic, TypeVar
 
 import cv2
 import numpy as np
@@ -16,6 +16,8 @@ from rose2_logs.segmentation.floor_plan.faces import SNAP_M
 
 LINE_SEARCH_M = 4 * SNAP_M
 """Noding moves an edge off its line by less than this."""
+WALL, FREE = 1, 2
+"""Bits of the image that tells both."""
 Number = TypeVar("Number", bound=np.generic)
 
 
@@ -136,7 +138,9 @@ def _passages(
     vector = lines_m[run_line, 2:] - lines_m[run_line, :2]
     vector /= np.maximum(np.hypot(vector[:, 0], vector[:, 1]), 1e-12)[:, None]
     normal = np.column_stack([-vector[:, 1], vector[:, 0]])
-    distance = cv2.distanceTransform((~walls).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
+    distance = _Image(
+        cv2.distanceTransform((~walls).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5), resolution_m
+    )
     depth = np.minimum(length * parameters.passage_look_widths, parameters.passage_look_max_m)
     ahead = np.linspace(0, 1, parameters.passage_look_samples)
     looks = parameters.passage_look_points + 1
@@ -147,7 +151,7 @@ def _passages(
             at = (begins - first_of_line + part * (ends - begins)) * step_m[run_line]
             eye = lines_m[run_line, :2] + vector * at[:, None]
             points = eye[:, None] + sign * normal[:, None] * (depth[:, None] * ahead)[..., None]
-            met = _sample(distance, points.reshape(-1, 2), resolution_m).reshape(len(begins), -1)
+            met = distance.at(points[..., 0], points[..., 1])
             met = np.where(np.minimum.accumulate(met, axis=1) > 0, met, 0)
             np.maximum(widest, met.max(1), out=widest)
         sides.append(widest * resolution_m)
@@ -203,30 +207,48 @@ def _read_lines(
     position = np.arange(len(line)) - np.repeat(np.cumsum(count) - count, count)
     center = lines_m[line, :2] + vector[line] * ((position + 0.5) / count[line])[:, None]
     normal = (np.column_stack([-vector[:, 1], vector[:, 0]]) / np.maximum(length, 1e-12)[:, None])[line]
-    is_wall = np.zeros(len(line), bool)
+    # Both masks are looked up at once, one in each bit.
+    kinds = _Image(walls * np.uint8(WALL) | free * np.uint8(FREE), resolution_m)
+    (x, y), (across_x, across_y) = center.T.copy(), normal.T.copy()
+    met = np.zeros(len(line), np.uint8)
     reach = round(parameters.wall_tolerance_m / resolution_m)
     for step in range(-reach, reach + 1):
-        is_wall |= _sample(walls, center + normal * (step * resolution_m), resolution_m)
+        met |= kinds.at(x + across_x * (step * resolution_m), y + across_y * (step * resolution_m))
+    is_wall = (met & WALL) > 0
     is_blind = np.zeros(len(line), bool)
-    center_of_wall, normal_of_wall = center[is_wall], normal[is_wall]
+    wall_x, wall_y, across_x, across_y = (values[is_wall] for values in (x, y, across_x, across_y))
     steps = np.arange(1, round(parameters.blind_look_m / resolution_m) + 1) * resolution_m
     for side in (1, -1):
-        is_empty, is_through = np.ones((2, len(center_of_wall)), bool)
+        any_of, all_of = np.zeros(len(wall_x), np.uint8), np.full(len(wall_x), WALL | FREE, np.uint8)
         for at_m in side * steps:
-            points = center_of_wall + normal_of_wall * at_m
-            is_empty &= ~_sample(free, points, resolution_m)
-            is_through &= _sample(walls, points, resolution_m)
-        is_blind[is_wall] |= is_empty & ~is_through
-    return line, length / count, is_wall, is_blind, _sample(free, center, resolution_m)
+            found = kinds.at(wall_x + across_x * at_m, wall_y + across_y * at_m)
+            any_of |= found
+            all_of &= found
+        is_blind[is_wall] |= ((any_of & FREE) == 0) & ((all_of & WALL) == 0)
+    return line, length / count, is_wall, is_blind, (kinds.at(x, y) & FREE) > 0
 
 
-def _sample(mask: NDArray[Number], points_m: FloatArray, resolution_m: float) -> NDArray[Number]:
-    """Values of the cells that hold points; 0 outside the map."""
-    cells = np.floor(points_m / resolution_m).astype(np.intp)
-    inside = np.all((cells >= 0) & (cells < mask.shape[::-1]), axis=1)
-    values = np.zeros(len(cells), mask.dtype)
-    values[inside] = mask[cells[inside, 1], cells[inside, 0]]
-    return values
+class _Image(Generic[Number]):
+    """An image (H, W) that is read at points; 0 beside it."""
+
+    def __init__(self, image: NDArray[Number], resolution_m: float) -> None:
+        self._values = np.pad(image, 1).ravel()
+        self._rows, self._columns = image.shape
+        self._resolution_m = resolution_m
+
+    def at(self, x_m: FloatArray, y_m: FloatArray) -> NDArray[Number]:
+        """Values of the cells that hold points."""
+        index = self._padded(y_m, self._rows)
+        index *= self._columns + 2
+        index += self._padded(x_m, self._columns)
+        return self._values.take(index)
+
+    def _padded(self, place_m: FloatArray, count: int) -> NDArray[np.intp]:
+        """Number of the cell in the padded image; all that lies beside the image is in its margin."""
+        cell = place_m / self._resolution_m
+        np.floor(cell, out=cell)
+        cell += 1
+        return np.clip(cell, 0, count + 1, out=cell).astype(np.intp)
 
 
 def _place_edges(edges_m: FloatArray, lines_m: FloatArray) -> tuple[NDArray[np.intp], FloatArray, FloatArray]:

@@ -77,13 +77,17 @@ def rasterize(
     """Paint polygons into cells: (H, W) int32 with `values`, 0 where there is none."""
     image = np.zeros(shape, np.int32)
     scale = 1 << SUBCELL_BITS
-    for polygon, value in zip(polygons, values, strict=True):
-        for part in shapely.get_parts(polygon):
-            rings = [
-                np.rint((shapely.get_coordinates(ring) / resolution_m - 0.5) * scale).astype(np.int32)
-                for ring in shapely.get_rings(part)
-            ]
-            cv2.fillPoly(image, rings, int(value), shift=SUBCELL_BITS)
+    parts, polygon = shapely.get_parts(polygons, return_index=True)
+    rings, part = shapely.get_rings(parts, return_index=True)
+    points, ring = shapely.get_coordinates(rings, return_index=True)
+    corners = np.rint((points / resolution_m - 0.5) * scale).astype(np.int32)
+    ring_ends = np.searchsorted(ring, np.arange(len(rings)), side="right")
+    outlines = np.split(corners, ring_ends[:-1])
+    part_ends = np.searchsorted(part, np.arange(len(parts)), side="right").tolist()
+    begin = 0
+    for value, end in zip(values[polygon].tolist(), part_ends, strict=True):
+        cv2.fillPoly(image, outlines[begin:end], value, shift=SUBCELL_BITS)
+        begin = end
     return image
 
 
