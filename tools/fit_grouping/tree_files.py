@@ -30,16 +30,14 @@ def trees_of(model: Any, columns: NDArray[np.intp]) -> BoostedTrees:
     left = np.tile(np.arange(size), (len(trees), 1))
     right = left.copy()
     value = np.zeros((len(trees), size))
-    depth = 0
     for k, nodes in enumerate(trees):
         inner = np.flatnonzero(nodes["is_leaf"] == 0)
         feature[k, inner] = columns[nodes["feature_idx"][inner]]
         threshold[k, inner] = nodes["num_threshold"][inner]
         left[k, inner], right[k, inner] = nodes["left"][inner], nodes["right"][inner]
         value[k, : len(nodes)] = np.where(nodes["is_leaf"] == 1, nodes["value"], 0.0)
-        depth = max(depth, int(nodes["depth"].max()))
     start = float(np.ravel(model._baseline_prediction)[0])
-    return BoostedTrees(feature, threshold, left, right, value, start, depth)
+    return BoostedTrees(feature, threshold, left, right, value, start)
 
 
 def write_trees(path: Path, trees: BoostedTrees, names: tuple[str, ...] = FEATURES) -> None:

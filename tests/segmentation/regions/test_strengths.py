@@ -19,7 +19,6 @@ def hand_made():
         right=np.array([[2, 1, 4, 3, 4], [0, 1, 2, 3, 4]]),
         value=np.array([[0.0, -1.0, 0.0, 2.0, 3.0], [0.5, 0, 0, 0, 0]]),
         start=10.0,
-        depth=2,
     )
 
 
@@ -38,7 +37,7 @@ def test_trees_of_other_features_are_refused(tmp_path):
     trees = hand_made()
     path = tmp_path / "trees.npz"
     arrays = {name: getattr(trees, name) for name in ("feature", "threshold", "left", "right", "value")}
-    np.savez(path, names=np.array(NAMES), start=trees.start, depth=trees.depth, **arrays)
+    np.savez(path, names=np.array(NAMES), start=trees.start, **arrays)
     asked = np.random.default_rng(0).uniform(0, 3, (50, 2))
     assert np.array_equal(read_trees(path, NAMES)(asked), trees(asked))
     with pytest.raises(ValueError, match="fitted on other features"):
