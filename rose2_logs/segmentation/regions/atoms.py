@@ -10,9 +10,9 @@ from skimage.measure import label
 from skimage.segmentation import watershed
 
 from rose2_logs.config.regions import RegionParameters
-from rose2_logs.model.labels import contacts
+from rose2_logs.model.labels import contacts, label_sizes
 from rose2_logs.model.occupancy import BoolArray
-from rose2_logs.segmentation.regions.plan_frame import Labels, PlanFrame, grown_labels, without_specks
+from rose2_logs.segmentation.regions.plan_frame import Labels, PlanFrame, grown_labels
 
 BASIN_REACH_M = 0.2
 """Cells of the map that no basin of the plan frame covers belong to one this near: two plan cells."""
@@ -24,8 +24,9 @@ ABSORBING_ROUNDS = 4
 
 def cut_atoms(
     free: BoolArray,
-    occupied: BoolArray,
     faces: Labels,
+    solid: BoolArray,
+    open_cells: BoolArray,
     frame: PlanFrame,
     resolution_m: float,
     parameters: RegionParameters,
@@ -34,9 +35,11 @@ def cut_atoms(
 
     Parameters
     ----------
-    free, occupied : (H, W) bool
+    free : (H, W) bool
     faces : (H, W) int32
         Face of each cell.
+    solid, open_cells : (P, Q) bool
+        Plan cells that hold walls, and those that hold free cells.
     frame : PlanFrame
         Frame on which the basins are found, so that they turn with the map.
     resolution_m : float
@@ -47,11 +50,8 @@ def cut_atoms(
     atoms : (H, W) int32
         1.. on the free cells, 0 elsewhere and on loose cells.
     """
-    walls = without_specks(occupied, parameters.speck_max_m / resolution_m)
-    solid, open_cells = frame.shares(walls, free) > 0
-    open_cells &= ~solid
     basins = grown_labels(
-        clearance_basins(open_cells, solid, frame.cell_m, parameters), BASIN_REACH_M / frame.cell_m
+        clearance_basins(open_cells & ~solid, solid, frame.cell_m, parameters), BASIN_REACH_M / frame.cell_m
     )
     basin = frame.back(basins, (free.shape[0], free.shape[1]))
     key = np.where(free, faces.astype(np.int64) * (int(basin.max(initial=0)) + 1) + basin + 1, 0)
@@ -78,34 +78,39 @@ def clearance_basins(
 
 def absorb_small(pieces: Labels, min_cells: float) -> Labels:
     """Give pieces under `min_cells` to the larger neighbor with the longest contact; loose ones get 0."""
+    count = int(pieces.max(initial=0)) + 1
+    size = label_sizes(pieces, count - 1)
+    loose = size < min_cells
+    loose[0] = False
+    # Pieces only grow: what takes part later touches a small piece now.
+    meet = contacts(pieces)
+    meet = meet.chosen((meet.low > 0) & (loose[meet.low] | loose[meet.high]))
+    one, other, contact = meet.low.astype(np.int64), meet.high.astype(np.int64), np.ones(len(meet.low), int)
+    piece = np.arange(count)
     for _ in range(ABSORBING_ROUNDS):
-        count = int(pieces.max(initial=0)) + 1
-        size = np.bincount(pieces.ravel(), minlength=count)
         small = size < min_cells
         small[0] = False
-        if not small.any():
-            break
-        meet = contacts(pieces)
-        meet = meet.chosen(meet.low > 0)
-        one, other = meet.low.astype(np.int64), meet.high.astype(np.int64)
-        key, contact = np.unique(
-            np.concatenate([one * count + other, other * count + one]), return_counts=True
+        apart = one != other
+        key, index = np.unique(
+            np.concatenate([(one * count + other)[apart], (other * count + one)[apart]]), return_inverse=True
         )
+        contact = np.bincount(index, np.tile(contact[apart], 2), minlength=len(key)).astype(np.int64)
         one, other = np.divmod(key, count)
         # Towards the larger, and the higher number at equal size, so that nothing goes round in a circle.
         up = small[one] & ((size[other] > size[one]) | ((size[other] == size[one]) & (other > one)))
-        one, other, contact = one[up], other[up], contact[up]
-        order = np.lexsort((size[other], contact))
+        order = np.flatnonzero(up)[np.lexsort((size[other[up]], contact[up]))]
         target = np.arange(count)
         target[one[order]] = other[order]
-        if np.array_equal(target, np.arange(count)):
+        if len(order) == 0:
             break
         while not np.array_equal(above := target[target], target):
             target = above
-        pieces = target[pieces].astype(np.int32)
-    size = np.bincount(pieces.ravel())
+        piece = target[piece]
+        size = np.bincount(target, size, minlength=count).astype(np.int64)
+        once = one < other
+        one, other, contact = target[one[once]], target[other[once]], contact[once]
     size[0] = 0
-    kept = np.flatnonzero(size >= min_cells)
-    renumbered = np.zeros(len(size), np.int32)
-    renumbered[kept] = np.arange(1, len(kept) + 1)
-    return renumbered[pieces]
+    kept = size >= min_cells
+    kept[0] = False
+    number = np.where(kept, np.cumsum(kept), 0).astype(np.int32)
+    return number[piece][pieces]

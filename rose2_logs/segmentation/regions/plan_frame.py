@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -16,6 +17,10 @@ Number = TypeVar("Number", bound=np.integer)
 
 PLAN_CELL_M = 0.1
 """Side of a plan cell, meters. The network and the trees were fitted on cells of this size."""
+POINTS_PER_SIDE = 3
+"""A plan cell is looked at in this many points squared, so that walls of one map cell are met."""
+COUNT_BITS = 4
+"""Bits that hold the number of these points."""
 POSITION_BITS = 16
 POSITION_STEPS = 2**POSITION_BITS
 """Positions on a map are told in this many steps per cell, far less than a map is good for."""
@@ -85,26 +90,21 @@ class PlanFrame:
         """Value of the map's cell below the center of each plan cell, 0 beside the map."""
         return _looked_up(image, self.to_map, self.shape)
 
-    def share(self, mask: BoolArray, per_side: int = 3) -> NDArray[np.float32]:
-        """Share of each plan cell that a mask of the map covers, of `per_side` squared points."""
-        (share,) = self.shares(mask, per_side=per_side)
-        return np.asarray(share, np.float32)
-
-    def shares(self, *masks: BoolArray, per_side: int = 3) -> NDArray[np.float32]:
-        """Share (M, P, Q) of each plan cell that each of some masks of the map covers, see `share`."""
+    def counts(self, *masks: BoolArray) -> NDArray[np.uint8]:
+        """How many of the `POINTS_PER_SIDE` squared points of each plan cell each mask covers: (M, P, Q)."""
         rows, columns = self.shape
-        linear = self.to_map[:, :2] / per_side
-        offset = self.to_map[:, 2] + self.to_map[:, :2] @ np.full(2, (1 / per_side - 1) / 2)
-        # All masks are looked up at once, one in each bit.
-        packed = np.zeros(masks[0].shape, np.uint8)
-        for bit, mask in enumerate(masks):
-            packed |= mask.astype(np.uint8) << bit
-        fine = _looked_up(packed, np.column_stack([linear, offset]), (rows * per_side, columns * per_side))
-        shares = np.empty((len(masks), rows, columns), np.float32)
-        for bit in range(len(masks)):
-            covered = (fine >> bit & 1).astype(np.float32)
-            cv2.resize(covered, (columns, rows), dst=shares[bit], interpolation=cv2.INTER_AREA)
-        return shares
+        linear = self.to_map[:, :2] / POINTS_PER_SIDE
+        offset = self.to_map[:, 2] + self.to_map[:, :2] @ np.full(2, (1 / POINTS_PER_SIDE - 1) / 2)
+        # All masks are looked up and counted at once, each in some bits of its own.
+        packed = np.zeros(masks[0].shape, np.min_scalar_type(2 ** (COUNT_BITS * len(masks)) - 1))
+        for number, mask in enumerate(masks):
+            packed |= mask.astype(packed.dtype) << packed.dtype.type(COUNT_BITS * number)
+        fine_shape = rows * POINTS_PER_SIDE, columns * POINTS_PER_SIDE
+        fine = _looked_up(packed, np.column_stack([linear, offset]), fine_shape)
+        of_rows = functools.reduce(np.add, (fine[k::POINTS_PER_SIDE] for k in range(POINTS_PER_SIDE)))
+        total = functools.reduce(np.add, (of_rows[:, k::POINTS_PER_SIDE] for k in range(POINTS_PER_SIDE)))
+        places = (total >> total.dtype.type(COUNT_BITS * number) for number in range(len(masks)))
+        return np.stack([(place & (2**COUNT_BITS - 1)).astype(np.uint8) for place in places])
 
     def back(self, image: Labels, shape: tuple[int, int]) -> Labels:
         """Plan labels at the cells of the map (H, W), 0 beside the plan frame."""

@@ -10,12 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rose2_logs.model.occupancy import BoolArray
-from rose2_logs.segmentation.regions.plan_frame import PlanFrame
+from rose2_logs.segmentation.regions.plan_frame import POINTS_PER_SIDE, PlanFrame
 
 FloatImage = NDArray[np.float32]
 
-POINTS_PER_SIDE = 3
-"""A plan cell is looked at in this many points squared, so that walls of one map cell are met."""
 SHARE_STEPS = POINTS_PER_SIDE**2
 OFFSETS = ((0, 2), (2, 0), (0, 6), (6, 0), (0, 14), (14, 0))
 """Pairs of cells that the network is asked about, rows and columns apart: 0.2, 0.6 and 1.4 m."""
@@ -43,11 +41,7 @@ class PlanRaster:
     @classmethod
     def of(cls, free: BoolArray, occupied: BoolArray, frame: PlanFrame) -> PlanRaster:
         """Sample the masks (H, W) of a map."""
-        return cls(*(_steps(share) for share in frame.shares(occupied, free, per_side=POINTS_PER_SIDE)))
-
-
-def _steps(share: FloatImage) -> NDArray[np.uint8]:
-    return np.rint(share * SHARE_STEPS).astype(np.uint8)
+        return cls(*frame.counts(occupied, free))
 
 
 def shares_of(steps: NDArray[np.integer[Any]]) -> FloatImage:

@@ -20,7 +20,7 @@ from rose2_logs.segmentation.regions.graph import STRONG_SCORE, RegionGraph, bui
 from rose2_logs.segmentation.regions.joining import Joins, Strength, join_regions
 from rose2_logs.segmentation.regions.outside import edge_shares, leftovers_joined, outside_of, room_numbers
 from rose2_logs.segmentation.regions.own_rooms import small_region_joins
-from rose2_logs.segmentation.regions.plan_frame import Labels, PlanFrame, grown_labels
+from rose2_logs.segmentation.regions.plan_frame import Labels, PlanFrame, grown_labels, without_specks
 from rose2_logs.segmentation.regions.plan_raster import PlanRaster
 from rose2_logs.segmentation.regions.strengths import FittedStrength
 from rose2_logs.segmentation.rose.clean_map import attached_cells
@@ -201,15 +201,17 @@ def find_atoms(
 ) -> Atoms:
     """Cut a map (H, W) into atoms, and look at it along its strongest direction."""
     frame = PlanFrame.of(free | occupied, direction_rad, resolution_m)
-    cells = cut_atoms(free, occupied, faces, frame, resolution_m, parameters)
+    walls = without_specks(occupied, parameters.speck_max_m / resolution_m)
+    solid, wall, open_cells, strong = frame.counts(walls, occupied, free, score >= STRONG_SCORE)
+    cells = cut_atoms(free, faces, solid > 0, open_cells > 0, frame, resolution_m, parameters)
     return Atoms(
         int(cells.max(initial=0)),
         cells,
         frame,
-        PlanRaster.of(free, occupied, frame),
+        PlanRaster(wall, open_cells),
         frame.sampled(cells),
         frame.sampled(faces),
-        frame.share(score >= STRONG_SCORE) > 0,
+        strong > 0,
     )
 
 

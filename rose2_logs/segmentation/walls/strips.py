@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,13 +43,13 @@ class Runs:
     start: FloatArray
     end: FloatArray
     covered: BoolArray
-    _across: FloatArray
+    _across: Callable[[], FloatArray]
 
     @cached_property
     def offset(self) -> FloatArray:
         """Mean place (R,) across the direction."""
         count = np.bincount(self.of_cell, minlength=len(self.start))
-        mean: FloatArray = np.bincount(self.of_cell, self._across, minlength=len(self.start)) / count
+        mean: FloatArray = np.bincount(self.of_cell, self._across(), minlength=len(self.start)) / count
         return mean
 
 
@@ -113,21 +113,22 @@ class SortedCells:
     def runs(self, chosen: BoolArray, parameters: WallParameters) -> Iterator[Runs]:
         """Cut the chosen (D, P) of the cells, set by set, where the gaps along a strip are too long."""
         flat = chosen.ravel()
+        every = bool(flat.all())
         cell_m = self.resolution_m
         for shift, all_slots in enumerate(self.slot):
-            place = np.flatnonzero(flat[all_slots])
-            if len(place) == 0:
-                continue
+            place = slice(None) if every else np.flatnonzero(flat.take(all_slots))
             position, key = self.along[shift][place], self.key[shift][place]
+            if len(position) == 0:
+                continue
             gap = position[1:] - position[:-1]
-            new = np.ones(len(place), bool)
+            new = np.ones(len(position), bool)
             np.greater(gap, parameters.segment_max_gap_m + cell_m, out=new[1:])
             new[1:] |= key[1:] != key[:-1]
             run = np.cumsum(new)
             run -= 1
             first = np.flatnonzero(new)
-            last = np.append(first[1:], len(place)) - 1
-            cover = np.full(len(place), cell_m)
+            last = np.append(first[1:], len(position)) - 1
+            cover = np.full(len(position), cell_m)
             most = parameters.segment_cover_cells * cell_m
             np.minimum(np.abs(gap, out=gap), most, out=cover[1:], where=~new[1:])
             start, end = position[first] - cell_m / 2, position[last] + cell_m / 2
@@ -141,7 +142,7 @@ class SortedCells:
                 start,
                 end,
                 np.bincount(run, weights=cover) >= parameters.segment_min_fill * (end - start),
-                self.across[shift][place],
+                partial(self.across[shift].__getitem__, place),
             )
 
 

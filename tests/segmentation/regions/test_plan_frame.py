@@ -3,7 +3,12 @@
 import numpy as np
 import pytest
 
-from rose2_logs.segmentation.regions.plan_frame import PlanFrame, grown_labels, without_specks
+from rose2_logs.segmentation.regions.plan_frame import (
+    POINTS_PER_SIDE,
+    PlanFrame,
+    grown_labels,
+    without_specks,
+)
 
 
 @pytest.fixture(scope="module")
@@ -17,8 +22,10 @@ def box():
 @pytest.mark.parametrize("resolution_m", [0.02, 0.05, 0.1])
 def test_areas_stay_and_labels_come_back(box, angle, resolution_m):
     frame = PlanFrame.of(box, angle, resolution_m)
-    share = frame.share(box)
-    assert share.sum() * frame.cell_m**2 == pytest.approx(box.sum() * resolution_m**2, rel=0.01)
+    (count,) = frame.counts(box)
+    assert count.sum() * (frame.cell_m / POINTS_PER_SIDE) ** 2 == pytest.approx(
+        box.sum() * resolution_m**2, rel=0.01
+    )
     back = frame.back(frame.sampled(box.astype(np.int32) * 7), box.shape)
     # Cells of the map that are cut at the sides of plan cells.
     assert np.mean((back == 7) == box) > 1 - 0.03 * 0.05 / resolution_m
@@ -35,8 +42,10 @@ def test_the_frame_lies_along_the_direction():
 
 def test_several_masks_are_looked_at_at_once(box):
     frame = PlanFrame.of(box, 0.3, 0.05)
-    both = frame.shares(box, ~box)
-    assert np.array_equal(both, np.stack([frame.share(box), frame.share(~box)]))
+    masks = box, ~box, box & False, box | True, np.roll(box, 5)
+    counts = frame.counts(*masks)
+    assert counts[3].max() == POINTS_PER_SIDE**2
+    assert np.array_equal(counts, np.concatenate([frame.counts(mask) for mask in masks]))
 
 
 def test_numbers_of_labels_are_exact_beyond_what_32_bit_floats_hold():
@@ -57,7 +66,7 @@ def test_a_map_of_which_nothing_is_known_has_a_frame_of_one_cell():
     nothing = np.zeros((7, 9), bool)
     frame = PlanFrame.of(nothing, 0.3, 0.05)
     assert frame.shape == (1, 1)
-    assert frame.share(nothing).tolist() == [[0.0]]
+    assert frame.counts(nothing).tolist() == [[[0]]]
 
 
 def test_labels_grow_up_to_their_reach():

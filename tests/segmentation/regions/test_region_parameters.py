@@ -8,11 +8,10 @@ from drawn_floors import draw_floor
 
 from rose2_logs.config.parameters import Parameters
 from rose2_logs.config.regions import RegionParameters
-from rose2_logs.segmentation.regions.atoms import clearance_basins, cut_atoms
+from rose2_logs.segmentation.regions.atoms import clearance_basins
 from rose2_logs.segmentation.regions.features import FEATURES, REGION_FEATURES
 from rose2_logs.segmentation.regions.outside import surroundings
-from rose2_logs.segmentation.regions.plan_frame import PlanFrame
-from rose2_logs.segmentation.regions.stage import generous_walls, room_labels
+from rose2_logs.segmentation.regions.stage import find_atoms, generous_walls, room_labels
 from rose2_logs.segmentation.regions.strengths import BoostedTrees, FittedStrength
 from rose2_logs.segmentation.rose.stage import find_structure
 from rose2_logs.segmentation.walls.strips import WallCells
@@ -60,10 +59,9 @@ def atoms_around_a_post(post_cells, speck_max_m):
     middle = np.array(floor.cells.shape) // 2
     floor.cells[middle[0] : middle[0] + post_cells, middle[1] : middle[1] + post_cells] = 100
     free, occupied = floor.cells == 0, floor.cells > 0
-    frame = PlanFrame.of(free | occupied, 0.0, floor.resolution_m)
-    faces = np.ones(free.shape, np.int32)
+    score, faces = np.zeros(free.shape, np.float32), np.ones(free.shape, np.int32)
     parameters = replace(PARAMETERS, speck_max_m=speck_max_m)
-    return int(cut_atoms(free, occupied, faces, frame, floor.resolution_m, parameters).max())
+    return find_atoms(free, occupied, score, faces, 0.0, floor.resolution_m, parameters).count
 
 
 def test_a_post_as_short_as_a_speck_bounds_no_basin():
