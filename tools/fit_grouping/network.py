@@ -53,7 +53,10 @@ class RoomNetwork(nn.Module):  # type: ignore[misc]
 
     def blocks(self, inputs: Tensor) -> Tensor:
         """Log odds (B, BLOCK^2 OUTPUTS, H / BLOCK, W / BLOCK), the cells of a block one after the other."""
-        x = self.stem(inputs)
+        return self.after_stem(self.stem(inputs))
+
+    def after_stem(self, x: Tensor) -> Tensor:
+        """All that follows on the stem."""
         levels = []
         for i, block in enumerate(self.down):
             x = block(x if i == 0 else nn.functional.max_pool2d(x, 2))
@@ -65,26 +68,37 @@ class RoomNetwork(nn.Module):  # type: ignore[misc]
         return out
 
 
-class _Answers(nn.Module):  # type: ignore[misc]
-    """Probabilities of a network, as blocks of 2 x 2 cells: as the package reads them."""
+class _OnBlocks(nn.Module):  # type: ignore[misc]
+    """A network whose inputs, too, are blocks of 2 x 2 cells: its stem is a fast convolution of 3 x 3."""
 
     def __init__(self, network: RoomNetwork) -> None:
         super().__init__()
         self.network = network
+        convolution, *rest = network.stem
+        out, channels, rows, columns = convolution.weight.shape
+        weight = convolution.weight.detach()
+        weight = weight.reshape(out, channels, rows // BLOCK, BLOCK, columns // BLOCK, BLOCK)
+        weight = weight.permute(0, 1, 3, 5, 2, 4).reshape(
+            out, channels * BLOCK**2, rows // BLOCK, columns // BLOCK
+        )
+        on_blocks = nn.Conv2d(channels * BLOCK**2, out, rows // BLOCK, padding=1, bias=False)
+        on_blocks.weight = nn.Parameter(weight)
+        self.stem = nn.Sequential(on_blocks, *rest)
 
     def forward(self, inputs: Tensor) -> Tensor:
-        return torch.sigmoid(self.network.blocks(inputs))
+        out: Tensor = self.network.after_stem(self.stem(inputs))
+        return out
 
 
 def export_onnx(network: RoomNetwork, path: Path) -> None:
-    """Write a network as an ONNX file that gives its probabilities, at any size.
+    """Write a network as an ONNX file that takes and gives blocks of cells, at any size.
 
     Norms are folded in, and weights are kept in 16 bits, which OpenCV reads as 32.
     """
     axes = {"map": {2: "rows", 3: "columns"}, "answers": {2: "rows", 3: "columns"}}
     torch.onnx.export(
-        _Answers(network).eval(),
-        (torch.zeros(1, INPUTS, 256, 256),),
+        _OnBlocks(network).eval(),
+        (torch.zeros(1, INPUTS * BLOCK**2, 128, 128),),
         str(path),
         input_names=["map"],
         output_names=["answers"],

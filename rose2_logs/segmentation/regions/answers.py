@@ -22,9 +22,11 @@ from rose2_logs.segmentation.regions.plan_raster import (
 STRIDE = 32
 """Inputs are padded to a multiple of this many cells, the coarsest step of the network."""
 BLOCK = 2
-"""The network answers for blocks of this many cells squared, one channel for each cell of a block."""
+"""The network sees and answers for blocks of this many cells squared, a channel for each cell of a block."""
 ANSWER_STEPS = 1000
 """Answers are rounded to this many steps, so that they are the same whatever instructions a CPU has."""
+LOG_ODDS_MAX = 30
+"""What is surer is not told from certainty by far."""
 TILE_CELLS = 1536
 """Larger plans are looked at in tiles of this side, so that memory does not grow with the map."""
 OVERLAP_CELLS = 192
@@ -35,7 +37,9 @@ class AnsweringNetwork:
     """A network from an ONNX file, run by OpenCV."""
 
     def __init__(self, path: Path) -> None:
-        self._network = cv2.dnn.readNetFromONNX(str(path))
+        # OpenCV 4 knows no other engine; in OpenCV 5 it is the faster one here.
+        classic = {"engine": cv2.dnn.ENGINE_CLASSIC} if hasattr(cv2.dnn, "ENGINE_CLASSIC") else {}
+        self._network = cv2.dnn.readNetFromONNX(str(path), **classic)
 
     def __call__(self, raster: PlanRaster, views: int = RegionParameters.answer_views) -> NDArray[np.float32]:
         """Answers (OUTPUTS, H, W) in [0, 1] for a raster (H, W).
@@ -74,10 +78,14 @@ class AnsweringNetwork:
         return rounded
 
     def _forward(self, inputs: FloatImage) -> FloatImage:
-        rows, columns = inputs.shape[1:]
-        self._network.setInput(np.ascontiguousarray(inputs[None]))
-        blocks = self._network.forward()[0].reshape(OUTPUTS, BLOCK, BLOCK, rows // BLOCK, columns // BLOCK)
-        out: FloatImage = blocks.transpose(0, 3, 1, 4, 2).reshape(OUTPUTS, rows, columns)
+        channels, rows, columns = inputs.shape
+        blocks = inputs.reshape(channels, rows // BLOCK, BLOCK, columns // BLOCK, BLOCK)
+        self._network.setInput(
+            blocks.transpose(0, 2, 4, 1, 3).reshape(1, -1, rows // BLOCK, columns // BLOCK)
+        )
+        odds = np.exp(np.clip(self._network.forward(), -LOG_ODDS_MAX, LOG_ODDS_MAX))
+        answers = (odds / (odds + 1)).reshape(OUTPUTS, BLOCK, BLOCK, rows // BLOCK, columns // BLOCK)
+        out: FloatImage = answers.transpose(0, 3, 1, 4, 2).reshape(OUTPUTS, rows, columns)
         return out
 
 
