@@ -75,6 +75,54 @@ def label_sizes(labels: NDArray[np.integer], count: int) -> NDArray[np.int64]:
 
 
 @dataclass(frozen=True, eq=False)
+class Pieces:
+    """What hangs together in a mask, with diagonals.
+
+    Attributes
+    ----------
+    row, column : (N,) int
+        The cells of the mask in reading order.
+    number : (N,) int32
+        Piece 1.. of each.
+    count : int
+        Highest number, and 1.
+    sides : (count, 2) int
+        Width and height of each piece's box, with the margin that it was grown by; 0 for what is none.
+    """
+
+    row: NDArray[np.intp]
+    column: NDArray[np.intp]
+    number: NDArray[np.int32]
+    count: int
+    sides: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, mask: BoolArray, margin: int = 0) -> Pieces:
+        """Find the pieces of a mask (H, W) over gaps that growing it by a margin of cells closes."""
+        import cv2
+
+        kernel = np.ones((2 * margin + 1, 2 * margin + 1), np.uint8)
+        grown = cv2.dilate(mask.astype(np.uint8), kernel) if margin else mask.astype(np.uint8)
+        count, piece = cv2.connectedComponents(grown, connectivity=8)
+        row, column = np.nonzero(mask)
+        number = piece[row, column].astype(np.int32, copy=False)
+        sides = np.zeros((count, 2), np.int64)
+        for axis, (place, size) in enumerate(((column, mask.shape[1]), (row, mask.shape[0]))):
+            low, high = np.full(count, size), np.zeros(count, np.int64)
+            np.minimum.at(low, number, place)
+            np.maximum.at(high, number, place)
+            sides[:, axis] = np.minimum(high + margin, size - 1) - np.maximum(low - margin, 0) + 1
+        return cls(row, column, number, count, np.maximum(sides, 0))
+
+    def cells(self, chosen: BoolArray, shape: tuple[int, ...]) -> BoolArray:
+        """Mask of the pieces of a choice (count,)."""
+        mask = np.zeros(shape, bool)
+        of_chosen = chosen[self.number]
+        mask[self.row[of_chosen], self.column[of_chosen]] = True
+        return mask
+
+
+@dataclass(frozen=True, eq=False)
 class Contacts:
     """Sides of cells at which two labels of an image meet, one entry per side.
 

@@ -161,7 +161,7 @@ def _analyze_by_rose2(
     by_borders = parameters.floor_plan.grouping == "fitted"
     tree = None
     if by_borders:
-        tree = _grow_tree(explored, scored, supported, strongest, parameters, watch)
+        tree = _grow_tree(explored, scored, supported, built.others, strongest, parameters, watch)
         del scored, supported, count_walls, clean  # the rest needs their memory
         found = tree.rooms(parameters.regions.detail)
     else:
@@ -258,13 +258,14 @@ def _grow_tree(
     explored: ExploredPart,
     scored: StructureResult,
     supported: WallCells,
+    others: WallCells,
     strongest_rad: float,
     parameters: Parameters,
     watch: _StopWatch,
 ) -> RoomTree:
     """Cut the floor into atoms, by faces and by basins of the clearance, and judge their borders."""
     free, occupied, cell_m = explored.free, explored.occupied, explored.resolution_m
-    generous = generous_walls(scored, supported, parameters)
+    generous = generous_walls(scored, supported, parameters, others)
     plan = generous_floor_plan(generous, free, strongest_rad, cell_m, parameters)
     watch.lap("floor_plan")
     atoms = find_atoms(

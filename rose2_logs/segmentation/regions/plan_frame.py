@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from rose2_logs.model.labels import Pieces
 from rose2_logs.model.occupancy import BoolArray, FloatArray
 
 Labels = NDArray[np.int32]
@@ -155,9 +156,5 @@ def grown_labels(labels: Labels, reach_cells: float) -> Labels:
 
 def without_specks(occupied: BoolArray, shortest_cells: float) -> BoolArray:
     """Occupied cells without the pieces whose longer side is less than `shortest_cells`."""
-    _, piece, stats, _ = cv2.connectedComponentsWithStats(occupied.astype(np.uint8), connectivity=8)
-    longest = np.maximum(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT])
-    keep = longest >= shortest_cells
-    keep[0] = False
-    kept: BoolArray = keep[piece]
-    return kept
+    pieces = Pieces.of(occupied)
+    return pieces.cells(pieces.sides.max(1) >= shortest_cells, occupied.shape)

@@ -169,17 +169,29 @@ class RegionTree:
         return RegionsResult(labels, borders, outside_m2)
 
 
-def generous_walls(scored: StructureResult, supported: WallCells, parameters: Parameters) -> WallResult:
+def generous_walls(
+    scored: StructureResult,
+    supported: WallCells,
+    parameters: Parameters,
+    others: WallCells | None = None,
+) -> WallResult:
     """Walls of a clean map that keeps every wall, by one low threshold.
 
     Where faces are no rooms but what rooms are joined from, a wall too many does no harm: the threshold needs
     no search, and no budget of walls.
+
+    Parameters
+    ----------
+    scored : StructureResult
+    supported, others : WallCells
+        See `find_walls`.
+    parameters : Parameters
     """
     least = parameters.regions.clean_min_score
     clean = scored.supported & (scored.score >= least)
     candidates = scored.supported & (scored.score >= parameters.spectrum.attached_share * least)
     attached = attached_cells(clean, candidates)
-    return find_walls(supported, clean, attached, parameters.walls)
+    return find_walls(supported, clean, attached, parameters.walls, others)
 
 
 def generous_floor_plan(

@@ -203,9 +203,9 @@ def _open_pockets(
 def _fill_small_holes(cells: NDArray[np.int32], resolution_m: float, largest_m2: float) -> None:
     """Give holes up to some size to the one room that surrounds them, in place."""
     empty = np.pad(cells == 0, 1, constant_values=True).astype(np.uint8)
-    count, hole, stats, _ = cv2.connectedComponentsWithStats(empty, connectivity=4)
-    hole = hole[1:-1, 1:-1]
-    small = stats[:, cv2.CC_STAT_AREA] * resolution_m**2 <= largest_m2
+    count, padded = cv2.connectedComponents(empty, connectivity=4)
+    hole = padded[1:-1, 1:-1].astype(np.int32, copy=False)
+    small = label_sizes(hole, count - 1) * resolution_m**2 <= largest_m2
     small[:2] = False  # the rooms themselves, and what is outside of them
     inside = small[hole]
     number, beside = hole[inside], _beside(cells, inside)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rose2_logs.config.parameters import SpectrumParameters
+from rose2_logs.model.labels import Pieces
 from rose2_logs.model.occupancy import BoolArray, FloatArray
 from rose2_logs.segmentation.rose.spectrum import Spectrum
 
@@ -85,17 +86,14 @@ def supported_cells(
     supported : (H, W) bool
         The occupied cells of the other pieces.
     """
-    width = 2 * round(parameters.piece_max_gap_m / resolution_m / 2) + 1
-    joined = cv2.dilate(occupied.astype(np.uint8), np.ones((width, width), np.uint8))
-    count, piece, stats, _ = cv2.connectedComponentsWithStats(joined, connectivity=8)
-    cells = piece[occupied]
-    total = np.bincount(cells, weights=score[occupied], minlength=count)
-    mean = total / np.maximum(np.bincount(cells, minlength=count), 1)
-    # The box of a dilated piece is wider by the dilation.
-    sides = (stats[:, [cv2.CC_STAT_WIDTH, cv2.CC_STAT_HEIGHT]] - (width - 1)) * resolution_m
+    margin = round(parameters.piece_max_gap_m / resolution_m / 2)
+    pieces = Pieces.of(occupied, margin)
+    total = np.bincount(pieces.number, score[pieces.row, pieces.column], minlength=pieces.count)
+    mean = total / np.maximum(np.bincount(pieces.number, minlength=pieces.count), 1)
+    # The box of a grown piece is wider by the margin.
+    sides = (pieces.sides - 2 * margin) * resolution_m
     wall = (np.hypot(*sides.T) >= parameters.piece_min_extent_m) | (mean >= parameters.piece_min_score)
-    supported: BoolArray = occupied & wall[piece]
-    return supported
+    return pieces.cells(wall, occupied.shape)
 
 
 def clean_threshold(

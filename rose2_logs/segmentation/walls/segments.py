@@ -9,11 +9,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from rose2_logs.config.parameters import WallParameters
+from rose2_logs.model.labels import Pieces
 from rose2_logs.model.occupancy import BoolArray, FloatArray
 from rose2_logs.segmentation.walls.strips import WallCells
 
@@ -115,14 +115,9 @@ def long_pieces(
 
     A piece is what hangs together over gaps at least as wide as a segment bridges.
     """
-    side = 2 * int(np.ceil((parameters.segment_max_gap_m / resolution_m + 1) / 2)) + 1
-    joined = cv2.dilate(occupied.astype(np.uint8), np.ones((side, side), np.uint8))
-    _, piece, stats, _ = cv2.connectedComponentsWithStats(joined, connectivity=8)
-    # The box of a dilated piece is wider than the piece, at whose cells' far sides a segment ends.
-    sides = stats[:, [cv2.CC_STAT_WIDTH, cv2.CC_STAT_HEIGHT]] * resolution_m
-    long = np.hypot(*sides.T) >= min_length_m
-    pieces: BoolArray = occupied & long[piece]
-    return pieces
+    # The box of a grown piece is wider than the piece, at whose cells' far sides a segment ends.
+    pieces = Pieces.of(occupied, int(np.ceil((parameters.segment_max_gap_m / resolution_m + 1) / 2)))
+    return pieces.cells(np.hypot(*(pieces.sides * resolution_m).T) >= min_length_m, occupied.shape)
 
 
 def local_directions(dominant_rad: FloatArray, parameters: WallParameters) -> FloatArray:

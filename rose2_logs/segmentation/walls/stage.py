@@ -36,6 +36,8 @@ class WallResult:
         Dominant directions first, then local ones.
     lines : RepresentativeLines
         The representative lines.
+    others : WallCells
+        What was left for walls off the dominant directions, and the local ones.
     walls : (H, W) bool
         Wall cells: the clean map, what is attached to it, and the walls off the dominant directions.
     """
@@ -45,11 +47,16 @@ class WallResult:
     segment_line: NDArray[np.int32]
     directions_rad: FloatArray
     lines: RepresentativeLines
+    others: WallCells
     walls: BoolArray
 
 
 def find_walls(
-    supported: WallCells, clean: BoolArray, attached: BoolArray, parameters: WallParameters
+    supported: WallCells,
+    clean: BoolArray,
+    attached: BoolArray,
+    parameters: WallParameters,
+    others: WallCells | None = None,
 ) -> WallResult:
     """Segments, wall clusters and representative lines of a clean map and what is attached to it.
 
@@ -60,13 +67,16 @@ def find_walls(
     clean, attached : (H, W) bool
         The clean map, chosen from them, and with what is attached to it.
     parameters : WallParameters
+    others : WallCells, optional
+        Those of another clean map of the same cells: if they hold all that are needed, they need no sorting.
     """
     dominant_rad = supported.directions_rad
     along, _ = detect_segments(supported, clean, parameters.segment_min_length_m, parameters)
     # Off the dominant directions, only its length distinguishes a wall from furniture.
     length_m = parameters.local_segment_min_length_m
     rest = long_pieces(supported.cells & ~clean, supported.resolution_m, length_m, parameters)
-    others = WallCells(rest, local_directions(dominant_rad, parameters), supported.resolution_m)
+    if others is None or (rest & ~others.cells).any():
+        others = WallCells(rest, local_directions(dominant_rad, parameters), supported.resolution_m)
     local, local_walls = detect_segments(others, rest, length_m, parameters)
     segments = join_segments(along, local)
     clusters = cluster_segments(segments, parameters)
@@ -77,6 +87,7 @@ def find_walls(
         lines.of_cluster[clusters.of_segment],
         segments.directions_rad,
         lines,
+        others,
         attached | local_walls,
     )
 
