@@ -91,11 +91,11 @@ class SortedCells:
         along, across = x * c + y * s, y * c - x * s
         cell = np.floor(across / resolution_m).astype(np.int32)
         base = np.arange(len(directions_rad), dtype=np.int32)[:, None] * np.int32(len(x))
-        by_place = np.argsort(along, axis=1, kind="stable")
+        by_place = np.stack([_order(places) for places in along])
         columns: list[tuple[NDArray[np.int32], NDArray[np.int32], FloatArray, FloatArray]] = []
         spans, lowest = [], []
         for shift in (0, 1):
-            strip = (cell + shift) // 2
+            strip = (cell + shift) >> 1
             low = strip.min(1, keepdims=True)
             strip -= low
             span = int(strip.max()) + 1
@@ -104,7 +104,7 @@ class SortedCells:
             in_strips = np.argsort(np.take_along_axis(rank, by_place, 1), axis=1, kind="stable")
             slot = (np.take_along_axis(by_place, in_strips, 1) + base).astype(np.int32).ravel()
             strip += np.arange(len(directions_rad), dtype=np.int32)[:, None] * np.int32(span)
-            columns.append((slot, strip.ravel()[slot], along.ravel()[slot], across.ravel()[slot]))
+            columns.append((slot, strip.take(slot), along.take(slot), across.take(slot)))
             spans.append(span)
             lowest.append(low[:, 0])
         slots, keys, alongs, acrosses = zip(*columns, strict=True)
@@ -144,6 +144,15 @@ class SortedCells:
                 np.bincount(run, weights=cover) >= parameters.segment_min_fill * (end - start),
                 partial(self.across[shift].__getitem__, place),
             )
+
+
+def _order(places: FloatArray) -> NDArray[np.intp]:
+    """Sort places as a stable sort does; the unstable one is three times as fast where no two are equal."""
+    order = np.argsort(places)
+    ascending = places[order]
+    if (ascending[1:] == ascending[:-1]).any():
+        return np.argsort(places, kind="stable")
+    return order
 
 
 @dataclass(frozen=True, eq=False)
