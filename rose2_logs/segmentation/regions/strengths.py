@@ -17,12 +17,12 @@ DIFFERENT, OUTSIDE = FEATURES.index("different"), REGION_FEATURES.index("outside
 UNASKED_ANSWER = -0.5
 """What the answer counts for regions that touch nowhere: they are in different rooms."""
 
-ROWS_AT_ONCE = 16
+ROWS_AT_ONCE = 32
 """Rows whose answers to all nodes are held at once, in a CPU's cache."""
 LEAVES_MAX = 16
 """Most leaves of a tree: one bit each."""
 ALL_LEAVES = 2**LEAVES_MAX - 1
-FIRST_BIT = np.zeros(ALL_LEAVES + 1, np.intp)
+FIRST_BIT = np.zeros(ALL_LEAVES + 1, np.uint8)
 """Number of the lowest bit of each set of leaves."""
 for _bit in reversed(range(LEAVES_MAX)):
     FIRST_BIT[1 << _bit :: 2 << _bit] = _bit
@@ -127,7 +127,7 @@ class _LeafMasks:
         left_over -= np.uint16(1)
         left_over |= self.kept[:, None]
         remaining = np.bitwise_and.reduce(left_over.reshape(-1, self.trees, len(features)), axis=0)
-        leaf = FIRST_BIT[remaining.T] + np.arange(self.trees) * LEAVES_MAX
+        leaf = FIRST_BIT.take(remaining.T) + np.arange(self.trees) * LEAVES_MAX
         return np.asarray(self.value.take(leaf))
 
 
