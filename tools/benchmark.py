@@ -248,6 +248,13 @@ def _add_speed(parser: argparse.ArgumentParser) -> None:
     add("--skip", nargs="+", choices=SPEED_PARTS, default=[], help="parts to leave out")
     add("--config", type=Path, metavar="FILE.toml", help="parameters, one table per stage")
     add("--set", action="append", default=[], metavar="STAGE.NAME=VALUE", help="change one parameter")
+    add(
+        "--against",
+        type=Path,
+        metavar="PATH",
+        help="checkout of another version, timed by turns on the same maps and logs (git worktree add "
+        "PATH COMMIT)",
+    )
     parser.set_defaults(run=_speed)
 
 
@@ -260,6 +267,7 @@ def _speed(options: argparse.Namespace) -> int:
             skip=frozenset(options.skip),
             config=options.config,
             settings=tuple(options.set),
+            against=options.against and options.against.resolve(),
         )
     )
     print(write_speed_report(speed, options.output))

@@ -60,8 +60,12 @@ def test_everything_is_measured_and_reported(log: Path, tmp_path: Path):
         logs=(log,),
         amount=Amount(1, 1, 1, (1, 4), (), 4_000_000, 100_000_000, 3, 1),
         skip=frozenset({"logs"}),
+        against=PROJECT,
     )
     speed = measure_speed(options)
+    (beside,) = speed.against.maps
+    assert beside.group == "incremental_drawn"
+    assert min(beside.other_s, *beside.ours_s.values()) > 0
     assert [times.group for times in speed.maps] == ["incremental_drawn", "logs"]
     for times in speed.maps:
         assert times.rooms == 2

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 import time
@@ -120,8 +121,8 @@ def write_growing_log(path: Path, cells: NDArray[np.int8], resolution_m: float, 
             log.write_map(MAP_EVERY_S * number, np.where(seen, cells, -1).astype(np.int8), geometry)
 
 
-def time_log(log: Path, snapshots: int, workers: int, folder: Path) -> LogTimes:
-    """Run ``analyze`` on a log as a user does.
+def time_log(log: Path, snapshots: int, workers: int, folder: Path, checkout: Path | None = None) -> LogTimes:
+    """Run ``analyze`` on a log as a user does, of this version or of that in another checkout.
 
     Raises
     ------
@@ -129,7 +130,7 @@ def time_log(log: Path, snapshots: int, workers: int, folder: Path) -> LogTimes:
         If the command fails.
     """
     start = time.perf_counter()
-    with _analyze(log, workers, folder) as process:
+    with _analyze(log, workers, folder, checkout) as process:
         tree = ProcessTree(process.pid)
         _wait(process, log)
     wall_s, use = time.perf_counter() - start, tree.stop()
@@ -156,10 +157,13 @@ def side_by_side_gain(log: Path, one_s: float, folder: Path) -> float:
     return 2 * one_s / (time.perf_counter() - start)
 
 
-def _analyze(log: Path, workers: int, folder: Path) -> subprocess.Popen[str]:
+def _analyze(log: Path, workers: int, folder: Path, checkout: Path | None = None) -> subprocess.Popen[str]:
     command = [sys.executable, "-m", "rose2_logs", "analyze", str(log), "-o", str(folder), "--overwrite"]
     command += ["--workers", str(workers)]
-    return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    env = {**os.environ, "PYTHONPATH": str(checkout)} if checkout else None
+    return subprocess.Popen(
+        command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, env=env, cwd=checkout
+    )
 
 
 def _wait(process: subprocess.Popen[str], log: Path) -> None:

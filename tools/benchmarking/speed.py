@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from benchmarking.accuracy import load_all_cases
+from benchmarking.against import Against, LogAgainst, MapAgainst, time_log_against, time_maps_against
 from benchmarking.gauges import machine, one_core
 from benchmarking.log_costs import (
     CopyTimes,
@@ -100,6 +101,8 @@ class SpeedOptions:
     config : path, optional
     settings : tuple of str
         Parameters that everything but the logs' command is run with.
+    against : path, optional
+        Checkout of another version, which maps and logs are timed beside.
     """
 
     cases: tuple[Path, ...]
@@ -108,6 +111,7 @@ class SpeedOptions:
     skip: frozenset[str] = frozenset()
     config: Path | None = None
     settings: tuple[str, ...] = ()
+    against: Path | None = None
 
 
 @dataclass(frozen=True)
@@ -125,6 +129,7 @@ class Speed:
     copy: CopyTimes | None
     starts: tuple[StartTimes, ...]
     look: LookTimes | None
+    against: Against | None = None
 
     def as_json(self) -> dict[str, Any]:
         """Return everything as JSON values."""
@@ -151,6 +156,9 @@ def measure_speed(options: SpeedOptions) -> Speed:
     logs: list[LogTimes] = []
     outputs: list[SinkCosts] = []
     side_by_side, copy, look, starts = None, None, None, []
+    other = options.against
+    maps_against: list[MapAgainst] = []
+    logs_against: list[LogAgainst] = []
     with open_log(options.logs[0]) as reader:
         last = reader.last()
     building, resolution_m = explored_part(last), last.geometry.resolution_m
@@ -165,6 +173,9 @@ def measure_speed(options: SpeedOptions) -> Speed:
                 for number, map_ in enumerate(chosen, start=1):
                     say(f"map {number} of {len(chosen)}: {map_.group}, {map_.name}")
                     maps.append(time_map(map_, parameters, METHODS[1:], amount.repeats))
+        if "maps" not in options.skip and other is not None:
+            per_group = amount.maps_per_group
+            maps_against = time_maps_against(other, options.cases, per_group, amount.repeats, say)
         if "tiles" not in options.skip:
             with one_core():
                 for row in time_tiles(building, resolution_m, amount.tiles, parameters, amount.repeats):
@@ -179,6 +190,9 @@ def measure_speed(options: SpeedOptions) -> Speed:
                 for workers in (1, 2):
                     say(f"log of {count} maps, {workers} workers")
                     logs.append(time_log(log, count, workers, folder / f"out_{count}"))
+                if other is not None:
+                    say(f"log of {count} maps, both versions")
+                    logs_against.append(time_log_against(other, log, count, 1, folder / f"both_{count}"))
             say("two commands side by side")
             shortest = folder / f"growing_{amount.snapshots[0]}.mcap"
             side_by_side = side_by_side_gain(shortest, logs[0].wall_s, folder)
@@ -202,6 +216,7 @@ def measure_speed(options: SpeedOptions) -> Speed:
         copy,
         tuple(starts),
         look,
+        Against(other.name, tuple(maps_against), tuple(logs_against)) if other else None,
     )
 
 

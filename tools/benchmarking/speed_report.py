@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarking.against import against_lines
 from benchmarking.map_times import MapTimes
 from benchmarking.markdown import table
 from benchmarking.scaling import LogTimes, TileTimes
@@ -39,6 +40,7 @@ def write_speed_report(speed: Speed, folder: Path) -> Path:
         stacked(pictures).save(folder / "speed.png", width_px=None)
         lines += ["![times and memory](speed.png)", ""]
     lines += [
+        *(against_lines(speed.against) if speed.against else []),
         *_groups(speed),
         *_tiles(speed),
         *_logs(speed),
