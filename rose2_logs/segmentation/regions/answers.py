@@ -56,9 +56,14 @@ class AnsweringNetwork:
             low = max(top - OVERLAP_CELLS, 0), max(left - OVERLAP_CELLS, 0)
             seen = np.s_[low[0] : top + step + OVERLAP_CELLS, low[1] : left + step + OVERLAP_CELLS]
             tile = PlanRaster(raster.wall[seen], raster.free[seen])
-            if tile.free.any():
-                own = np.s_[:, top - low[0] : top - low[0] + step, left - low[1] : left - low[1] + step]
-                answers[:, top : top + step, left : left + step] = self._answers(tile, views)[own]
+            if not tile.free.any():
+                continue
+            if not tile.wall.any():
+                # No building: a hundred meters and more without a wall.
+                answers[-1, top : top + step, left : left + step] = 1
+                continue
+            own = np.s_[:, top - low[0] : top - low[0] + step, left - low[1] : left - low[1] + step]
+            answers[:, top : top + step, left : left + step] = self._answers(tile, views)[own]
         return answers
 
     def _answers(self, raster: PlanRaster, views: int) -> NDArray[np.float32]:

@@ -84,6 +84,15 @@ def test_tiles_without_free_cells_are_not_looked_at(raster, monkeypatch):
     assert not fitted.answering_network()(empty)[..., -256:].any()
 
 
+def test_tiles_without_walls_are_outside(raster, monkeypatch):
+    monkeypatch.setattr(module, "TILE_CELLS", 96)
+    monkeypatch.setattr(module, "OVERLAP_CELLS", 16)
+    wall, free = (np.pad(raster.wall, ((0, 0), (0, 400))), np.pad(raster.free, ((0, 0), (0, 400)), "edge"))
+    answers = fitted.answering_network()(PlanRaster(wall, np.maximum(free, 1)))[..., -256:]
+    assert not answers[:-1].any()
+    assert (answers[-1] == 1).all()
+
+
 @pytest.mark.parametrize("shape", [(1, 1), (1, 200), (STRIDE, STRIDE), (STRIDE + 1, 2 * STRIDE - 1)])
 def test_rasters_of_any_shape_are_answered(shape):
     free = PlanRaster(np.zeros(shape, np.uint8), np.full(shape, SHARE_STEPS, np.uint8))
