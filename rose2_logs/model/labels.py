@@ -104,8 +104,9 @@ class Pieces:
         kernel = np.ones((2 * margin + 1, 2 * margin + 1), np.uint8)
         grown = cv2.dilate(mask.astype(np.uint8), kernel) if margin else mask.astype(np.uint8)
         count, piece = cv2.connectedComponents(grown, connectivity=8)
-        row, column = np.nonzero(mask)
-        number = piece[row, column].astype(np.int32, copy=False)
+        cell = np.flatnonzero(mask)
+        number = piece.ravel()[cell].astype(np.int32, copy=False)
+        row, column = np.divmod(cell, mask.shape[1])
         sides = np.zeros((count, 2), np.int64)
         for axis, (place, size) in enumerate(((column, mask.shape[1]), (row, mask.shape[0]))):
             low, high = np.full(count, size), np.zeros(count, np.int64)
@@ -156,16 +157,12 @@ def contacts(labels: NDArray[np.integer]) -> Contacts:
     """Find where labels of an image (H, W) meet; 0 counts as any other label."""
     width = labels.shape[1]
     flat = labels.ravel()
-    firsts, seconds = [], []
-    for before, behind, step in (
-        (labels[:, :-1], labels[:, 1:], 1),
-        (labels[:-1], labels[1:], width),
-    ):
-        row, column = np.nonzero(before != behind)
-        cell = row * width + column
-        firsts.append(cell)
-        seconds.append(cell + step)
-    first, second = np.concatenate(firsts), np.concatenate(seconds)
+    within_rows = np.flatnonzero(flat[:-1] != flat[1:])
+    # Not from the end of a row to the begin of the next.
+    within_rows = within_rows[(within_rows + 1) % width != 0]
+    within_columns = np.flatnonzero(flat[:-width] != flat[width:])
+    first = np.concatenate([within_rows, within_columns])
+    second = np.concatenate([within_rows + 1, within_columns + width])
     one, other = flat[first], flat[second]
     return Contacts(np.minimum(one, other), np.maximum(one, other), first, second)
 

@@ -54,7 +54,7 @@ def _vertices(padded: NDArray[np.int32]) -> tuple[NDArray[np.int64], ...]:
     northwest, northeast, southwest, southeast = around
     flat = (northwest == northeast) & (southwest == southeast)
     flat |= (northwest == southwest) & (northeast == southeast)
-    row, column = np.nonzero(~flat)
+    row, column = np.divmod(np.flatnonzero(~flat), flat.shape[1])
     cells = np.column_stack([part[row, column] for part in around])
     is_same = cells[:, :, None] == cells[:, None, :]
     codes = is_same @ np.array([NORTHWEST, NORTHEAST, SOUTHWEST, SOUTHEAST])

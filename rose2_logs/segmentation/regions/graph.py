@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from rose2_logs.model.labels import contacts
 from rose2_logs.model.occupancy import BoolArray, FloatArray
 from rose2_logs.segmentation.regions.plan_frame import Labels, grown_labels, without_specks
 from rose2_logs.segmentation.regions.plan_raster import OFFSETS, PlanRaster
@@ -140,26 +141,29 @@ def build_graph(
     atoms = np.where(inside, grown_labels(atoms, ATOM_REACH_CELLS), 0).astype(np.int32)
     solid = without_specks(wall, WALL_MIN_CELLS)
     clear, clear_strong = (_clearance(mask, cell_m) for mask in (solid, strong))
-    row, column = np.nonzero(atoms)
-    node = atoms[row, column].astype(np.int64) - 1
+    at = np.flatnonzero(atoms)
+    row, column = np.divmod(at, atoms.shape[1])
+    node = atoms.take(at).astype(np.int64) - 1
     node_sums = np.zeros((count, len(NODE_SUMS)))
     node_sums[:, 0] = np.bincount(node, minlength=count) * cell_m**2
-    kind = np.pad(np.where(wall, 1, np.where(atoms > 0, 0, 2)).astype(np.uint8), 1, constant_values=2)
-    for down, right in ((0, 1), (1, 0), (1, 2), (2, 1)):
-        beside = kind[row + down, column + right]
+    kind = np.full((atoms.shape[0] + 2, atoms.shape[1] + 2), 2, np.uint8)
+    kind[1:-1, 1:-1] = np.where(wall, np.uint8(1), np.where(atoms > 0, np.uint8(0), np.uint8(2)))
+    in_kind = (row + 1) * kind.shape[1] + column + 1
+    for step in (-kind.shape[1], -1, 1, kind.shape[1]):
+        beside = kind.take(in_kind + step)
         for which in (1, 2):
             node_sums[:, which] += np.bincount(node[beside == which], minlength=count) * cell_m
     width = 2 * round(WIDE_M / cell_m / 2) + 1
     wide = cv2.morphologyEx(inside.astype(np.uint8), cv2.MORPH_OPEN, np.ones((width, width), np.uint8))
-    node_sums[:, 3] = np.bincount(node[wide[row, column] > 0], minlength=count) * cell_m**2
+    node_sums[:, 3] = np.bincount(node[wide.take(at) > 0], minlength=count) * cell_m**2
     if answers is not None:
-        node_sums[:, 4] = np.bincount(node, answers[-1][row, column], minlength=count) * cell_m**2
+        node_sums[:, 4] = np.bincount(node, answers[-1].take(at), minlength=count) * cell_m**2
     node_maxima = np.full((count, len(NODE_MAXIMA)), -np.inf)
     x, y = (column + 0.5) * cell_m, (row + 0.5) * cell_m
     half = cell_m / 2
     reaches = ((1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, -1), (1, -1), (-1, 1))
     extents = (a * x + b * y + half * (abs(a) + abs(b)) for a, b in reaches)
-    _fill_maxima(node_maxima, node, chain((c[row, column] for c in (clear, clear_strong)), extents))
+    _fill_maxima(node_maxima, node, chain((c.take(at) for c in (clear, clear_strong)), extents))
     # An atom that no center of a plan cell meets.
     missed = np.isinf(node_maxima[:, 0])
     node_maxima[missed] = 0
@@ -197,29 +201,33 @@ def _border_records(
     """One row for each pair of cells beside one another (or asked about) that lie in two regions."""
     grown = grown_labels(atoms, GROW_M / cell_m)
     keys, sums, maxima = [], [], []
-    for upright, (one, other) in ((True, (np.s_[:, :-1], np.s_[:, 1:])), (False, (np.s_[:-1], np.s_[1:]))):
-        a, b = grown[one], grown[other]
-        row, column = np.nonzero((a != b) & (a > 0) & (b > 0))
+    meet = contacts(grown)
+    meet = meet.chosen(meet.low > 0)
+    in_one_row = meet.first // grown.shape[1] == meet.second // grown.shape[1]
+    for upright in (True, False):
+        of_kind = meet.chosen(in_one_row == upright)
+        one, other = of_kind.first, of_kind.second
+        row, column = np.divmod(one, grown.shape[1])
         row2, column2 = (row, column + 1) if upright else (row + 1, column)
-        open_contact = (atoms[row, column] > 0) & (atoms[row2, column2] > 0)
-        walled = wall[row, column] | wall[row2, column2]
-        record = np.zeros((len(row), len(BORDER_SUMS)))
+        open_contact = (atoms.take(one) > 0) & (atoms.take(other) > 0)
+        walled = wall.take(one) | wall.take(other)
+        record = np.zeros((len(one), len(BORDER_SUMS)))
         record[:, 0 if upright else 1] = open_contact * cell_m
         record[:, 2] = (~open_contact & walled) * cell_m
         record[:, 3] = (~open_contact & ~walled) * cell_m
-        narrow = np.minimum(clear[row, column], clear[row2, column2])
+        narrow = np.minimum(clear.take(one), clear.take(other))
         record[:, 4] = open_contact * narrow * cell_m
-        record[:, 5] = (open_contact & (faces[row, column] != faces[row2, column2])) * cell_m
+        record[:, 5] = (open_contact & (faces.take(one) != faces.take(other))) * cell_m
         for k, length in enumerate(LINE_WINDOWS_M):
             along = _wall_along(wall, upright, length, cell_m)
-            record[:, 6 + k] = open_contact * np.maximum(along[row, column], along[row2, column2]) * cell_m
-        extreme = np.full((len(row), len(BORDER_MAXIMA)), -np.inf)
+            record[:, 6 + k] = open_contact * np.maximum(along.take(one), along.take(other)) * cell_m
+        extreme = np.full((len(one), len(BORDER_MAXIMA)), -np.inf)
         x, y = (column + column2 + 1) / 2 * cell_m, (row + row2 + 1) / 2 * cell_m
         half_x, half_y = (0.0, cell_m / 2) if upright else (cell_m / 2, 0.0)
-        narrow_strong = np.minimum(clear_strong[row, column], clear_strong[row2, column2])
+        narrow_strong = np.minimum(clear_strong.take(one), clear_strong.take(other))
         for k, value in enumerate((narrow, narrow_strong, x + half_x, half_x - x, y + half_y, half_y - y)):
             extreme[:, k] = np.where(open_contact, value, -np.inf)
-        keys.append(_pair_key(grown[row, column], grown[row2, column2], count))
+        keys.append(_pair_key(of_kind.low, of_kind.high, count))
         sums.append(record)
         maxima.append(extreme)
     if answers is not None:
@@ -237,9 +245,10 @@ def _border_records(
     return np.concatenate(keys), np.concatenate(sums), np.concatenate(maxima)
 
 
-def _pair_key(a: Labels, b: Labels, count: int) -> NDArray[np.int64]:
+def _pair_key(a: NDArray[np.integer], b: NDArray[np.integer], count: int) -> NDArray[np.int64]:
     low, high = np.minimum(a, b).astype(np.int64) - 1, np.maximum(a, b).astype(np.int64) - 1
-    return low * count + high
+    key: NDArray[np.int64] = low * count + high
+    return key
 
 
 def _wall_along(wall: BoolArray, upright: bool, length_m: float, cell_m: float) -> NDArray[np.float32]:

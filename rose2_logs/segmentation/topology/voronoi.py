@@ -45,7 +45,7 @@ def parts_of_room(
     basin = _basins(inside, clear, resolution_m, parameters.summit_reach_m)
     count = int(basin.max()) + 1
     summit = np.zeros(count)
-    np.maximum.at(summit, basin[inside], clear[inside])
+    np.maximum.at(summit, basin[inside], clear[inside].astype(float))
     area: FloatArray = np.bincount(basin[inside], minlength=count).astype(float) * resolution_m**2
     root = _join_basins(_passages(basin, clear), summit, area, parameters)
     number = np.zeros(count, np.int32)
@@ -145,7 +145,8 @@ def _passages(basin: NDArray[np.int32], clear: NDArray[np.float32]) -> dict[tupl
     meet = meet.chosen(meet.low > 0)
     pairs, pair = meet.pairs()
     widest = np.zeros(len(pairs))
-    np.maximum.at(widest, pair, np.minimum(clear.ravel()[meet.first], clear.ravel()[meet.second]))
+    narrow = np.minimum(clear.ravel()[meet.first], clear.ravel()[meet.second])
+    np.maximum.at(widest, pair, narrow.astype(float))
     return dict(zip(pairs, widest.tolist(), strict=True))
 
 
