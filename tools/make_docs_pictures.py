@@ -37,6 +37,7 @@ from rose2_logs.segmentation.regions.fitted import answering_network
 from rose2_logs.segmentation.regions.stage import find_atoms, generous_floor_plan, generous_walls
 from rose2_logs.segmentation.rose.spectrum import Spectrum, compute_spectrum
 from rose2_logs.segmentation.rose.stage import find_structure
+from rose2_logs.segmentation.walls.stage import WallCounter
 from rose2_logs.segmentation.walls.strips import WallCells
 from rose2_logs.workflows.analyze import RunOptions, analyze_log
 from rose2_logs.workflows.compare import compare_runs
@@ -182,8 +183,8 @@ def _atoms_and_answers(
     cell_m = part.resolution_m
     scored = find_structure(part.occupied, cell_m, parameters.spectrum)
     direction = float(scored.directions_rad[0])
-    supported = WallCells(scored.supported, scored.directions_rad, cell_m)
-    walls = generous_walls(scored, supported, parameters)
+    count_walls = WallCounter(WallCells(scored.supported, scored.directions_rad, cell_m), parameters.walls)
+    walls = generous_walls(scored, count_walls, parameters)
     plan = generous_floor_plan(walls, part.free, direction, cell_m, parameters)
     atoms = find_atoms(
         part.free, part.occupied, scored.score, plan.face_of_cell, direction, cell_m, parameters.regions

@@ -145,14 +145,13 @@ def _analyze_by_rose2(
     # A: dominant directions and clean map
     scored = find_structure(occupied, cell_m, parameters.spectrum)
     directions = scored.directions_rad
-    supported = WallCells(scored.supported, directions, cell_m)
-    count_walls = WallCounter(supported, parameters.walls)
+    count_walls = WallCounter(WallCells(scored.supported, directions, cell_m), parameters.walls)
     clean = make_clean_map(scored, explored.free_area_m2, count_walls, parameters.spectrum)
     structure = _structure(scored, clean, explored)
     watch.lap("structure")
 
     # B: wall segments, wall clusters, representative lines
-    built = find_walls(supported, clean.cells, clean.attached, parameters.walls)
+    built = find_walls(count_walls, clean.cells, clean.attached)
     walls = built.walls
     watch.lap("walls")
 
@@ -161,11 +160,11 @@ def _analyze_by_rose2(
     by_borders = parameters.floor_plan.grouping == "fitted"
     tree = None
     if by_borders:
-        tree = _grow_tree(explored, scored, supported, built.others, strongest, parameters, watch)
-        del scored, supported, count_walls, clean  # the rest needs their memory
+        tree = _grow_tree(explored, scored, count_walls, built.others, strongest, parameters, watch)
+        del scored, count_walls, clean  # the rest needs their memory
         found = tree.rooms(parameters.regions.detail)
     else:
-        del supported, count_walls, clean  # the rest needs their memory
+        del count_walls, clean  # the rest needs their memory
         found = _rooms_by_walls(explored, scored, built, strongest, parameters, watch)
         del scored
     watch.lap("rooms")
@@ -257,7 +256,7 @@ class RoomTree:
 def _grow_tree(
     explored: ExploredPart,
     scored: StructureResult,
-    supported: WallCells,
+    count_walls: WallCounter,
     others: WallCells,
     strongest_rad: float,
     parameters: Parameters,
@@ -265,7 +264,7 @@ def _grow_tree(
 ) -> RoomTree:
     """Cut the floor into atoms, by faces and by basins of the clearance, and judge their borders."""
     free, occupied, cell_m = explored.free, explored.occupied, explored.resolution_m
-    generous = generous_walls(scored, supported, parameters, others)
+    generous = generous_walls(scored, count_walls, parameters, others)
     plan = generous_floor_plan(generous, free, strongest_rad, cell_m, parameters)
     watch.lap("floor_plan")
     atoms = find_atoms(

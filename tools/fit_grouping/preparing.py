@@ -19,6 +19,7 @@ from rose2_logs.segmentation.regions.answers import AnsweringNetwork
 from rose2_logs.segmentation.regions.graph import RegionGraph
 from rose2_logs.segmentation.regions.stage import Atoms, find_atoms, generous_floor_plan, generous_walls
 from rose2_logs.segmentation.rose.stage import find_structure
+from rose2_logs.segmentation.walls.stage import WallCounter
 from rose2_logs.segmentation.walls.strips import WallCells
 
 FloatArray = NDArray[np.float64]
@@ -57,8 +58,10 @@ def atoms_of(one: TruthMap, parameters: Parameters) -> Atoms:
     """Cut a map into atoms as the analysis does."""
     scored = find_structure(one.occupied, one.resolution_m, parameters.spectrum)
     direction = float(scored.directions_rad[0]) if len(scored.directions_rad) else 0.0
-    supported = WallCells(scored.supported, scored.directions_rad, one.resolution_m)
-    walls = generous_walls(scored, supported, parameters)
+    count_walls = WallCounter(
+        WallCells(scored.supported, scored.directions_rad, one.resolution_m), parameters.walls
+    )
+    walls = generous_walls(scored, count_walls, parameters)
     plan = generous_floor_plan(walls, one.free, direction, one.resolution_m, parameters)
     return find_atoms(
         one.free,

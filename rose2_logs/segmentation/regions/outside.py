@@ -35,7 +35,11 @@ def edge_shares(atoms: Labels, raster: PlanRaster, count: int) -> FloatArray:
     known = ((raster.wall > 0) | (raster.free > 0)).astype(np.uint8)
     if not known.any():
         return np.zeros(count)
-    hull = cv2.convexHull(cv2.findNonZero(known))
+    # The ends of each row hold the corners of the hull.
+    rows = np.flatnonzero(known.any(1))
+    ends = known[rows].argmax(1), known.shape[1] - 1 - known[rows, ::-1].argmax(1)
+    corners = np.stack([np.concatenate(ends), np.concatenate([rows, rows])], axis=1)
+    hull = cv2.convexHull(corners[np.lexsort(corners.T)].astype(np.int32))
     edge = cv2.polylines(np.zeros_like(known), [hull], isClosed=True, color=1) > 0
     beside = np.where(raster.wall > 0, 0, grown_labels(atoms, EDGE_REACH_CELLS))[edge]
     return np.bincount(beside, minlength=count + 1)[1:] / len(beside)

@@ -25,7 +25,7 @@ from rose2_logs.segmentation.regions.plan_raster import PlanRaster
 from rose2_logs.segmentation.regions.strengths import FittedStrength
 from rose2_logs.segmentation.rose.clean_map import attached_cells
 from rose2_logs.segmentation.rose.stage import StructureResult
-from rose2_logs.segmentation.walls.stage import WallResult, find_walls
+from rose2_logs.segmentation.walls.stage import WallCounter, WallResult, find_walls
 from rose2_logs.segmentation.walls.strips import WallCells
 
 EVEN_ODDS = 0.0
@@ -171,7 +171,7 @@ class RegionTree:
 
 def generous_walls(
     scored: StructureResult,
-    supported: WallCells,
+    count_walls: WallCounter,
     parameters: Parameters,
     others: WallCells | None = None,
 ) -> WallResult:
@@ -183,15 +183,16 @@ def generous_walls(
     Parameters
     ----------
     scored : StructureResult
-    supported, others : WallCells
-        See `find_walls`.
+    count_walls : WallCounter
     parameters : Parameters
+    others : WallCells, optional
+        See `find_walls`.
     """
     least = parameters.regions.clean_min_score
     clean = scored.supported & (scored.score >= least)
     candidates = scored.supported & (scored.score >= parameters.spectrum.attached_share * least)
     attached = attached_cells(clean, candidates)
-    return find_walls(supported, clean, attached, parameters.walls, others)
+    return find_walls(count_walls, clean, attached, others)
 
 
 def generous_floor_plan(

@@ -65,7 +65,10 @@ def settle_borders(labels: NDArray[np.int32], resolution_m: float, strip_m: floa
     cross = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
     # Every step reaches one cell further; twice the width of the strip also restores corners.
     for _ in range(4 * radius):
-        np.copyto(grown, cv2.dilate(grown, cross), where=(grown == 0) & open_cells)
+        empty = (grown == 0) & open_cells
+        if not empty.any():
+            break
+        np.copyto(grown, cv2.dilate(grown, cross), where=empty)
     settled = labels.copy()
     np.copyto(settled, grown, where=grown > 0, casting="unsafe")
     return settled

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from rose2_logs.model.occupancy import BoolArray, FloatArray
 from rose2_logs.segmentation.walls.clusters import cluster_segments, group_segments
 from rose2_logs.segmentation.walls.lines import RepresentativeLines, representative_lines
 from rose2_logs.segmentation.walls.segments import (
+    Segments,
     detect_segments,
     join_segments,
     local_directions,
@@ -52,33 +53,31 @@ class WallResult:
 
 
 def find_walls(
-    supported: WallCells,
+    count_walls: WallCounter,
     clean: BoolArray,
     attached: BoolArray,
-    parameters: WallParameters,
     others: WallCells | None = None,
 ) -> WallResult:
     """Segments, wall clusters and representative lines of a clean map and what is attached to it.
 
     Parameters
     ----------
-    supported : WallCells
-        Cells that may be walls, and the dominant directions.
+    count_walls : WallCounter
+        Knows the cells that may be walls, and the dominant directions.
     clean, attached : (H, W) bool
         The clean map, chosen from them, and with what is attached to it.
-    parameters : WallParameters
     others : WallCells, optional
         Those of another clean map of the same cells: if they hold all that are needed, they need no sorting.
     """
+    supported, parameters = count_walls.supported, count_walls.parameters
     dominant_rad = supported.directions_rad
-    along, _ = detect_segments(supported, clean, parameters.segment_min_length_m, parameters)
     # Off the dominant directions, only its length distinguishes a wall from furniture.
     length_m = parameters.local_segment_min_length_m
     rest = long_pieces(supported.cells & ~clean, supported.resolution_m, length_m, parameters)
     if others is None or (rest & ~others.cells).any():
         others = WallCells(rest, local_directions(dominant_rad, parameters), supported.resolution_m)
     local, local_walls = detect_segments(others, rest, length_m, parameters)
-    segments = join_segments(along, local)
+    segments = join_segments(count_walls.segments(clean), local)
     clusters = cluster_segments(segments, parameters)
     lines = representative_lines(clusters, segments.directions_rad, len(dominant_rad), parameters)
     return WallResult(
@@ -105,9 +104,19 @@ class WallCounter:
 
     supported: WallCells
     parameters: WallParameters
+    _found: dict[int, Segments] = field(default_factory=dict)
 
     def __call__(self, clean: BoolArray) -> int:
         """Number of wall clusters along the dominant directions of a clean map (H, W)."""
-        length_m = self.parameters.segment_min_length_m
-        segments, _ = detect_segments(self.supported, clean, length_m, self.parameters)
-        return group_segments(segments, self.parameters)[0]
+        return group_segments(self.segments(clean), self.parameters)[0]
+
+    def segments(self, clean: BoolArray) -> Segments:
+        """Segments of a clean map (H, W) along the dominant directions.
+
+        Of clean maps by a threshold each holds the next one: with as many cells they are the same.
+        """
+        count = int(np.count_nonzero(clean))
+        if count not in self._found:
+            length_m = self.parameters.segment_min_length_m
+            self._found[count] = detect_segments(self.supported, clean, length_m, self.parameters)[0]
+        return self._found[count]

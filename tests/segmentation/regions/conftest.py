@@ -11,6 +11,7 @@ from rose2_logs.config.parameters import Parameters
 from rose2_logs.segmentation.regions.plan_raster import OUTPUTS
 from rose2_logs.segmentation.regions.stage import Atoms, find_atoms, generous_floor_plan, generous_walls
 from rose2_logs.segmentation.rose.stage import find_structure
+from rose2_logs.segmentation.walls.stage import WallCounter
 from rose2_logs.segmentation.walls.strips import WallCells
 
 
@@ -31,8 +32,10 @@ def atoms(two_rooms: Floor) -> Atoms:
     parameters = Parameters()
     scored = find_structure(occupied, two_rooms.resolution_m, parameters.spectrum)
     direction = float(scored.directions_rad[0])
-    supported = WallCells(scored.supported, scored.directions_rad, two_rooms.resolution_m)
-    walls = generous_walls(scored, supported, parameters)
+    count_walls = WallCounter(
+        WallCells(scored.supported, scored.directions_rad, two_rooms.resolution_m), parameters.walls
+    )
+    walls = generous_walls(scored, count_walls, parameters)
     plan = generous_floor_plan(walls, free, direction, two_rooms.resolution_m, parameters)
     return find_atoms(
         free, occupied, scored.score, plan.face_of_cell, direction, two_rooms.resolution_m, parameters.regions

@@ -14,6 +14,7 @@ from rose2_logs.segmentation.regions.outside import surroundings
 from rose2_logs.segmentation.regions.stage import find_atoms, generous_walls, room_labels
 from rose2_logs.segmentation.regions.strengths import BoostedTrees, FittedStrength
 from rose2_logs.segmentation.rose.stage import find_structure
+from rose2_logs.segmentation.walls.stage import WallCounter
 from rose2_logs.segmentation.walls.strips import WallCells
 
 CELL_M = 0.1
@@ -75,11 +76,13 @@ def test_a_wall_is_in_the_generous_clean_map_from_its_score_on():
     floor.cells[50:80, 70:73] = 100  # 1.5 m that stand free
     scored = find_structure(floor.cells > 0, floor.resolution_m, Parameters().spectrum)
     score = float(scored.score[50:80, 70:73].max())
-    supported = WallCells(scored.supported, scored.directions_rad, floor.resolution_m)
+    count_walls = WallCounter(
+        WallCells(scored.supported, scored.directions_rad, floor.resolution_m), Parameters().walls
+    )
 
     def walls_there(least):
         parameters = replace(Parameters(), regions=replace(PARAMETERS, clean_min_score=least))
-        return bool(generous_walls(scored, supported, parameters).walls[55:75, 71].all())
+        return bool(generous_walls(scored, count_walls, parameters).walls[55:75, 71].all())
 
     assert walls_there(0.8 * score)
     assert not walls_there(min(1.0, 1.001 * score))

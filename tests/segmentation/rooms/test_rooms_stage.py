@@ -10,6 +10,7 @@ from rose2_logs.segmentation.rooms.borders import adopt_left_out, settle_borders
 from rose2_logs.segmentation.rooms.doorways import find_doorways
 from rose2_logs.segmentation.rooms.stage import finish_rooms
 from rose2_logs.segmentation.rose.stage import find_structure
+from rose2_logs.segmentation.walls.stage import WallCounter
 from rose2_logs.segmentation.walls.strips import WallCells
 
 PARAMETERS, TOPOLOGY = FloorPlanParameters(), TopologyParameters()
@@ -58,8 +59,10 @@ def test_finished_rooms_have_no_strips_along_the_other_side_of_a_wall():
     floor = draw_floor([(0, 0, 5, 4), (5.2, 0, 10.2, 4)], [(5, 1.5, 5.2, 2.4)], wall_m=0.2)
     free, occupied, parameters = floor.cells == 0, floor.cells > 0, Parameters()
     scored = find_structure(occupied, floor.resolution_m, parameters.spectrum)
-    supported = WallCells(scored.supported, scored.directions_rad, floor.resolution_m)
-    built = generous_walls(scored, supported, parameters)
+    count_walls = WallCounter(
+        WallCells(scored.supported, scored.directions_rad, floor.resolution_m), parameters.walls
+    )
+    built = generous_walls(scored, count_walls, parameters)
     plan = generous_floor_plan(built, free, 0.0, floor.resolution_m, parameters)
     labels = floor.rooms.astype(np.int32)
     right = np.flatnonzero((labels == labels.max()).any(0))[0]
