@@ -33,6 +33,7 @@ rose2_msgs/Room[] rooms
 """
 ROOM_DEFINITION = """\
 uint32 track                # identity of the room over the run, never used again
+string name                 # that was given to it; empty where none was
 float64 area                # m2 of its known free cells
 float64 predicted_area      # m2 of its shape, the unseen part included
 geometry_msgs/Point label_point
@@ -196,6 +197,7 @@ class MessageMaker:
         for track, number in sorted(zip(tracks, range(1, len(rooms) + 1), strict=True)):
             shape = rooms.polygons[number - 1]
             message.numbers("I", track)
+            message.string(step.given_name(number - 1))
             message.numbers("d", float(rooms.areas_m2[number - 1]), shape.area, *points[number - 1], 0.0)
             rings = rooms.outer_rings_m[number - 1]
             message.numbers("I", len(rings))
