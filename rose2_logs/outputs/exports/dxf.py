@@ -14,7 +14,9 @@ from rose2_logs.model.room_plan import RoomPlan, predicted_parts, wall_outlines
 from rose2_logs.system.files import replacing
 
 if TYPE_CHECKING:
+    from ezdxf.document import Drawing
     from ezdxf.layouts.layout import Modelspace
+    from ezdxf.math import BoundingBox
 
 VERSION = "R2010"
 """Read by every CAD program in use; the first release with true colors on all entities."""
@@ -27,6 +29,8 @@ LABEL_RISE_M = 0.75 * TEXT_HEIGHT_M
 """The two lines of a label are centered this far above and below its point, half a line apart."""
 MARGIN = 1.05
 """Of the view that a file is opened with, over all that is drawn."""
+VIEW_ASPECT = 4 / 3
+"""Width over height of this view: few windows are narrower, and in a wider one there is space at the sides."""
 HATCH_PATTERN, HATCH_SCALE = "ANSI31", 0.08
 """Lines at 45 degrees, about a quarter of a meter apart."""
 
@@ -39,7 +43,7 @@ def write_dxf(plan: RoomPlan, path: Path) -> None:
     OutputError
         If the file cannot be written.
     """
-    from ezdxf import bbox, options, units, zoom  # type: ignore[attr-defined]
+    from ezdxf import bbox, options, units  # type: ignore[attr-defined]
     from ezdxf.filemanagement import new
 
     # Without this the file would contain the time and random numbers; the same plan must give the same file.
@@ -54,7 +58,7 @@ def write_dxf(plan: RoomPlan, path: Path) -> None:
         if drawn.has_data:
             # Programs open a file on the view in it; without one they show the surroundings of the origin.
             space.reset_extents(drawn.extmin, drawn.extmax)
-            zoom.center(space, drawn.center, drawn.size * MARGIN)
+            _open_on(document, drawn)
         # By default ezdxf lists the classes in the order of a set, which changes from run to run.
         for name in sorted(document.entitydb.dxf_types_in_use()):
             document.classes.add_class(name)
@@ -62,6 +66,19 @@ def write_dxf(plan: RoomPlan, path: Path) -> None:
             document.saveas(part)
     finally:
         options.write_fixed_meta_data_for_testing = fixed
+
+
+def _open_on(document: Drawing, drawn: BoundingBox) -> None:
+    """Set the view of the model to all that is drawn.
+
+    The center of a view is told relative to its target, and the target in the world. LibreCAD 2.2 knows no
+    target and puts the upper right corner of its window at twice the center. So the center is half of the
+    view's upper right corner, and the target says the rest to all programs that follow the definition.
+    """
+    size, middle = drawn.size.vec2 * MARGIN, drawn.center.vec2
+    center = (middle + size / 2) / 2
+    view = {"aspect_ratio": VIEW_ASPECT, "target": (middle - center).vec3}
+    document.set_modelspace_vport(max(size.y, size.x / VIEW_ASPECT), center, dxfattribs=view)
 
 
 def _draw(plan: RoomPlan, space: Modelspace) -> None:

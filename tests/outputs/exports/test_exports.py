@@ -112,8 +112,17 @@ def test_dxf_opens_on_the_plan(plan, tmp_path: Path):
     x0, y0, x1, y1 = plan.bounds_m
     assert [*low, *high] == pytest.approx([x0, y0, x1, y1], abs=0.1)
     (view,) = document.viewports.get("*Active")
-    assert list(view.dxf.center.vec2) == pytest.approx((low + high) / 2, abs=0.01)
-    assert (high - low)[1] <= view.dxf.height <= 1.1 * max((high - low)[1], (high - low)[0] / 2)
+    seen = np.array([view.dxf.height * view.dxf.aspect_ratio, view.dxf.height])
+    size = high - low
+    # The center is relative to the target.
+    middle = np.array((view.dxf.target + view.dxf.center).vec2)
+    assert list(middle) == pytest.approx((low + high) / 2, abs=0.01)
+    assert (size <= seen).all()
+    assert (seen <= 1.1 * size).any()
+    # LibreCAD 2.2 knows no target, and has its upper right corner at twice the center.
+    corner = 2 * np.array(view.dxf.center.vec2)
+    assert (corner - seen <= low).all()
+    assert (corner >= high).all()
 
 
 def test_overlapping_segments_are_one_wall():
