@@ -20,19 +20,33 @@ class KindParameters(ParameterBlock):
     corridor_min_elongation: float = number(
         3.5,
         "1",
-        "Least length over width of a corridor; rooms seldom reach 3. Of the rectangle of the same area "
-        "and perimeter, so that corridors with bends count too.",
+        "Least length over width of a corridor; rooms seldom reach 3. Its width is that of the largest circle "
+        "within, and its length the area over the width, so that corridors with bends and rings count too.",
         1.0,
         1000.0,
     )
+    corridor_min_width_m: float = number(
+        0.8, "m", "Least width of a corridor: what is narrower is a niche, or what was seen through a gap.", 0.0, 50.0
+    )
     corridor_max_width_m: float = number(
-        4.0, "m", "Greatest width of a corridor: twice that of a wide one in an office.", 0.1, 50.0
+        4.5,
+        "m",
+        "Greatest width of a corridor, at its widest place: about that of two wide ones that meet.",
+        0.1,
+        50.0,
     )
     hall_min_m2: float = number(
         80.0, "m2", "Least area of a hall: more than a classroom or a living room.", 0.1, 1e6
     )
     closet_max_m2: float = number(
         3.0, "m2", "Greatest area of a closet: less than the smallest bedroom or bathroom.", 0.0, 1e6
+    )
+    island_max_m2: float = number(
+        20.0,
+        "m2",
+        "Smaller holes in a room are furniture; larger ones are parts of the building that it goes around.",
+        0.0,
+        1e6,
     )
     detail_m: float = number(
         0.5,

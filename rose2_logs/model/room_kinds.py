@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import shapely
 from shapely.geometry.base import BaseGeometry
 
@@ -32,27 +30,27 @@ def guess_kind(shape: BaseGeometry, parameters: KindParameters) -> str:
     """
     if shape.is_empty:
         return ""
-    length_m, width_m = _sides_m(_smooth(shape, parameters.detail_m))
-    is_long = length_m >= parameters.corridor_min_elongation * width_m
-    if is_long and width_m <= parameters.corridor_max_width_m:
+    smooth = _smooth(shape, parameters)
+    width_m = 2 * shapely.maximum_inscribed_circle(smooth, tolerance=parameters.detail_m / 10).length
+    is_long = smooth.area >= parameters.corridor_min_elongation * width_m**2
+    if is_long and parameters.corridor_min_width_m <= width_m <= parameters.corridor_max_width_m:
         return "corridor"
     if shape.area >= parameters.hall_min_m2:
         return "hall"
     return "closet" if shape.area <= parameters.closet_max_m2 else "room"
 
 
-def _smooth(shape: BaseGeometry, detail_m: float) -> BaseGeometry:
-    """Fill holes and notches of a shape, and take away what juts out, up to twice a detail in width."""
-    whole = shapely.union_all([shapely.Polygon(part.exterior) for part in shapely.get_parts(shape)])
+def _smooth(shape: BaseGeometry, parameters: KindParameters) -> BaseGeometry:
+    """Fill furniture, pillars and notches, and take away what juts out, up to twice a detail in width."""
+    detail_m = parameters.detail_m
+    whole = shapely.union_all([_filled(part, parameters) for part in shapely.get_parts(shape)])
     filled = whole.buffer(detail_m, join_style="mitre").buffer(-detail_m, join_style="mitre")
     smooth = filled.buffer(-detail_m, join_style="mitre").buffer(detail_m, join_style="mitre")
     # A shape that is nowhere wider than that stays.
     return smooth.simplify(detail_m) if smooth.area > filled.area / 2 else filled
 
 
-def _sides_m(shape: BaseGeometry) -> tuple[float, float]:
-    """Sides of the rectangle with the area and the perimeter of a shape, or of a square."""
-    half = shape.length / 4
-    apart = math.sqrt(max(half**2 - shape.area, 0.0))
-    side = math.sqrt(shape.area)
-    return (half + apart, half - apart) if apart > 0 else (side, side)
+def _filled(part: shapely.Polygon, parameters: KindParameters) -> shapely.Polygon:
+    """Fill the small holes of a polygon."""
+    holes = [hole for hole in part.interiors if shapely.Polygon(hole).area > parameters.island_max_m2]
+    return shapely.Polygon(part.exterior, holes)

@@ -39,12 +39,16 @@ def test_an_outline_that_reaches_a_little_into_a_room_does_not_name_it():
     [
         (shapely.box(0, 0, 20, 2), "corridor"),
         (shapely.union(shapely.box(0, 0, 12, 2), shapely.box(10, 0, 12, 12)), "corridor"),
+        (shapely.box(0, 0, 30, 20).difference(shapely.box(2, 2, 28, 18)), "corridor"),
         (shapely.box(0, 0, 30, 8), "hall"),
+        (shapely.box(0, 0, 12, 9).difference(shapely.box(3, 3, 7, 5)), "hall"),
+        (shapely.union(shapely.box(0, 0, 5, 9), shapely.box(0, 0, 9, 5)), "room"),
+        (shapely.box(0, 0, 4, 0.6), "closet"),
         (shapely.box(0, 0, 5, 4), "room"),
         (shapely.box(0, 0, 1.5, 1.2), "closet"),
         (shapely.Polygon(), ""),
     ],
-    ids=["straight", "bent", "wide", "square", "small", "empty"],
+    ids=["straight", "bent", "ring", "wide", "furnished", "bent and wide", "gap", "square", "small", "empty"],
 )
 def test_kinds_are_guessed_from_shapes(shape, kind):
     """Whatever the turn of the map, and however ragged the outline is by furniture."""
