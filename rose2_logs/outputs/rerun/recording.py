@@ -134,6 +134,11 @@ class RerunRecording(Sink):
         coverage_percent = self._percent(step.coverage, step.part)
         self._layers.begin(snapshot.log_time_ns, snapshot.stamp_ns, snapshot.index, coverage_percent)
         self._extent.add(step)
+        is_first = self._maps == 0
+        if is_first:
+            # For viewers that are live, or still load the file; the final layout comes at the end.
+            self._first_percent = coverage_percent
+            self._send_blueprint()
         self._world.log(step, view_side_m(self._extent.low_m, self._extent.high_m))
         self._lanes.add(self._layers.now, step.track_ids)
         self._log_curves(step)
@@ -141,11 +146,8 @@ class RerunRecording(Sink):
             if event.kind != "continued":
                 text = f"{percent(step.coverage, ' %')}: {event_text(event)}"
                 self._layers.add("/events", Entry(text, _event_level(event)))
-        if self._maps == 0:
-            self._first_percent = coverage_percent
-        if self._live and self._maps == 0:
-            # A live viewer shows the layout from the beginning; a file alone gets the final one.
-            self._send_blueprint()
+        if is_first:
+            self._log_legend()
         self._maps += 1
         self._flush()
 
@@ -167,6 +169,7 @@ class RerunRecording(Sink):
         text = rr.TextDocument(summary_text(self._info, summary, self._name_of), media_type="text/markdown")
         self._stream.log("/summary", text, static=True)
         if self._maps:
+            self._log_legend()
             self._send_blueprint()
         self._flush()
         self._stream.disconnect()
@@ -192,9 +195,11 @@ class RerunRecording(Sink):
         # A live viewer shows each snapshot at once.
         return Layers(self._stream, 0 if self._live else CHUNK_BYTES)
 
-    def _send_blueprint(self) -> None:
+    def _log_legend(self) -> None:
         shown = [layer for layer in self._wanted if layer != "path" or self._world.has_path]
         log_legend(self._stream, shown)
+
+    def _send_blueprint(self) -> None:
         blueprint = make_blueprint(
             self._extent.low_m,
             self._extent.high_m,

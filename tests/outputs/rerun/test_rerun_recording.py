@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 import threading
@@ -75,6 +76,16 @@ def test_rerun_finds_the_file_whole(recording):
         [BIN / "rerun", "rrd", "verify", recording], capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_a_viewer_that_still_loads_the_file_has_the_layout_already(recording):
+    """It stands before the first map, and once more at the end, when all that is to be in view is known."""
+    done = subprocess.run(
+        [BIN / "rerun", "rrd", "print", recording], capture_output=True, text=True, check=True
+    )
+    first, *_, last = (each.start() for each in re.finditer(r"^ +Blueprint,$", done.stdout, re.MULTILINE))
+    maps = [each.start() for each in re.finditer(r" - /world/map ", done.stdout)]
+    assert first < maps[0] < maps[-1] < last
 
 
 def test_the_logged_values_are_those_of_the_tables(result, recording):
