@@ -27,6 +27,8 @@ AXES_SHARE = 0.025
 AXES_M = 0.2
 """Their length in RViz and Foxglove at the scale 1, meters."""
 MAP_ALPHA = 0.7
+SHOWN = {name: name != "lines" for name in MARKER_LAYERS}
+"""Namespaces of markers that are on at first: the representative lines go on beyond the building."""
 TRANSIENT_LOCAL, VOLATILE = "Transient Local", "Volatile"
 RELIABLE, BEST_EFFORT = "Reliable", "Best Effort"
 
@@ -113,7 +115,7 @@ def foxglove_layout(scene: MapScene) -> dict[str, Any]:
         scene.map_topic: {"visible": True, "colorMode": "map", "alpha": MAP_ALPHA},
         "/rose2/markers": {
             "visible": True,
-            "namespaces": {name: {"visible": True} for name in MARKER_LAYERS},
+            "namespaces": {name: {"visible": shown} for name, shown in SHOWN.items()},
         },
         "/rose2/segmented_map": {"visible": False},
         "/rose2/clean_map": {"visible": False, "colorMode": "map"},
@@ -213,7 +215,7 @@ def rviz_config(scene: MapScene) -> dict[str, Any]:
             "Class": "rviz_default_plugins/MarkerArray",
             "Name": "Rooms",
             "Enabled": True,
-            "Namespaces": dict.fromkeys(MARKER_LAYERS, True),
+            "Namespaces": dict(SHOWN),
             "Topic": _rviz_topic("/rose2/markers", scene.qos),
             "Value": True,
         },
