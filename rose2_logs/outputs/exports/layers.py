@@ -65,7 +65,7 @@ LAYERS = {
 }
 """Layers by name."""
 ENDINGS = tuple(f".{name}.{ending}" for name in LAYERS for ending in ("geojson", "qml"))
-LABEL = "name || '\\n' || round(area_m2, 1) || ' m²'"
+LABEL = "name || '\\n' || format_number(area_m2, 1) || ' m²'"
 """Expression of QGIS for the label of a room."""
 LABEL_SIZE_PT = 9
 

@@ -54,6 +54,7 @@ def make_blueprint(
     *,
     back_projected: bool = False,
     first_percent: int = 0,
+    most_rooms: int = 0,
 ) -> rrb.Blueprint:
     """Map from above and a tab per stage of the method; next to it curves, summary, room lanes, events.
 
@@ -69,6 +70,8 @@ def make_blueprint(
         Whether it has the back-projected rooms.
     first_percent : int
         Coverage of the first map, where playing begins.
+    most_rooms : int
+        Greatest number of rooms of a map; 0 if it is not known.
     """
     stages = (
         ("Rooms", (), ()),
@@ -101,7 +104,7 @@ def make_blueprint(
                 row_shares=[1 - SIGNS_SHARE, SIGNS_SHARE],
             ),
             rrb.Vertical(
-                rrb.Tabs(*_curve_views(back_projected), active_tab=0),
+                rrb.Tabs(*_curve_views(back_projected, most_rooms), active_tab=0),
                 rrb.Tabs(
                     rrb.TextDocumentView(name="Summary", origin="/summary"),
                     rrb.StateTimelineView(name="Room history", origin=LANES, time_view=_axis()),
@@ -190,7 +193,7 @@ def _axis() -> rrb.archetypes.TimeAxis:
     return rrb.archetypes.TimeAxis(link="Independent", view_range=whole_run)
 
 
-def _curve_views(back_projected: bool) -> list[rrb.View | rrb.Container]:
+def _curve_views(back_projected: bool, most_rooms: int) -> list[rrb.View | rrb.Container]:
     """Views of everything that is a curve, what matters most first."""
     agreement = "Agreement with the final layout"
     paths = ("/run/coverage", FINAL_SHARE, KNOWN_FINAL_SHARE, FINAL_IOU, SHIFTS)
@@ -205,7 +208,13 @@ def _curve_views(back_projected: bool) -> list[rrb.View | rrb.Container]:
     ]
     if back_projected:
         views.append(_curves("Seen share, %", (f"{SEEN_SHARE}/**",)))
-    return [*views, _curves("Room count", ("/run/rooms",)), _curves("Change", ("/run/variation_bits",))]
+    # From 0 on, so that also a small plot has two figures beside its axis.
+    count_span = (0.0, 1.05 * most_rooms) if most_rooms else None
+    return [
+        *views,
+        _curves("Room count", ("/run/rooms",), count_span),
+        _curves("Change", ("/run/variation_bits",)),
+    ]
 
 
 def _curves(

@@ -91,7 +91,7 @@ class RerunRecording(Sink):
         self._known: set[int] = set()
         self._back_projected: BackProjectedWorld | None = None
         self._extent = Extent()
-        self._maps, self._first_percent = 0, 0
+        self._maps, self._first_percent, self._most_rooms = 0, 0, 0
         self._parts: list[int | None] = []
 
     def begin(self, info: RunInfo) -> None:
@@ -134,6 +134,7 @@ class RerunRecording(Sink):
         coverage_percent = self._percent(step.coverage, step.part)
         self._layers.begin(snapshot.log_time_ns, snapshot.stamp_ns, snapshot.index, coverage_percent)
         self._extent.add(step)
+        self._most_rooms = max(self._most_rooms, len(step.track_ids))
         is_first = self._maps == 0
         if is_first:
             # For viewers that are live, or still load the file; the final layout comes at the end.
@@ -206,6 +207,7 @@ class RerunRecording(Sink):
             self._wanted,
             back_projected=self._back_projected is not None,
             first_percent=self._first_percent - 100 * (len(self._parts) - 1),
+            most_rooms=self._most_rooms,
         )
         self._stream.send_blueprint(blueprint)
 
