@@ -20,13 +20,17 @@ class KindParameters(ParameterBlock):
     corridor_min_elongation: float = number(
         3.5,
         "1",
-        "Least length over width of a corridor; rooms seldom reach 3. Its width is that of the largest circle "
-        "within, and its length the area over the width, so that corridors with bends and rings count too.",
+        "Least length over width of a corridor; rooms seldom reach 3. The width is of the largest circle "
+        "in it, the length its area over this width, so that corridors with bends and rings count too.",
         1.0,
         1000.0,
     )
     corridor_min_width_m: float = number(
-        0.8, "m", "Least width of a corridor: what is narrower is a niche, or what was seen through a gap.", 0.0, 50.0
+        0.8,
+        "m",
+        "Least width of a corridor: what is narrower is a niche, or what was seen through a gap.",
+        0.0,
+        50.0,
     )
     corridor_max_width_m: float = number(
         4.5,

@@ -30,7 +30,7 @@ LABEL_RISE_M = 0.75 * TEXT_HEIGHT_M
 MARGIN = 1.05
 """Of the view that a file is opened with, over all that is drawn."""
 VIEW_ASPECT = 4 / 3
-"""Width over height of this view: few windows are narrower, and in a wider one there is space at the sides."""
+"""Width over height of this view: few windows are narrower, and wider ones have space at the sides."""
 HATCH_PATTERN, HATCH_SCALE = "ANSI31", 0.08
 """Lines at 45 degrees, about a quarter of a meter apart."""
 
