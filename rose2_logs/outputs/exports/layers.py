@@ -13,6 +13,9 @@ from rose2_logs.outputs.exports.geojson import feature_collection, plan_features
 from rose2_logs.runs.summary import write_json
 from rose2_logs.system.files import replacing
 
+NORMAL, MULTIPLIED = 0, 6
+"""QGIS's numbers of ways to lay one layer over another."""
+
 
 @dataclass(frozen=True)
 class Layer:
@@ -30,6 +33,8 @@ class Layer:
         Which of them is the color of the room.
     opacity : float
         Of the whole, in [0, 1].
+    blending : int
+        How it is laid over the layers below, `NORMAL` or `MULTIPLIED`.
     """
 
     kind: str
@@ -38,6 +43,7 @@ class Layer:
     properties: dict[str, str]
     colored: str = ""
     opacity: float = 1.0
+    blending: int = NORMAL
 
 
 def _rgba(color: Color) -> str:
@@ -52,6 +58,8 @@ LAYERS = {
         {"style": "solid", "outline_color": "80,80,80,255", "outline_width": "0.2"},
         "fillColor",
         SEEN_OPACITY,
+        # Doorways are seen through it: files dragged into QGIS lie in the order of their names.
+        MULTIPLIED,
     ),
     "unseen": Layer(
         "predicted", "fill", "SimpleFill", {"style": "b_diagonal", "outline_style": "no"}, "fillColor"
@@ -111,5 +119,6 @@ def _style(layer: Layer) -> str:
         f'<qgis version="3.22" styleCategories="Symbology|Labeling" labelsEnabled="{int(bool(labels))}">\n'
         f'<renderer-v2 type="singleSymbol"><symbols><symbol name="0" type="{layer.symbol}" '
         f'alpha="{layer.opacity:g}"><layer class="{layer.simple}" enabled="1" locked="0" pass="0">'
-        f"{properties}{colored}</layer></symbol></symbols></renderer-v2>\n{labels}\n</qgis>\n"
+        f"{properties}{colored}</layer></symbol></symbols></renderer-v2>\n{labels}\n"
+        f"<blendMode>{layer.blending}</blendMode>\n</qgis>\n"
     )

@@ -149,6 +149,8 @@ def test_layers_hold_one_kind_of_thing_each(plan, tmp_path: Path):
         style = ET.parse(tmp_path / f"two.{name}.qml")
         colored = [each for each in style.iter("Option") if each.get("value") == "color"]
         assert len(colored) == (layer.kind in ("room", "predicted"))
+        # What lies below the rooms is seen through them.
+        assert style.findtext("blendMode") == ("6" if layer.kind == "room" else "0")
         assert all("color" in each["properties"] for each in collection["features"]) == bool(colored)
     everything = json.loads(whole.read_text())["features"]
     assert sorted(found, key=lambda each: each["id"]) == sorted(everything, key=lambda each: each["id"])
