@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import shapely
 from shapely.geometry.base import BaseGeometry
 
@@ -30,20 +32,39 @@ def guess_kind(shape: BaseGeometry, parameters: KindParameters) -> str:
     """
     if shape.is_empty:
         return ""
-    smooth = _smooth(shape, parameters)
-    width_m = 2 * shapely.maximum_inscribed_circle(smooth, tolerance=parameters.detail_m / 10).length
-    is_long = smooth.area >= parameters.corridor_min_elongation * width_m**2
-    if is_long and parameters.corridor_min_width_m <= width_m <= parameters.corridor_max_width_m:
+    if not _is_compact(shape, parameters.corridor_min_elongation) and _is_corridor(shape, parameters):
         return "corridor"
     if shape.area >= parameters.hall_min_m2:
         return "hall"
     return "closet" if shape.area <= parameters.closet_max_m2 else "room"
 
 
+def _is_compact(shape: BaseGeometry, elongation: float) -> bool:
+    """Whether a shape has more area for its perimeter than any that is so elongated, as most rooms have.
+
+    An area A around a largest circle of width w has a perimeter of at least 2 A / w + pi w / 2 (Bonnesen).
+    """
+    least = (2 * elongation + math.pi / 2) ** 2 / elongation
+    return bool(shape.length**2 < least * shape.area)
+
+
+def _is_corridor(shape: BaseGeometry, parameters: KindParameters) -> bool:
+    smooth = _smooth(shape, parameters)
+    width_m = 2 * shapely.maximum_inscribed_circle(smooth, tolerance=parameters.detail_m / 10).length
+    is_long = smooth.area >= parameters.corridor_min_elongation * width_m**2
+    return bool(is_long and parameters.corridor_min_width_m <= width_m <= parameters.corridor_max_width_m)
+
+
 def _smooth(shape: BaseGeometry, parameters: KindParameters) -> BaseGeometry:
-    """Fill furniture, pillars and notches, and take away what juts out, up to twice a detail in width."""
+    """Fill furniture, pillars and notches, and take away what juts out, up to twice a detail in width.
+
+    Of a shape in many pieces, specks that are smaller than a detail do not count.
+    """
     detail_m = parameters.detail_m
-    whole = shapely.union_all([_filled(part, parameters) for part in shapely.get_parts(shape)])
+    parts = shapely.get_parts(shape)
+    areas = shapely.area(parts)
+    large = parts[areas >= min(detail_m**2, areas.max())]
+    whole = shapely.union_all([_filled(part, parameters) for part in large])
     filled = whole.buffer(detail_m, join_style="mitre").buffer(-detail_m, join_style="mitre")
     smooth = filled.buffer(-detail_m, join_style="mitre").buffer(detail_m, join_style="mitre")
     # A shape that is nowhere wider than that stays.
