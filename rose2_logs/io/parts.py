@@ -316,10 +316,11 @@ def _is_continued(before: _Seen, now: Grid, occupancy: OccupancyParameters) -> b
     floor = _around(now, before.floor_m, 0.0)
     if np.count_nonzero(floor != UNKNOWN) < FALLEN_SHARE * len(floor):
         return False
-    around = _around(now, before.walls_m, WALL_REACH_M)
-    free, occupied = classify(around, occupancy)
-    near = occupied.any(axis=1)
-    shown = near | free[:, free.shape[1] // 2]
+    free, near = (each[:, 0] for each in classify(_around(now, before.walls_m, 0.0), occupancy))
+    # Most walls are where they were: only around the others is more to look at.
+    away = np.flatnonzero(~near)
+    near[away] = classify(_around(now, before.walls_m[away], WALL_REACH_M), occupancy)[1].any(axis=1)
+    shown = near | free
     if np.count_nonzero(shown) < LEAST_WALL_CELLS:
         return True
     return bool(np.count_nonzero(near) >= SAME_WALLS_SHARE * np.count_nonzero(shown))
