@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 PIPE_WIDTH = 120
 """Columns of tables that do not go to a terminal."""
 
-_out = Console(highlight=False, width=None if sys.stdout.isatty() else PIPE_WIDTH)
+_out = Console(highlight=False, emoji=False, width=None if sys.stdout.isatty() else PIPE_WIDTH)
 
 
 def print_line(markup: str, to_error: bool = False) -> None:
