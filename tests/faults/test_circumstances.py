@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shlex
 import shutil
 import subprocess
 import sys
@@ -76,6 +77,23 @@ def test_too_little_for_python_is_no_endless_wait(log: Path, tmp_path: Path, lim
     )
     assert done.returncode != 0
     assert not list(tmp_path.rglob("summary.json"))
+
+
+@pytest.mark.parametrize("kind", ["size=4k", "ro"])
+def test_without_space_in_shared_memory_a_line_says_what_helps(log: Path, tmp_path: Path, kind: str):
+    """Not even the semaphores of worker processes can be made then; one process needs none."""
+    shell = f'mount -t tmpfs -o {kind} tmpfs /dev/shm; exec "$@"'
+    own = ["unshare", "-m", "bash", "-c", shell, "-"]
+    if subprocess.run([*own, "true"], capture_output=True, check=False).returncode:
+        pytest.skip("this user may mount nothing")
+    command = ("analyze", log, "-o", tmp_path / "out", *QUICK)
+    done = run(f"exec {shlex.join(own)} \"$@\"", *command, "--workers", 2)
+    assert (done.returncode, len(errors(done.stderr))) == (2, 1)
+    assert "worker processes cannot start" in done.stderr
+    assert "take --workers 1" in done.stderr
+    assert not (tmp_path / "out").exists()
+    done = run(f"exec {shlex.join(own)} \"$@\"", *command)
+    assert (done.returncode, errors(done.stderr)) == (0, [])
 
 
 def test_an_output_that_is_full_is_told(log: Path, tmp_path: Path):
