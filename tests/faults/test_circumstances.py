@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shlex
 import shutil
 import subprocess
@@ -14,6 +15,8 @@ import pytest
 from commands import ROSE2_LOGS, WAIT_S, started, wait_for
 from finished_runs import SAMPLE_LOGS
 from saved_maps import save_run
+
+from rose2_logs.outputs.exports.formats import FORMATS
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="needs a shell and limits of POSIX")
 QUICK = ("--no-rrd", "--no-mcap")
@@ -66,6 +69,24 @@ def test_results_are_whole_all_the_same(log: Path, tmp_path: Path, shell: str, e
     assert (done.returncode, errors(done.stderr)) == (0, [])
     assert is_whole(tmp_path / "out" / "mapy č 3")
     assert sorted(path.name for path in named.iterdir()) == before
+
+
+@pytest.mark.parametrize(
+    ("limit", "told"),
+    [("ulimit -v 3000000", "addresses"), ("ulimit -n 24", "open files"), ("ulimit -f 9000", "files may have")],
+)
+def test_rerun_is_not_started_where_it_would_end_the_process(
+    log: Path, tmp_path: Path, office_results: Path, limit: str, told: str
+):
+    """Or wait for ever; one line says what it needs, and nothing stays of the results."""
+    done = run(f'{limit}; exec "$@"', "analyze", log, "-o", tmp_path / "out", "--no-mcap")
+    assert (done.returncode, len(errors(done.stderr))) == (2, 1), done.stderr
+    assert told in done.stderr
+    assert not list(tmp_path.rglob("*.rrd*")) + list(tmp_path.rglob("*.part"))
+    command = ("compare", office_results, office_results, "-o", tmp_path / "compared")
+    done = run(f'{limit}; exec "$@"', *command)
+    assert (done.returncode, len(errors(done.stderr))) == (2, 1), done.stderr
+    assert "comparison.rrd" in done.stderr
 
 
 @pytest.mark.parametrize("limit", ["ulimit -v 200000", "ulimit -n 8"])
@@ -134,6 +155,37 @@ def test_a_full_disk_is_one_line_at_whatever_output(tmp_path: Path, kilobytes: i
         assert (done.returncode, len(errors(done.stderr))) == (2, 1), done.stderr
         assert str(disk) in done.stderr
         assert not list(disk.rglob("summary.json"))
+    finally:
+        subprocess.run(["umount", "-l", str(disk)], check=True)
+
+
+@pytest.mark.parametrize(
+    ("command", "kilobytes"),
+    [
+        (("report", "RUN", "-o", "DISK/page.html"), 8),
+        (("figure", "RUN", "-o", "DISK/plan.png"), 8),
+        *((("export", "RUN", "--format", name, "-o", "DISK/plans"), 4) for name in FORMATS),
+        (("compare", "RUN", "RUN", "-o", "DISK/compared"), 8),
+        (("compare", "RUN", "RUN", "-o", "DISK/compared"), 800),
+        (("segment", SAMPLE_LOGS / "office.rooms.png", "--resolution", "0.05", "-o", "DISK/rooms"), 4),
+        (("batch", SAMPLE_LOGS / "office.mcap", "-o", "DISK/all", *QUICK, "--max-snapshots", "1"), 60),
+    ],
+    ids=lambda value: " ".join(map(str, value[:1] + value[2:4])) if isinstance(value, tuple) else None,
+)
+def test_every_command_tells_of_a_full_disk(
+    tmp_path: Path, office_results: Path, command: tuple[object, ...], kilobytes: int
+):
+    """In one line that names the file, without an end that never comes; no half file stays."""
+    disk = tmp_path / "disk"
+    if not mounted(disk, kilobytes):
+        pytest.skip("this user may mount nothing")
+    places = {"RUN": str(office_results), "DISK": str(disk)}
+    words = [re.sub("RUN|DISK", lambda found: places[found[0]], str(word)) for word in command]
+    try:
+        done = run(f'exec timeout -k 1 {WAIT_S} "$@"', *words)
+        assert (done.returncode, len(errors(done.stderr))) == (2, 1), done.stderr
+        assert str(disk) in errors(done.stderr)[0]
+        assert not list(disk.rglob("*.part"))
     finally:
         subprocess.run(["umount", "-l", str(disk)], check=True)
 
