@@ -7,6 +7,7 @@ import os
 import re
 import shlex
 import shutil
+import sqlite3
 import subprocess
 import sys
 from pathlib import Path
@@ -203,6 +204,49 @@ def test_a_log_that_is_still_written_is_read_as_far_as_it_is(tmp_path: Path):
     assert (process.returncode, errors(err)) == (0, [])
     assert "warning: " in err
     assert is_whole(tmp_path / "out" / "growing")
+
+
+def test_a_bag_that_rosbag_still_writes_is_read_by_its_name_of_then(tmp_path: Path):
+    whole = (SAMPLE_LOGS / "wing.bag").read_bytes()
+    growing = tmp_path / "wing.bag.active"
+    growing.write_bytes(whole[: len(whole) // 2])
+    done = run('exec "$@"', "info", growing)
+    assert (done.returncode, errors(done.stderr)) == (0, [])
+    assert "everything before is read" in done.stderr
+
+
+def test_a_database_that_is_still_written_is_read_without_its_journal(tmp_path: Path):
+    """The recorder holds it open and writes; nothing of its files is touched."""
+    bag = shutil.copytree(SAMPLE_LOGS / "ring", tmp_path / "ring")
+    (database,) = bag.glob("*.db3")
+    recorder = sqlite3.connect(database)
+    recorder.execute("pragma journal_mode=wal")
+    recorder.execute("pragma wal_autocheckpoint=0")
+    recorder.execute(
+        "insert into messages select max(id) + 1, topic_id, max(timestamp) + 1000, data from messages"
+    )
+    recorder.commit()
+    before = {path.name: path.read_bytes() for path in bag.iterdir()}
+    done = run('exec "$@"', "info", bag)
+    assert (done.returncode, errors(done.stderr)) == (0, [])
+    assert "contains messages that are not in the database yet" in done.stderr
+    assert {path.name: path.read_bytes() for path in bag.iterdir()} == before
+    recorder.close()
+
+
+def test_a_second_run_to_a_folder_ends_and_the_first_goes_on(tmp_path: Path):
+    many, out = save_run(tmp_path / "maps", tuple(range(100, 240, 10))), tmp_path / "out"
+    command = ("analyze", many, "-o", out, *QUICK)
+    with started(*ROSE2_LOGS, *command) as process:
+        wait_for(lambda: list(out.rglob("*.part")))
+        for options in ((), ("--overwrite",), ("--resume",)):
+            done = run('exec "$@"', *command, *options)
+            if process.poll() is None:
+                assert (done.returncode, len(errors(done.stderr))) == (2, 1)
+                assert "another run is writing to this folder; wait for it, or name another" in done.stderr
+        _, err = process.communicate(timeout=WAIT_S)
+    assert (process.returncode, errors(err)) == (0, [])
+    assert is_whole(out / "maps")
 
 
 @pytest.mark.parametrize("name", ["two\nlines", "n" * 255, "n" * 230], ids=["line break", "255", "230"])
