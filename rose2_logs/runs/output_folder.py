@@ -103,7 +103,10 @@ class OutputFolder:
         facts = json.loads(json.dumps(facts))
         with writing(self._folder):
             self._work.parent.mkdir(parents=True, exist_ok=True)
-        with locked(self._lock, f"{self._folder}: another run is writing to this folder; wait for it, or name another folder"):
+        with locked(
+            self._lock,
+            f"{self._folder}: another run is writing to this folder; wait for it, or name another folder",
+        ):
             journal = Journal(self._journal, facts, self._kept(facts, overwrite, resume))
             try:
                 with self._told_by_final_name(), journal:

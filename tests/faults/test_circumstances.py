@@ -74,7 +74,11 @@ def test_results_are_whole_all_the_same(log: Path, tmp_path: Path, shell: str, e
 
 @pytest.mark.parametrize(
     ("limit", "told"),
-    [("ulimit -v 3000000", "addresses"), ("ulimit -n 24", "open files"), ("ulimit -f 9000", "files may have")],
+    [
+        ("ulimit -v 3000000", "addresses"),
+        ("ulimit -n 24", "open files"),
+        ("ulimit -f 9000", "files may have"),
+    ],
 )
 def test_rerun_is_not_started_where_it_would_end_the_process(
     log: Path, tmp_path: Path, office_results: Path, limit: str, told: str
@@ -109,12 +113,12 @@ def test_without_space_in_shared_memory_a_line_says_what_helps(log: Path, tmp_pa
     if subprocess.run([*own, "true"], capture_output=True, check=False).returncode:
         pytest.skip("this user may mount nothing")
     command = ("analyze", log, "-o", tmp_path / "out", *QUICK)
-    done = run(f"exec {shlex.join(own)} \"$@\"", *command, "--workers", 2)
+    done = run(f'exec {shlex.join(own)} "$@"', *command, "--workers", 2)
     assert (done.returncode, len(errors(done.stderr))) == (2, 1)
     assert "worker processes cannot start" in done.stderr
     assert "take --workers 1" in done.stderr
     assert not (tmp_path / "out").exists()
-    done = run(f"exec {shlex.join(own)} \"$@\"", *command)
+    done = run(f'exec {shlex.join(own)} "$@"', *command)
     assert (done.returncode, errors(done.stderr)) == (0, [])
 
 

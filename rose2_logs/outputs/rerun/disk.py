@@ -1,4 +1,4 @@
-"""What Rerun's writer of files needs around it: where it cannot write, it waits without end or ends Python."""
+"""What Rerun's writer of files needs around it: where it cannot write, it waits for ever or ends Python."""
 
 from __future__ import annotations
 
