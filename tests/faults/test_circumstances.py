@@ -278,3 +278,5 @@ def test_an_annotated_log_can_be_analyzed_again(tmp_path: Path):
     one, two = (json.loads(path.read_text()) for path in sorted(tmp_path.glob("*/*/summary.json")))
     assert one["topic"] == two["topic"]
     assert one["results"] == two["results"]
+    for table in (tmp_path / "one" / "office").glob("*.parquet"):
+        assert table.read_bytes() == (tmp_path / "two" / "office.rose2" / table.name).read_bytes()
