@@ -56,12 +56,15 @@ def is_whole(folder: Path) -> bool:
         ("ulimit -n 64; exec \"$@\"", {}),
         ("ulimit -v 6000000; exec \"$@\"", {}),
         ('exec "$@"', {"TMPDIR": "/there/is/no/such/folder"}),
+        ('exec "$@"', {"TMPDIR": "/proc"}),
         ('exec "$@"', {"LC_ALL": "C", "LANG": "C", "PYTHONIOENCODING": ""}),
         ('exec "$@" >&-', {}),
         ('exec "$@" >&- 2>&-', {}),
+        ('exec "$@" <&-', {}),
         ('set -o pipefail; "$@" | head -c 1 >/dev/null; true', {}),
     ],
-    ids=["few files", "little memory", "no TMPDIR", "C locale", "no stdout", "no outputs", "head"],
+    ids=["few files", "little memory", "no TMPDIR", "TMPDIR not writable", "C locale", "no stdout",
+         "no outputs", "no stdin", "head"],
 )  # fmt: skip
 def test_results_are_whole_all_the_same(log: Path, tmp_path: Path, shell: str, environment: dict[str, str]):
     named = shutil.copytree(log, tmp_path / "mapy č 3")
