@@ -78,7 +78,7 @@ class StoredRun:
         require_utf8(folder)
         self.summary: dict[str, Any] = _read_summary(folder)
         self.part = part
-        maps = self.summary["results"]["snapshots"]
+        whole = self.summary["results"]
         if part is not None:
             of_part = next((each for each in self._parts if each["part"] == part), None)
             if of_part is None:
@@ -89,7 +89,7 @@ class StoredRun:
         self._require_parameters()
         for name in (*TABLES, *([BACK_PROJECTED] if self.is_back_projected else ())):
             self._schema(name)
-        self._require_maps(maps)
+        self._require_rows(whole)
 
     @property
     def parts(self) -> tuple[int, ...]:
@@ -126,17 +126,18 @@ class StoredRun:
                         f"{path}: its parameters.{block}.{name} is missing; {MAKE_AGAIN}", file=path
                     )
 
-    def _require_maps(self, count: int) -> None:
-        """Refuse tables that have not one row for each map of the run."""
+    def _require_rows(self, results: dict[str, Any]) -> None:
+        """Refuse tables that have not one row for each map, track and event of the whole run's results."""
         import pyarrow.parquet as pq
 
-        for name in ("snapshots", "maps"):
+        maps, tracks, events = results["snapshots"], results["tracks"], sum(results["events"].values())
+        for name, count in {"snapshots": maps, "maps": maps, "tracks": tracks, "events": events}.items():
             path = self.folder / f"{name}.parquet"
             with _reading(path):
                 held = pq.read_metadata(path).num_rows
             if held != count:
-                maps = counted(held, "map") if held else "no map"
-                text = f"{path}: holds {maps}, not {count} as {SUMMARY} says; {MAKE_AGAIN}"
+                rows = counted(held, "row") if held else "no map" if name == "snapshots" else "no row"
+                text = f"{path}: holds {rows}, not {count} as {SUMMARY} says; {MAKE_AGAIN}"
                 raise ResultsError(text, file=path)
 
     @cached_property
