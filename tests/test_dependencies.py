@@ -33,7 +33,7 @@ def bounded(requirements: list[Requirement]) -> list[Requirement]:
 
 
 EVERYTHING = bounded([*DIRECT, *BUILD, *OPTIONAL])
-WITH_LOWEST = bounded([*DIRECT, *BUILD, *EXTRAS["batch"], *EXTRAS["test"], *EXTRAS["docs"]])
+WITH_LOWEST = bounded([*DIRECT, *BUILD, *EXTRAS["batch"], *EXTRAS["dxf"], *EXTRAS["test"], *EXTRAS["docs"]])
 
 
 def pins(name: str) -> dict[str, list[Version]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import re
 import sys
 from contextlib import suppress
 from typing import Annotated, Any
@@ -49,6 +50,10 @@ COMMANDS = {
     ),
 }
 """Each command: its module in the folder ``commands``, and what it does, told without importing it."""
+
+
+NO_THREAD = re.compile("can't start new thread|Failed to launch worker thread")
+"""What Python and Arrow say where memory, addresses or processes are limited."""
 
 
 class Commands(Group):
@@ -128,6 +133,9 @@ def main() -> None:
     except Exception as error:
         if messages.style.debug:
             raise
+        if NO_THREAD.search(str(error)):
+            messages.error(f"the system starts no further thread ({error}); allow more: ulimit -v, ulimit -u")
+            sys.exit(EXIT_KNOWN)
         messages.error(f"{type(error).__name__}: {error} (internal error of rose2-logs; --debug shows where)")
         sys.exit(EXIT_FAULT)
 

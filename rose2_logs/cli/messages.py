@@ -20,7 +20,7 @@ SHOWN_OF_KIND = 3
 """Warnings of one kind that are shown; a log with a thousand damaged messages has a thousand more."""
 STYLES = {"info": "cyan", "warning": "yellow", "error": "bold red"}
 
-errors = Console(stderr=True, highlight=False)
+errors = Console(stderr=True, highlight=False, emoji=False)
 """Where messages and progress go."""
 
 

@@ -20,7 +20,13 @@ if TYPE_CHECKING:
 PIPE_WIDTH = 120
 """Columns of tables that do not go to a terminal."""
 
-_out = Console(highlight=False, width=None if sys.stdout.isatty() else PIPE_WIDTH)
+_out = Console(highlight=False, emoji=False, width=None if sys.stdout.isatty() else PIPE_WIDTH)
+
+
+def shown(name: str | Path) -> str:
+    """Return the name of a file or folder as markup, in one line and without what would steer a terminal."""
+    signs = (" " if each in "\n\r\t" else each for each in str(name))
+    return escape("".join(each if each.isprintable() else "\ufffd" for each in signs))
 
 
 def print_line(markup: str, to_error: bool = False) -> None:
@@ -65,7 +71,7 @@ def progress_bar(text: str) -> Progress:
 
 def print_file(path: Path) -> None:
     """Print the path and size of a file that was written."""
-    _out.print(f"{escape(str(path))}  {megabytes(path.stat().st_size)}", soft_wrap=True)
+    _out.print(f"{shown(path)}  {megabytes(path.stat().st_size)}", soft_wrap=True)
 
 
 def megabytes(size_bytes: int) -> str:

@@ -10,7 +10,6 @@ import dataclasses
 import difflib
 import math
 import reprlib
-import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -551,6 +550,8 @@ def load_parameters(config: Path | None = None, settings: Iterable[str] = ()) ->
     """
     parameters = Parameters()
     if config is not None:
+        import tomllib
+
         try:
             parameters = parameters.replaced(tomllib.loads(config.read_text(encoding="utf-8")))
         except (OSError, ValueError, RecursionError) as error:
@@ -570,6 +571,8 @@ def load_parameters(config: Path | None = None, settings: Iterable[str] = ()) ->
 
 
 def _parsed_setting(setting: str) -> dict[str, Any]:
+    import tomllib
+
     try:
         return tomllib.loads(setting)
     except tomllib.TOMLDecodeError:

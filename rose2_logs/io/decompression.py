@@ -67,7 +67,7 @@ def decompress(
     limit = most_bytes if claimed_bytes is None else claimed_bytes
     try:
         plain = _BY_NAME[compression](data, limit, is_cut)
-    except (zstandard.ZstdError, OSError, EOFError, RuntimeError, MemoryError) as error:
+    except (zstandard.ZstdError, OSError, EOFError, RuntimeError) as error:
         raise ValueError(f"the {compression} data are damaged: {error}") from error
     if len(plain) > limit:
         raise TooLargeError(f"{len(data)} bytes decompress to more than {limit} bytes; {REMEDY}")

@@ -10,6 +10,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from rose2_logs.model.room_names import RoomNames
+from rose2_logs.system.packages import need
 
 NO_NAME = re.compile(r"[\d.,\s]*(m2|m²|sqm|qm)?", re.IGNORECASE)
 """Texts in rooms that are no names: areas, and numbers alone, as of doors and dimensions."""
@@ -26,7 +27,10 @@ def read_dxf_plan(path: Path) -> RoomNames:
     ------
     ValueError
         If it is no DXF that ezdxf can read.
+    MissingPackageError
+        If ezdxf is not installed.
     """
+    need("ezdxf", "DXF files", extra="dxf")
     import ezdxf
     from ezdxf import units
     from ezdxf.entities.lwpolyline import LWPolyline

@@ -20,7 +20,7 @@ from rose2_logs.errors import LogError
 from rose2_logs.io.grids import Decoder, Grid, Patch
 from rose2_logs.io.log_file import LATEST_NS, LogFile, Place
 from rose2_logs.io.messages import decoder
-from rose2_logs.io.source import LoggedBytes, LoggedMap, LogInfo, MessageSource, TopicInfo
+from rose2_logs.io.source import LoggedBytes, LoggedMap, LogInfo, MessageSource, TopicInfo, places_of
 from rose2_logs.system.text import apart
 from rose2_logs.system.warnings import log_warning
 
@@ -242,7 +242,7 @@ class FileLog(MessageSource):
         chosen = []
         for topic in topics:
             places = self._topic_places(topic)
-            for k in np.flatnonzero(np.isin(self.log_times(topic), times)):
+            for k in places_of(times, self.log_times(topic)):
                 chosen.append((*places[k], topic, int(k) + 1))
         for time, number, place, topic, index in sorted(chosen, key=lambda found: found[:3]):
             decode = partial(self._decode, number, place)

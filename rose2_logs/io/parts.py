@@ -229,8 +229,8 @@ def find_parts(
 
 def _spread(places: Sequence[int]) -> list[int]:
     """At most `LOOKED_AT` of the places, evenly, the first and the last among them."""
-    chosen = np.unique(np.linspace(0, len(places) - 1, LOOKED_AT).round().astype(int))
-    return [places[at] for at in chosen.tolist()]
+    chosen = np.linspace(0, len(places) - 1, LOOKED_AT).round().astype(int).tolist()
+    return [places[at] for at in dict.fromkeys(chosen)]
 
 
 def _returns(publishers: Sequence[str]) -> int:
@@ -316,10 +316,11 @@ def _is_continued(before: _Seen, now: Grid, occupancy: OccupancyParameters) -> b
     floor = _around(now, before.floor_m, 0.0)
     if np.count_nonzero(floor != UNKNOWN) < FALLEN_SHARE * len(floor):
         return False
-    around = _around(now, before.walls_m, WALL_REACH_M)
-    free, occupied = classify(around, occupancy)
-    near = occupied.any(axis=1)
-    shown = near | free[:, free.shape[1] // 2]
+    free, near = (each[:, 0] for each in classify(_around(now, before.walls_m, 0.0), occupancy))
+    # Most walls are where they were: only around the others is more to look at.
+    away = np.flatnonzero(~near)
+    near[away] = classify(_around(now, before.walls_m[away], WALL_REACH_M), occupancy)[1].any(axis=1)
+    shown = near | free
     if np.count_nonzero(shown) < LEAST_WALL_CELLS:
         return True
     return bool(np.count_nonzero(near) >= SAME_WALLS_SHARE * np.count_nonzero(shown))
@@ -337,7 +338,7 @@ def _around(grid: Grid, points_m: FloatArray, reach_m: float) -> NDArray[np.int8
     """Cells (N, K) of a map within reach of points (N, 2), its own in the middle; unknown outside the map."""
     reach = round(reach_m / grid.geometry.resolution_m)
     # Of finer cells not all are looked at: walls are thicker than they are.
-    steps = np.unique(np.linspace(-reach, reach, 2 * min(reach, MOST_STEPS) + 1).round().astype(np.intp))
+    steps = np.linspace(-reach, reach, 2 * min(reach, MOST_STEPS) + 1).round().astype(np.intp)
     row, column = np.moveaxis(grid.geometry.world_to_cell(points_m), -1, 0)
     row, column = row[:, None, None] + steps[:, None], column[:, None, None] + steps
     height, width = grid.cells.shape

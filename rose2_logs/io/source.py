@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rose2_logs.config.parameters import OccupancyParameters
 from rose2_logs.config.selection import Times
@@ -198,3 +199,16 @@ def distinct(times: Times) -> Times:
     is_new = np.ones(len(ordered), bool)
     is_new[1:] = ordered[1:] != ordered[:-1]
     return ordered[is_new]
+
+
+def places_of(times: Times, among: Times) -> NDArray[np.intp]:
+    """Return which of the ascending log times `among` are some of `times`, which are ascending and distinct.
+
+    Examples
+    --------
+    >>> places_of(np.array([1, 4]), np.array([1, 1, 3, 4])).tolist()
+    [0, 1, 3]
+    """
+    begins, ends = np.searchsorted(among, times), np.searchsorted(among, times, "right")
+    ranges = [np.arange(begin, end) for begin, end in zip(begins.tolist(), ends.tolist(), strict=True)]
+    return np.concatenate([np.zeros(0, np.intp), *ranges])

@@ -7,6 +7,7 @@ explored shows as blocks of cells that are mostly known; rays and specks do not 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,16 +70,15 @@ def find_far_cells(
     """
     if parameters.far_cells == "keep" or cells.shape[0] * cells.shape[1] == 0:
         return None
-    count, spans = _known_extent(cells)
+    known_of, spans = _known_extent(cells)
     most = spans / parameters.far_min_gain
     # A window that is full enough cannot shrink so much: hardly a map goes on from here to lists of cells.
-    if count == 0 or count > most:
+    if not 0 < known_of.sum() <= most:
         return None
-    known = cells_where(cells, lambda part: part >= 0)
-    row, column = np.divmod(known, cells.shape[1])
-    window = _explored_window(row, column, cells.shape, resolution_m, parameters, most)
+    window = _explored_window(known_of, cells.shape, resolution_m, parameters, most)
     if window is None:
         return None
+    row, column = np.divmod(cells_where(cells, lambda part: part >= 0), cells.shape[1])
     down, right = (
         np.maximum(np.maximum(along.start - place, place - along.stop + 1), 0)
         for along, place in zip(window, (row, column), strict=True)
@@ -87,25 +87,31 @@ def find_far_cells(
     return FarCells(window, int(np.count_nonzero(away)), float(away.max()) * resolution_m)
 
 
-def _known_extent(cells: NDArray[np.int8]) -> tuple[int, int]:
-    """Count the known cells, and all cells of the smallest rectangle around them; 0, 0 if there are none."""
-    count = 0
-    rows, columns = (np.zeros(side, bool) for side in cells.shape)
-    at_once = max(1, COUNTED_AT_ONCE // cells.shape[1])
-    for top in range(0, cells.shape[0], at_once):
-        known = cells[top : top + at_once] >= 0
-        count += int(np.count_nonzero(known))
-        rows[top : top + at_once] = known.any(1)
-        columns |= known.any(0)
-    if count == 0:
-        return 0, 0
-    height, width = (int(np.ptp(np.flatnonzero(each))) + 1 for each in (rows, columns))
-    return count, height * width
+def _known_extent(cells: NDArray[np.int8]) -> tuple[NDArray[np.intp], int]:
+    """Count the known cells of each block, and all cells of the smallest rectangle around the known ones."""
+    height, width = cells.shape
+    beside = np.arange(0, width, BLOCK_CELLS)
+    counts = np.zeros((-(-height // BLOCK_CELLS), len(beside)), np.intp)
+    rows, columns = np.zeros(height, bool), np.zeros(width, bool)
+    whole = height - height % BLOCK_CELLS
+    at_once = max(1, COUNTED_AT_ONCE // (width * BLOCK_CELLS)) * BLOCK_CELLS
+    for low, high in pairwise([*range(0, whole, at_once), *sorted({whole, height})]):
+        known = cells[low:high] >= 0
+        rows[low:high] = known.any(1)
+        # At most the side of a block, so that a byte holds it.
+        tall = known.view(np.uint8).reshape(-1, min(BLOCK_CELLS, high - low), width)
+        stacked = np.add.reduce(tall, axis=1, dtype=np.uint8)
+        columns |= stacked.any(0)
+        first = low // BLOCK_CELLS
+        counts[first : first + len(stacked)] = np.add.reduceat(stacked, beside, axis=1, dtype=np.intp)
+    if not rows.any():
+        return counts, 0
+    spans = [int(np.ptp(np.flatnonzero(each))) + 1 for each in (rows, columns)]
+    return counts, spans[0] * spans[1]
 
 
 def _explored_window(
-    row: NDArray[np.intp],
-    column: NDArray[np.intp],
+    known: NDArray[np.intp],
     shape: tuple[int, ...],
     resolution_m: float,
     parameters: OccupancyParameters,
@@ -116,13 +122,11 @@ def _explored_window(
     They begin and end with blocks of the canvas, so that the part of a map that stays is left as it is. None
     without such blocks, and where there would be more than `most` cells.
     """
-    height, width = (-(-side // BLOCK_CELLS) for side in shape)
-    of_cell = (row // BLOCK_CELLS) * width + column // BLOCK_CELLS
-    known = np.bincount(of_cell, minlength=height * width)
-    filled = (known >= FILLED_SHARE * BLOCK_CELLS**2).astype(np.uint8).reshape(height, width)
+    filled = (known >= FILLED_SHARE * BLOCK_CELLS**2).astype(np.uint8)
     # A filled block and the filled ones around it are of one piece: in nearly all maps that decides.
-    padded = np.pad(known.reshape(height, width) * filled, 1)
-    nearby = np.lib.stride_tricks.sliding_window_view(padded, (3, 3)).sum(axis=(2, 3))
+    padded = np.pad(known * filled, 1)
+    nearby = padded[:-2] + padded[1:-1] + padded[2:]
+    nearby = nearby[:, :-2] + nearby[:, 1:-1] + nearby[:, 2:]
     sure = np.nonzero(filled * (nearby * resolution_m**2 >= parameters.far_min_area_m2))
     if len(sure[0]):
         low, high = (np.array([of(sure[1]), of(sure[0])]) for of in (np.min, np.max))
@@ -131,7 +135,7 @@ def _explored_window(
     import cv2
 
     count, piece, boxes, _ = cv2.connectedComponentsWithStats(filled, connectivity=8)
-    cells = np.bincount(piece.reshape(-1), known, count)
+    cells = np.bincount(piece.reshape(-1), known.reshape(-1), count)
     boxes = boxes[1:][cells[1:] * resolution_m**2 >= parameters.far_min_area_m2]
     if not len(boxes):
         return None

@@ -18,6 +18,7 @@ from rose2_logs.errors import AlreadyWholeError, OutputError
 from rose2_logs.runs.journal import Journal, KeptMaps, kept_maps
 from rose2_logs.runs.provenance import log_files
 from rose2_logs.system.files import locked, refuse_existing, writing
+from rose2_logs.system.text import counted
 from rose2_logs.system.warnings import UNCOUNTED
 from rose2_logs.system.workers import WorkerError
 
@@ -102,7 +103,10 @@ class OutputFolder:
         facts = json.loads(json.dumps(facts))
         with writing(self._folder):
             self._work.parent.mkdir(parents=True, exist_ok=True)
-        with locked(self._lock, f"{self._folder}: another run is writing to this folder"):
+        with locked(
+            self._lock,
+            f"{self._folder}: another run is writing to this folder; wait for it, or name another folder",
+        ):
             journal = Journal(self._journal, facts, self._kept(facts, overwrite, resume))
             try:
                 with self._told_by_final_name(), journal:
@@ -195,9 +199,9 @@ class OutputFolder:
         shutil.rmtree(self._work, ignore_errors=True)
         if kept_maps:
             logger.warning(
-                "%s: %d maps are done; resume=True goes on after them",
+                "%s: %s done; resume=True goes on from there",
                 self._folder,
-                kept_maps,
+                counted(kept_maps, "map"),
                 extra=UNCOUNTED,
             )
         else:

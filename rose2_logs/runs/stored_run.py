@@ -30,7 +30,7 @@ from rose2_logs.runs.summary import RESULTS_FORMAT, SUMMARY
 from rose2_logs.runs.summary_schema import what_it_lacks
 from rose2_logs.runs.tables import BACK_PROJECTED, TABLES, Row, unpack_image
 from rose2_logs.system.files import reason_of, require_utf8
-from rose2_logs.system.text import percent
+from rose2_logs.system.text import counted, percent
 from rose2_logs.tracking.registration import RigidMotion
 
 if TYPE_CHECKING:
@@ -78,6 +78,7 @@ class StoredRun:
         require_utf8(folder)
         self.summary: dict[str, Any] = _read_summary(folder)
         self.part = part
+        whole = self.summary["results"]
         if part is not None:
             of_part = next((each for each in self._parts if each["part"] == part), None)
             if of_part is None:
@@ -88,6 +89,7 @@ class StoredRun:
         self._require_parameters()
         for name in (*TABLES, *([BACK_PROJECTED] if self.is_back_projected else ())):
             self._schema(name)
+        self._require_rows(whole)
 
     @property
     def parts(self) -> tuple[int, ...]:
@@ -123,6 +125,20 @@ class StoredRun:
                     raise ResultsError(
                         f"{path}: its parameters.{block}.{name} is missing; {MAKE_AGAIN}", file=path
                     )
+
+    def _require_rows(self, results: dict[str, Any]) -> None:
+        """Refuse tables that have not one row for each map, track and event of the whole run's results."""
+        import pyarrow.parquet as pq
+
+        maps, tracks, events = results["snapshots"], results["tracks"], sum(results["events"].values())
+        for name, count in {"snapshots": maps, "maps": maps, "tracks": tracks, "events": events}.items():
+            path = self.folder / f"{name}.parquet"
+            with _reading(path):
+                held = pq.read_metadata(path).num_rows
+            if held != count:
+                rows = counted(held, "row") if held else "no map" if name == "snapshots" else "no row"
+                text = f"{path}: holds {rows}, not {count} as {SUMMARY} says; {MAKE_AGAIN}"
+                raise ResultsError(text, file=path)
 
     @cached_property
     def names(self) -> dict[int, str]:

@@ -81,6 +81,11 @@ class Workers(Generic[Item, Result]):
                 self._start()
         except BaseException as error:
             self.__exit__(type(error), error, None)
+            if isinstance(error, OSError):  # no space for semaphores, too few processes or files allowed
+                raise WorkerError(
+                    f"{self._count} worker processes cannot start: {error.strerror or error}; "
+                    "give them space in /dev/shm and higher limits, or take workers=1"
+                ) from error
             raise
         return self
 

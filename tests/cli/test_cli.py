@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import subprocess
 import sys
 import time
@@ -69,6 +70,16 @@ def test_info_shows_topics_and_maps(cli, maps: Path):
     facts = json.loads(out)
     assert facts["maps"][0]["last"]["shape"] == [120, 240]
     assert 0.4 < facts["maps"][0]["coverage_first"] < 0.6
+
+
+def test_a_name_is_shown_as_it_is_in_one_line(cli, maps: Path, tmp_path: Path):
+    """Without what would steer a terminal, and with no pictures in place of words between colons."""
+    log = tmp_path / "run:dog:\x1b[2J\n2"
+    shutil.copytree(maps, log)
+    code, out, _ = cli("info", log)
+    assert (code, out.splitlines()[0]) == (0, f"{tmp_path}/run:dog:\ufffd[2J 2")
+    _, out, _ = cli("analyze", log, "-o", tmp_path / "out", "--no-rrd", "--no-mcap")
+    assert f"results in {tmp_path}/out/run:dog:\ufffd[2J 2\n" in out
 
 
 def test_analyze_writes_a_folder_named_after_the_log(cli, maps: Path, tmp_path: Path):

@@ -6,6 +6,7 @@ import json
 import re
 import shutil
 import xml.etree.ElementTree as ET
+from functools import partial
 from pathlib import Path
 
 import pyarrow.parquet as pq
@@ -110,7 +111,22 @@ def _of_another_type(folder: Path) -> str:
     return "events.parquet: its column track is of type string, not int32"
 
 
-@pytest.mark.parametrize("damage", [_without_key, _without_file, _of_another_type])
+def _of_one_row(name: str, folder: Path) -> str:
+    path = folder / f"{name}.parquet"
+    table = pq.read_table(path, partitioning=None)
+    pq.write_table(table.slice(0, 1), path)
+    return f"{name}.parquet: holds 1 row, not {len(table)} as summary.json says"
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        _without_key,
+        _without_file,
+        _of_another_type,
+        *(partial(_of_one_row, name) for name in ("snapshots", "maps", "tracks", "events")),
+    ],
+)
 def test_every_command_names_what_damaged_results_lack(cli, office_results: Path, tmp_path: Path, damage):
     """Whether it needs it or not: a folder is checked as a whole when it is opened. Nothing is written."""
     folder = shutil.copytree(office_results, tmp_path / "damaged")

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import json
 import os
+import re
+import shlex
 import shutil
+import sqlite3
 import subprocess
 import sys
 from pathlib import Path
@@ -13,6 +16,8 @@ import pytest
 from commands import ROSE2_LOGS, WAIT_S, started, wait_for
 from finished_runs import SAMPLE_LOGS
 from saved_maps import save_run
+
+from rose2_logs.outputs.exports.formats import FORMATS
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="needs a shell and limits of POSIX")
 QUICK = ("--no-rrd", "--no-mcap")
@@ -51,12 +56,15 @@ def is_whole(folder: Path) -> bool:
         ("ulimit -n 64; exec \"$@\"", {}),
         ("ulimit -v 6000000; exec \"$@\"", {}),
         ('exec "$@"', {"TMPDIR": "/there/is/no/such/folder"}),
+        ('exec "$@"', {"TMPDIR": "/proc"}),
         ('exec "$@"', {"LC_ALL": "C", "LANG": "C", "PYTHONIOENCODING": ""}),
         ('exec "$@" >&-', {}),
         ('exec "$@" >&- 2>&-', {}),
+        ('exec "$@" <&-', {}),
         ('set -o pipefail; "$@" | head -c 1 >/dev/null; true', {}),
     ],
-    ids=["few files", "little memory", "no TMPDIR", "C locale", "no stdout", "no outputs", "head"],
+    ids=["few files", "little memory", "no TMPDIR", "TMPDIR not writable", "C locale", "no stdout",
+         "no outputs", "no stdin", "head"],
 )  # fmt: skip
 def test_results_are_whole_all_the_same(log: Path, tmp_path: Path, shell: str, environment: dict[str, str]):
     named = shutil.copytree(log, tmp_path / "mapy č 3")
@@ -65,6 +73,28 @@ def test_results_are_whole_all_the_same(log: Path, tmp_path: Path, shell: str, e
     assert (done.returncode, errors(done.stderr)) == (0, [])
     assert is_whole(tmp_path / "out" / "mapy č 3")
     assert sorted(path.name for path in named.iterdir()) == before
+
+
+@pytest.mark.parametrize(
+    ("limit", "told"),
+    [
+        ("ulimit -v 3000000", "addresses"),
+        ("ulimit -n 24", "open files"),
+        ("ulimit -f 9000", "files may have"),
+    ],
+)
+def test_rerun_is_not_started_where_it_would_end_the_process(
+    log: Path, tmp_path: Path, office_results: Path, limit: str, told: str
+):
+    """Or wait for ever; one line says what it needs, and nothing stays of the results."""
+    done = run(f'{limit}; exec "$@"', "analyze", log, "-o", tmp_path / "out", "--no-mcap")
+    assert (done.returncode, len(errors(done.stderr))) == (2, 1), done.stderr
+    assert told in done.stderr
+    assert not list(tmp_path.rglob("*.rrd*")) + list(tmp_path.rglob("*.part"))
+    command = ("compare", office_results, office_results, "-o", tmp_path / "compared")
+    done = run(f'{limit}; exec "$@"', *command)
+    assert (done.returncode, len(errors(done.stderr))) == (2, 1), done.stderr
+    assert "comparison.rrd" in done.stderr
 
 
 @pytest.mark.parametrize("limit", ["ulimit -v 200000", "ulimit -n 8"])
@@ -76,6 +106,23 @@ def test_too_little_for_python_is_no_endless_wait(log: Path, tmp_path: Path, lim
     )
     assert done.returncode != 0
     assert not list(tmp_path.rglob("summary.json"))
+
+
+@pytest.mark.parametrize("kind", ["size=4k", "ro"])
+def test_without_space_in_shared_memory_a_line_says_what_helps(log: Path, tmp_path: Path, kind: str):
+    """Not even the semaphores of worker processes can be made then; one process needs none."""
+    shell = f'mount -t tmpfs -o {kind} tmpfs /dev/shm; exec "$@"'
+    own = ["unshare", "-m", "bash", "-c", shell, "-"]
+    if subprocess.run([*own, "true"], capture_output=True, check=False).returncode:
+        pytest.skip("this user may mount nothing")
+    command = ("analyze", log, "-o", tmp_path / "out", *QUICK)
+    done = run(f'exec {shlex.join(own)} "$@"', *command, "--workers", 2)
+    assert (done.returncode, len(errors(done.stderr))) == (2, 1)
+    assert "worker processes cannot start" in done.stderr
+    assert "take --workers 1" in done.stderr
+    assert not (tmp_path / "out").exists()
+    done = run(f'exec {shlex.join(own)} "$@"', *command)
+    assert (done.returncode, errors(done.stderr)) == (0, [])
 
 
 def test_an_output_that_is_full_is_told(log: Path, tmp_path: Path):
@@ -120,6 +167,37 @@ def test_a_full_disk_is_one_line_at_whatever_output(tmp_path: Path, kilobytes: i
         subprocess.run(["umount", "-l", str(disk)], check=True)
 
 
+@pytest.mark.parametrize(
+    ("command", "kilobytes"),
+    [
+        (("report", "RUN", "-o", "DISK/page.html"), 8),
+        (("figure", "RUN", "-o", "DISK/plan.png"), 8),
+        *((("export", "RUN", "--format", name, "-o", "DISK/plans"), 4) for name in FORMATS),
+        (("compare", "RUN", "RUN", "-o", "DISK/compared"), 8),
+        (("compare", "RUN", "RUN", "-o", "DISK/compared"), 800),
+        (("segment", SAMPLE_LOGS / "office.rooms.png", "--resolution", "0.05", "-o", "DISK/rooms"), 4),
+        (("batch", SAMPLE_LOGS / "office.mcap", "-o", "DISK/all", *QUICK, "--max-snapshots", "1"), 60),
+    ],
+    ids=lambda value: " ".join(map(str, value[:1] + value[2:4])) if isinstance(value, tuple) else None,
+)
+def test_every_command_tells_of_a_full_disk(
+    tmp_path: Path, office_results: Path, command: tuple[object, ...], kilobytes: int
+):
+    """In one line that names the file, without an end that never comes; no half file stays."""
+    disk = tmp_path / "disk"
+    if not mounted(disk, kilobytes):
+        pytest.skip("this user may mount nothing")
+    places = {"RUN": str(office_results), "DISK": str(disk)}
+    words = [re.sub("RUN|DISK", lambda found: places[found[0]], str(word)) for word in command]
+    try:
+        done = run(f'exec timeout -k 1 {WAIT_S} "$@"', *words)
+        assert (done.returncode, len(errors(done.stderr))) == (2, 1), done.stderr
+        assert str(disk) in errors(done.stderr)[0]
+        assert not list(disk.rglob("*.part"))
+    finally:
+        subprocess.run(["umount", "-l", str(disk)], check=True)
+
+
 def test_a_log_that_is_still_written_is_read_as_far_as_it_is(tmp_path: Path):
     whole = (SAMPLE_LOGS / "office.mcap").read_bytes()
     growing = tmp_path / "growing.mcap"
@@ -133,6 +211,49 @@ def test_a_log_that_is_still_written_is_read_as_far_as_it_is(tmp_path: Path):
     assert (process.returncode, errors(err)) == (0, [])
     assert "warning: " in err
     assert is_whole(tmp_path / "out" / "growing")
+
+
+def test_a_bag_that_rosbag_still_writes_is_read_by_its_name_of_then(tmp_path: Path):
+    whole = (SAMPLE_LOGS / "wing.bag").read_bytes()
+    growing = tmp_path / "wing.bag.active"
+    growing.write_bytes(whole[: len(whole) // 2])
+    done = run('exec "$@"', "info", growing)
+    assert (done.returncode, errors(done.stderr)) == (0, [])
+    assert "everything before is read" in done.stderr
+
+
+def test_a_database_that_is_still_written_is_read_without_its_journal(tmp_path: Path):
+    """The recorder holds it open and writes; nothing of its files is touched."""
+    bag = shutil.copytree(SAMPLE_LOGS / "ring", tmp_path / "ring")
+    (database,) = bag.glob("*.db3")
+    recorder = sqlite3.connect(database)
+    recorder.execute("pragma journal_mode=wal")
+    recorder.execute("pragma wal_autocheckpoint=0")
+    recorder.execute(
+        "insert into messages select max(id) + 1, topic_id, max(timestamp) + 1000, data from messages"
+    )
+    recorder.commit()
+    before = {path.name: path.read_bytes() for path in bag.iterdir()}
+    done = run('exec "$@"', "info", bag)
+    assert (done.returncode, errors(done.stderr)) == (0, [])
+    assert "contains messages that are not in the database yet" in done.stderr
+    assert {path.name: path.read_bytes() for path in bag.iterdir()} == before
+    recorder.close()
+
+
+def test_a_second_run_to_a_folder_ends_and_the_first_goes_on(tmp_path: Path):
+    many, out = save_run(tmp_path / "maps", tuple(range(100, 240, 10))), tmp_path / "out"
+    command = ("analyze", many, "-o", out, *QUICK)
+    with started(*ROSE2_LOGS, *command) as process:
+        wait_for(lambda: list(out.rglob("*.part")))
+        for options in ((), ("--overwrite",), ("--resume",)):
+            done = run('exec "$@"', *command, *options)
+            if process.poll() is None:
+                assert (done.returncode, len(errors(done.stderr))) == (2, 1)
+                assert "another run is writing to this folder; wait for it, or name another" in done.stderr
+        _, err = process.communicate(timeout=WAIT_S)
+    assert (process.returncode, errors(err)) == (0, [])
+    assert is_whole(out / "maps")
 
 
 @pytest.mark.parametrize("name", ["two\nlines", "n" * 255, "n" * 230], ids=["line break", "255", "230"])
@@ -160,3 +281,5 @@ def test_an_annotated_log_can_be_analyzed_again(tmp_path: Path):
     one, two = (json.loads(path.read_text()) for path in sorted(tmp_path.glob("*/*/summary.json")))
     assert one["topic"] == two["topic"]
     assert one["results"] == two["results"]
+    for table in (tmp_path / "one" / "office").glob("*.parquet"):
+        assert table.read_bytes() == (tmp_path / "two" / "office.rose2" / table.name).read_bytes()

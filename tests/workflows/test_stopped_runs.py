@@ -250,7 +250,7 @@ def test_a_run_that_was_interrupted_keeps_its_maps_and_says_so(log: Path, fresh,
     for resume, number in ((False, 2), (True, 4)):
         with pytest.raises(KeyboardInterrupt):
             analyze_log(log, out, RunOptions(**OPTIONS, resume=resume), stop(number, KeyboardInterrupt))
-        assert f"{number} maps are done; resume=True goes on after them" in caplog.text
+        assert f"{number} maps done; resume=True goes on from there" in caplog.text
         assert names(tmp_path) == [JOURNAL]
     analyze_log(log, out, RunOptions(**OPTIONS, resume=True, workers=2))
     assert contents(out) == fresh
@@ -376,7 +376,7 @@ def test_killed_and_interrupted_commands_end_with_their_workers(tmp_path: Path, 
     assert [line for line in err.splitlines() if line.startswith("error: ")] == [
         "error: interrupted; unfinished results were removed"
     ]
-    assert "--resume goes on after them" in err
+    assert "--resume goes on from there" in err
     assert names(tmp_path / "o") == [".maps.journal"]
     monkeypatch.setattr(sys, "argv", ["rose2-logs", *command[3:], "--resume"])
     for said in ("results in", "is whole already"):

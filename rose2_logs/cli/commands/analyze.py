@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.markup import escape
 
 from rose2_logs.cli.exit_codes import EXIT_KNOWN
 from rose2_logs.cli.messages import show_error
@@ -21,6 +20,7 @@ from rose2_logs.cli.printing import (
     print_table,
     print_text,
     progress_bar,
+    shown,
 )
 from rose2_logs.config.run_options import MAPS, RunOptions
 from rose2_logs.errors import AlreadyWholeError, ParameterError, Rose2LogsError
@@ -190,9 +190,9 @@ def print_run(result: RunResult) -> None:
         table.add_row("warnings", f"{kinds}; see warnings in summary.json")
     table.add_row("time", f"{result.seconds:.1f} s, {totals.snapshots / result.seconds:.2f} maps/s")
     print_table(table)
-    print_line(f"results in [bold]{escape(str(result.folder))}[/]")
+    print_line(f"results in [bold]{shown(result.folder)}[/]")
     for file in result.files:
-        print_line(f"  {escape(file.name)}  {megabytes(file.stat().st_size)}")
+        print_line(f"  {shown(file.name)}  {megabytes(file.stat().st_size)}")
 
 
 def _part(part: RunSummary) -> str:

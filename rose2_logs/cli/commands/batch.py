@@ -13,7 +13,7 @@ from rose2_logs.batch.options import BatchOptions
 from rose2_logs.cli.exit_codes import EXIT_KNOWN
 from rose2_logs.cli.flags import with_flags
 from rose2_logs.cli.messages import error, style, warning
-from rose2_logs.cli.printing import print_line, print_table, progress_bar
+from rose2_logs.cli.printing import print_line, print_table, progress_bar, shown
 
 if TYPE_CHECKING:
     from rich.progress import TaskID
@@ -120,7 +120,7 @@ class BatchDisplay:
             error(f"{state.name}: {row['reason']}")
         else:
             found = f"{row['snapshots']} maps, {row['rooms_last']} rooms, {row['run_s']:.1f} s"
-            print_line(f"[green]{state.status}:[/] {escape(state.name)}, {found}", to_error=True)
+            print_line(f"[green]{state.status}:[/] {shown(state.name)}, {found}", to_error=True)
         if self._all is not None:
             self._bar.update(self._all, completed=self._ended, note=self._note())
 
@@ -149,10 +149,10 @@ def print_batch(result: BatchResult) -> None:
         ]
         seconds = "" if row["run_s"] is None else f"{row['run_s']:.1f}"
         status = f"[{color}]{state.status}[/]"
-        table.add_row(escape(state.name), status, *figures, seconds, escape(with_flags(row["reason"] or "")))
+        table.add_row(shown(state.name), status, *figures, seconds, escape(with_flags(row["reason"] or "")))
     print_table(table)
     counts = {status: sum(state.status == status for state in result.states) for status in COLORS}
     print_line(", ".join(f"{count} {status}" for status, count in counts.items() if count))
-    print_line(f"results in [bold]{escape(str(result.out))}[/]")
+    print_line(f"results in [bold]{shown(result.out)}[/]")
     for file in result.files:
-        print_line(f"  {escape(file.name)}")
+        print_line(f"  {shown(file.name)}")

@@ -10,7 +10,7 @@ import typer
 from rich.markup import escape
 
 from rose2_logs.cli.messages import warning
-from rose2_logs.cli.printing import print_line, print_table
+from rose2_logs.cli.printing import print_line, print_table, shown
 from rose2_logs.config.parameters import Parameters
 
 if TYPE_CHECKING:
@@ -65,9 +65,9 @@ def print_comparison(result: ComparisonResult) -> None:
     _print_overview(found)
     _print_rooms(found)
     _print_walls(found)
-    print_line(f"results in [bold]{escape(str(result.folder))}[/]")
+    print_line(f"results in [bold]{shown(result.folder)}[/]")
     for file in result.files:
-        print_line(f"  {escape(file.name)}")
+        print_line(f"  {shown(file.name)}")
 
 
 def _print_overview(found: LayoutComparison) -> None:
@@ -76,8 +76,8 @@ def _print_overview(found: LayoutComparison) -> None:
     x, y, yaw = found.placement.motion.pose
     yaw_deg = math.degrees(math.remainder(yaw, 2 * math.pi))
     table = Table(box=None, show_header=False, pad_edge=False)
-    table.add_row("A", escape(f"{found.a.name}, {len(found.a.tracks)} rooms"))
-    table.add_row("B", escape(f"{found.b.name}, {len(found.b.tracks)} rooms"))
+    table.add_row("A", f"{shown(found.a.name)}, {len(found.a.tracks)} rooms")
+    table.add_row("B", f"{shown(found.b.name)}, {len(found.b.tracks)} rooms")
     table.add_row("B's frame in A's", f"{x:+.2f}, {y:+.2f} m, turned by {yaw_deg:+.2f} deg")
     sure = "not the same building" if not found.same_building else "ambiguous" if found.ambiguous else "sure"
     table.add_row(

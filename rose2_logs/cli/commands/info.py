@@ -9,7 +9,7 @@ from rich.markup import escape
 
 from rose2_logs.cli.flags import with_flags
 from rose2_logs.cli.messages import printable
-from rose2_logs.cli.printing import duration, megabytes, print_json, print_line, print_table
+from rose2_logs.cli.printing import duration, megabytes, print_json, print_line, print_table, shown
 from rose2_logs.config.parameters import Parameters
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ def print_log_facts(facts: LogFacts) -> None:
     from rich.table import Table
 
     info = facts.info
-    print_line(f"[bold]{escape(str(info.path))}[/]")
+    print_line(f"[bold]{shown(info.path)}[/]")
     index = "" if info.indexed else ", no index: read from its beginning"
     index += "" if info.whole else ", damaged: what is whole of it"
     print_line(f"{info.format}, {megabytes(info.size_bytes)}, {duration(info.duration_s)}{index}")

@@ -6,10 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.markup import escape
 
 from rose2_logs.cli.options import option_of
-from rose2_logs.cli.printing import print_line, print_table
+from rose2_logs.cli.printing import print_line, print_table, shown
 from rose2_logs.config.parameters import Parameters
 from rose2_logs.config.run_options import with_detail
 
@@ -74,6 +73,6 @@ def print_static_map(result: StaticMapResult) -> None:
         if border.is_unsure:
             one, other = border.rooms
             print_line(f"rooms {one} and {other} may be one ({border.kind}, {border.strength:.0%} sure)")
-    print_line(f"results in [bold]{escape(str(result.folder))}[/]")
+    print_line(f"results in [bold]{shown(result.folder)}[/]")
     for file in result.files:
-        print_line(f"  {escape(file.name)}")
+        print_line(f"  {shown(file.name)}")

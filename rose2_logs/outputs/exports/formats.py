@@ -17,6 +17,7 @@ from rose2_logs.outputs.exports.layers import write_layers
 from rose2_logs.outputs.exports.map_server import ENDINGS, write_labeled_map
 from rose2_logs.runs.summary import write_json
 from rose2_logs.system.files import replacing
+from rose2_logs.system.packages import need
 
 FORMATS: dict[str, tuple[str, ...]] = {
     "geojson": (".floor_plan.geojson",),
@@ -36,10 +37,14 @@ def planned_files(formats: Sequence[str], folder: Path, stem: str) -> list[Path]
     ------
     ParameterError
         If a format is unknown.
+    MissingPackageError
+        If a format needs a package that is not installed.
     """
     for name in formats:
         if name not in FORMATS:
             raise ParameterError(f"unknown format {name!r}; choose one of {', '.join(FORMATS)}")
+    if "dxf" in formats:
+        need("ezdxf", "DXF files", extra="dxf")
     return [folder / f"{stem}{ending}" for name in dict.fromkeys(formats) for ending in FORMATS[name]]
 
 

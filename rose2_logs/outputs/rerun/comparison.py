@@ -21,6 +21,7 @@ from rose2_logs.model.labels import known_window
 from rose2_logs.model.occupancy import UNKNOWN, FloatArray
 from rose2_logs.model.outlines import outer_rings
 from rose2_logs.outputs.rerun.blueprint import eye_above
+from rose2_logs.outputs.rerun.disk import require_resources, require_space
 from rose2_logs.outputs.rerun.world import LABEL_COLOR, OUTLINE_POINTS, OUTLINE_SHADE, PAPER, lifted
 from rose2_logs.system.files import replacing
 from rose2_logs.tracking.registration import RigidMotion
@@ -50,6 +51,8 @@ def write_comparison_recording(path: Path, comparison: LayoutComparison) -> None
         If the file cannot be written.
     """
     with replacing(path) as part:
+        require_resources(path)
+        require_space(part, path)
         recording = rr.RecordingStream(
             "rose2_logs_compare", recording_id=f"{comparison.a.name}-{comparison.b.name}"
         )

@@ -19,7 +19,7 @@ from rose2_logs.outputs.rerun import viewer as rerun_viewer
 from rose2_logs.outputs.rerun.back_projected import BackProjectedWorld
 from rose2_logs.outputs.rerun.blueprint import make_blueprint, view_side_m
 from rose2_logs.outputs.rerun.columns import Entry, Scalar
-from rose2_logs.outputs.rerun.disk import abandon, require_space
+from rose2_logs.outputs.rerun.disk import abandon, require_resources, require_space
 from rose2_logs.outputs.rerun.lanes import SHIFTS, TrackLanes
 from rose2_logs.outputs.rerun.layers import CHUNK_BYTES, Layers, whole_percent
 from rose2_logs.outputs.rerun.legend import CURVES, log_legend
@@ -97,6 +97,8 @@ class RerunRecording(Sink):
     def begin(self, info: RunInfo) -> None:
         """Open the file, or a viewer, and log what stays the same."""
         self._info = info
+        if self._path is not None:
+            require_resources(self._path, ", or recording=False")
         # The same log gives the same recording id, so that a second run replaces the first in a viewer.
         fingerprint = str(info.provenance.get("sha256", info.log_path.name))
         self._recording = self._stream = rr.RecordingStream(

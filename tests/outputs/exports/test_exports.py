@@ -21,8 +21,9 @@ from PIL import Image
 from shapely.geometry import shape
 
 from rose2_logs.config.parameters import OccupancyParameters
-from rose2_logs.errors import OutputError, ParameterError
+from rose2_logs.errors import MissingPackageError, OutputError, ParameterError
 from rose2_logs.io import open_log
+from rose2_logs.io.room_names import read_room_names
 from rose2_logs.model.occupancy import GridGeometry
 from rose2_logs.model.room_plan import PlanMap, wall_outlines
 from rose2_logs.outputs.exports.dxf import LAYERS
@@ -249,6 +250,18 @@ def test_graph_is_read_by_networkx(plan, tmp_path: Path):
     assert graph.nodes[LEFT]["name"] == "Room 3"
     assert graph.number_of_edges(LEFT, RIGHT) == 2
     assert graph.edges[LEFT, RIGHT, 0]["width_m"] == pytest.approx(1.0)
+
+
+def test_without_ezdxf_a_line_says_what_to_install(plan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """Before any other file is written, also where names are read from a drawing."""
+    (drawing,) = write_plan(plan, ["dxf"], tmp_path, "two")
+    monkeypatch.setitem(sys.modules, "ezdxf", None)
+    told = r"^DXF files need ezdxf, which is not installed: pip install 'rose2-logs\[dxf\]'$"
+    with pytest.raises(MissingPackageError, match=told):
+        write_plan(plan, ["geojson", "dxf"], tmp_path / "none", "two")
+    assert not (tmp_path / "none").exists()
+    with pytest.raises(MissingPackageError, match=told):
+        read_room_names(drawing)
 
 
 def test_svg_is_xml(plan, tmp_path: Path):
