@@ -6,7 +6,9 @@ import logging
 import queue
 import time
 import uuid
+from collections import deque
 from collections.abc import Iterator
+from concurrent.futures import CancelledError
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -22,6 +24,11 @@ CONNECT_TIMEOUT_S = 10.0
 """Maximum time for the scheduler to answer."""
 LOOK_EVERY_S = 2.0
 """Time between two checks whether the scheduler still answers and has workers."""
+LOGS_PER_THREAD = 4
+"""Logs that the scheduler holds for each thread of its workers: one in work, the others so that none waits for this
+process. The rest of a large batch stays here, so that the scheduler needs no more memory for it."""
+LEAST_LOGS = 16
+"""As many at least, also while no worker has joined: a cluster that grows by itself must see that there is work."""
 
 
 class DaskWorkers:
@@ -49,7 +56,9 @@ class DaskWorkers:
         self._address = address
         self._topic = f"rose2-logs-{uuid.uuid4().hex}"
         self._news: queue.Queue[Progress | Any] = queue.Queue()
+        self._waiting: deque[LogTask] = deque()
         self._tasks: dict[Any, LogTask] = {}
+        self._most = LEAST_LOGS
         self._looked = False
         where: dict[str, Any] = (
             {"scheduler_file": address} if Path(address).is_file() else {"address": address}
@@ -77,11 +86,8 @@ class DaskWorkers:
         self._client.close(timeout=CONNECT_TIMEOUT_S)
 
     def submit(self, task: LogTask) -> None:
-        """Accept a task."""
-        key = f"rose2-logs-{task.name}-{uuid.uuid4().hex}"
-        future = self._client.submit(analyze_on_worker, task, self._topic, key=key, pure=False)
-        self._tasks[future] = task
-        future.add_done_callback(self._news.put)
+        """Accept a task; tasks are begun in their order."""
+        self._waiting.append(task)
 
     def events(self) -> Iterator[Progress | LogOutcome]:
         """Yield what the workers report until no task is left; more may be submitted in the meantime.
@@ -92,10 +98,12 @@ class DaskWorkers:
             If the scheduler is lost.
         """
         looked = 0.0
-        while self._tasks:
+        while self._waiting or self._tasks:
             if time.monotonic() - looked >= LOOK_EVERY_S:
                 self._look()
                 looked = time.monotonic()
+            while self._waiting and len(self._tasks) < self._most:
+                self._send(self._waiting.popleft())
             try:
                 news = self._news.get(timeout=LOOK_EVERY_S)
             except queue.Empty:
@@ -105,15 +113,29 @@ class DaskWorkers:
             elif news in self._tasks:
                 yield self._outcome(news, self._tasks.pop(news))
 
+    def _send(self, task: LogTask) -> None:
+        # The scheduler keeps statistics for each beginning of a key, so it must be the same for all logs.
+        key = f"rose2-logs-{uuid.uuid4().hex}"
+        future = self._client.submit(analyze_on_worker, task, self._topic, key=key, pure=False)
+        self._tasks[future] = task
+        future.add_done_callback(self._news.put)
+
     def _look(self) -> None:
-        """Notice what would make the wait endless."""
+        """Notice what would make the wait endless, and how many logs the workers can take."""
         lost = any(future.status in ("lost", "cancelled") for future in self._tasks)
         if lost or self._client.status in ("closing", "closed"):
             raise self._is_gone()
-        if self._looked or self._client.status != "running":
+        if self._client.status != "running":
+            return
+        try:
+            threads = self._client.nthreads()
+        except OSError:
+            # It was lost just now; what the client makes of that is seen next time.
+            return
+        self._most = max(LEAST_LOGS, LOGS_PER_THREAD * sum(threads.values()))
+        if self._looked:
             return
         self._looked = True
-        threads = self._client.nthreads()
         if not threads:
             logger.warning(
                 "no worker has joined the scheduler yet: `dask worker %s` starts one", self._address
@@ -131,7 +153,10 @@ class DaskWorkers:
             raise self._is_gone()
         error = future.exception() if future.status == "error" else None
         if error is None:
-            outcome: LogOutcome = future.result()
+            try:
+                outcome: LogOutcome = future.result()
+            except (OSError, CancelledError) as lost:
+                raise self._is_gone() from lost
             return outcome
         if isinstance(error, self._killed_worker):
             # The scheduler counts also losses of workers where the log only waited behind the one to blame.

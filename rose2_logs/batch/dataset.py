@@ -133,7 +133,7 @@ def failed_row(name: str, source: str, reason: str) -> Row:
     return dict.fromkeys(SUMMARY_COLUMNS) | known
 
 
-def write_summary_tables(out: Path, rows: Sequence[Mapping[str, Any]]) -> tuple[Path, Path]:
+def write_summary_tables(out: Path, rows: Sequence[Row]) -> tuple[Path, Path]:
     """Write ``summary.parquet`` and ``summary.csv``, sorted by log.
 
     Raises
@@ -148,7 +148,7 @@ def write_summary_tables(out: Path, rows: Sequence[Mapping[str, Any]]) -> tuple[
         pa.field(column, kind, metadata={"description": meaning})
         for column, (kind, meaning) in SUMMARY_COLUMNS.items()
     ]
-    table = pa.Table.from_pylist([dict(row) for row in rows], pa.schema(fields))
+    table = pa.Table.from_pylist(rows, pa.schema(fields))
     paths = (out / f"{SUMMARY_NAME}.parquet", out / f"{SUMMARY_NAME}.csv")
     with replacing(paths[0]) as part:
         pq.write_table(table, part, compression="zstd")

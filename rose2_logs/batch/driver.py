@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import fnmatch
 import logging
 import os
 import re
@@ -32,7 +33,7 @@ from rose2_logs.system.workers import usable_cpus
 logger = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class LogState:
     """How one log of a batch ended.
 
@@ -44,14 +45,11 @@ class LogState:
         ``done``, ``up to date`` or ``failed``.
     row : dict
         Its row of the summary.
-    outcome : LogOutcome, optional
-        What its worker reported; None if no worker was needed.
     """
 
     name: str
     status: str
     row: dataset.Row
-    outcome: LogOutcome | None = None
 
 
 @dataclass(frozen=True)
@@ -83,8 +81,8 @@ class Listener(Protocol):
         """Show that a log is tried again, and why."""
         ...
 
-    def finished(self, state: LogState) -> None:
-        """Show how a log ended."""
+    def finished(self, state: LogState, outcome: LogOutcome) -> None:
+        """Show how a log ended, and what its worker reported."""
         ...
 
 
@@ -212,12 +210,14 @@ class _Batch:
     def sum_up(self) -> tuple[Path, ...]:
         """Bring data set and summary up to date with the finished logs and the failures of this batch."""
         finished = [name for name, record in self._records.items() if record is not None]
-        failed = {state.name: state.row for state in self.states if state.status == "failed"}
+        rows = {state.name: state.row for state in self.states}
+        new = {state.name for state in self.states if state.status == "done"}
         for name in finished:
-            dataset.publish_tables(self._out, name)
+            if name not in new:
+                dataset.publish_tables(self._out, name)
         dataset.withdraw_tables(self._out, finished)
-        rows = [dataset.summary_row(self._out, name) for name in finished if name not in failed]
-        return dataset.write_summary_tables(self._out, [*rows, *failed.values()])
+        others = [dataset.summary_row(self._out, name) for name in finished if name not in rows]
+        return dataset.write_summary_tables(self._out, [*rows.values(), *others])
 
     def _moved(self, looks: dict[Location, Signature | None], known: dict[str, str]) -> dict[Location, str]:
         """Earlier results of logs that seem to have moved, by name and size; the workers make sure."""
@@ -250,8 +250,11 @@ class _Batch:
         wanted += ["*.rose2.mcap"] if asked.annotated_log else []
         wanted += [f"{BACK_PROJECTED}.parquet"] if asked.back_project else []
         wanted += [BAG_DESCRIPTION] if asked.bag else []
-        folder = self._out / LOGS_FOLDER / name
-        return all(next(folder.glob(each), None) for each in wanted)
+        try:
+            there = os.listdir(self._out / LOGS_FOLDER / name)  # noqa: PTH208 (names alone)
+        except OSError:
+            return False
+        return all(fnmatch.filter(there, each) for each in wanted)
 
     def _check_settings(self, names: set[str]) -> None:
         """Refuse to mix results of different options in one data set, unless they may be replaced."""
@@ -296,13 +299,15 @@ class _Batch:
                 dataset.publish_tables(self._out, name)
         except (OSError, OutputError) as error:
             outcome = dataclasses.replace(outcome, status="failed", reason=f"{folder}: {error}")
+        # With what lost workers may have left of it.
+        shutil.rmtree(self._work / task.name, ignore_errors=True)
         if outcome.status == "failed":
             row = dataset.failed_row(name, task.log.address, outcome.reason)
         else:
             row = dataset.summary_row(self._out, name)
         status = "up to date" if outcome.status == "unchanged" else outcome.status
-        self.states.append(LogState(name, status, row, outcome))
-        self._listener.finished(self.states[-1])
+        self.states.append(LogState(name, status, row))
+        self._listener.finished(self.states[-1], outcome)
 
 
 def _local_look(log: Location) -> Signature | None:

@@ -119,21 +119,24 @@ def assign_names(
     dict of Location to str
         The log's own name, preceded by those of its folders as far as needed to make it unique;
         where that is not enough a hash of its address follows. Names differ by more than upper and lower
-        case.
+        case. A log gets the same name whichever of the others have theirs already.
     """
-    logs = list(logs)
+    logs = sorted(logs)
     names = {log: known[log.address] for log in logs if log.address in known}
     used = {name.casefold() for name in (*known.values(), *taken)}
-    new = sorted(log for log in logs if log not in names)
     level = 0
-    while new:
-        candidates = {log: _candidate(log, level) for log in new}
+    while logs:
+        candidates = {log: _candidate(log, level) for log in logs}
         wanted = Counter(name.casefold() for name in candidates.values())
+        left = []
         for log, name in candidates.items():
-            if wanted[name.casefold()] == 1 and name.casefold() not in used:
+            is_used = name.casefold() in used and names.get(log) != name
+            if is_used or wanted[name.casefold()] > 1:
+                left.append(log)
+            elif log not in names:
                 names[log] = name
                 used.add(name.casefold())
-        new = [log for log in new if log not in names]
+        logs = left
         level += 1
     return names
 

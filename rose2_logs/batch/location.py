@@ -14,7 +14,7 @@ _SIGNED = re.compile("signature|token|credential|^sig$", re.IGNORECASE)
 """Names of query parameters in the signed URLs of the large object stores."""
 
 
-@dataclass(frozen=True, order=True)
+@dataclass(frozen=True, order=True, slots=True)
 class Location:
     """Where a log lies.
 

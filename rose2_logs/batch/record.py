@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import sys
 import time
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +33,7 @@ def deciding_settings(options: RunOptions) -> dict[str, Any]:
     return {"rose2-logs": __version__, **deciding, **flat}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Signature:
     """What is known of the files of a log without reading them.
 
@@ -87,7 +89,7 @@ def local_signature(log: Path) -> Signature:
     return Signature(tuple(files), newest_ns + round(SETTLED_S * 1e9) <= now_ns)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Record:
     """What is kept with the results of one log.
 
@@ -123,6 +125,8 @@ class Record:
 
     def difference(self, settings: dict[str, Any]) -> str:
         """Describe the first of the settings that differs from that of the record; empty if none does."""
+        if self.settings == settings:
+            return ""
         for name in (*settings, *self.settings):
             before, now = self.settings.get(name), settings.get(name)
             if before != now:
@@ -138,10 +142,17 @@ def read_record(folder: Path) -> Record | None:
         kept = json.loads((folder / RECORD).read_text(encoding="utf-8"))
         files = tuple((name, size, tuple(version)) for name, size, version in kept["signature"]["files"])
         signature = Signature(files, bool(kept["signature"]["is_sound"]))
-        layers = tuple(kept.get("layers", RECORDING_LAYERS))
-        return Record(str(kept["address"]), signature, str(kept["sha256"]), dict(kept["settings"]), layers)
+        settings = _shared(json.dumps(kept["settings"]))
+        layers = tuple(map(sys.intern, kept.get("layers", RECORDING_LAYERS)))
+        return Record(str(kept["address"]), signature, str(kept["sha256"]), settings, layers)
     except (OSError, ValueError, KeyError, TypeError):
         return None
+
+
+@lru_cache(maxsize=16)
+def _shared(settings: str) -> dict[str, Any]:
+    """Return the settings of a text in JSON: the same object for the same text, not one for each log."""
+    return dict(json.loads(settings))
 
 
 def signature_of(log: Location) -> Signature:

@@ -56,7 +56,7 @@ TRANSIENT = frozenset(
 """Faults of storage and network that may pass; a missing file, no permission or a full disk will not."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class LogTask:
     """A log to analyze, as it is sent to a worker: plain values only, which reach another process or machine.
 
@@ -110,7 +110,7 @@ class Progress:
     share: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class LogOutcome:
     """How a log ended.
 

@@ -56,6 +56,7 @@ class Heard:
         self.shares: dict[str, list[float]] = {}
         self.retries: list[tuple[str, str]] = []
         self.ended: list[str] = []
+        self.warnings: list[str] = []
 
     def begin(self, logs: int, up_to_date: int) -> None:
         self.begun = (logs, up_to_date)
@@ -66,8 +67,9 @@ class Heard:
     def retry(self, name: str, reason: str) -> None:
         self.retries.append((name, reason))
 
-    def finished(self, state: LogState) -> None:
+    def finished(self, state: LogState, outcome: LogOutcome) -> None:
         self.ended.append(state.name)
+        self.warnings += outcome.warnings
 
 
 class WorkersHere:

@@ -19,7 +19,6 @@ from batches import (
     make_logs,
     started_batch,
     summary,
-    table_bytes,
     tree,
     worker_of,
 )
@@ -29,8 +28,9 @@ from saved_maps import save_run
 from rose2_logs.batch import dask_workers, driver
 from rose2_logs.batch.dask_workers import DaskWorkers
 from rose2_logs.batch.driver import run_batch
+from rose2_logs.batch.location import Location
 from rose2_logs.batch.options import BatchOptions
-from rose2_logs.batch.task import Progress
+from rose2_logs.batch.task import LogTask, Progress
 from rose2_logs.config.run_options import RunOptions
 from rose2_logs.errors import ParameterError
 
@@ -50,15 +50,37 @@ def running(*arguments: object):
         process.wait(WAIT_S)
 
 
-@pytest.fixture(scope="module")
-def cluster(tmp_path_factory) -> Iterator[tuple[str, subprocess.Popen[str]]]:
+@contextmanager
+def cluster_in(folder: Path) -> Iterator[tuple[str, subprocess.Popen[str]]]:
     """A scheduler, as its file and its process, with two workers, which are started again when they die."""
-    file = tmp_path_factory.mktemp("dask") / "scheduler.json"
+    file = folder / "scheduler.json"
     starting = ("scheduler", "--host", "127.0.0.1", "--port", 0, "--scheduler-file", file)
     with running(*starting) as scheduler:
         wait_for(file.exists)
         with running("worker", "--scheduler-file", file, "--nworkers", 2, "--nthreads", 1):
             yield str(file), scheduler
+
+
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory) -> Iterator[tuple[str, subprocess.Popen[str]]]:
+    """One for all tests that leave it as it is."""
+    with cluster_in(tmp_path_factory.mktemp("dask")) as started:
+        yield started
+
+
+def all_tables(out: Path) -> dict[str, bytes]:
+    """Bytes of the tables of all logs, beside the logs and in the data set."""
+    return {path.relative_to(out).as_posix(): path.read_bytes() for path in out.glob("*/**/*.parquet")}
+
+
+@pytest.fixture
+def undisturbed(tmp_path, monkeypatch):
+    """Logs, and the tables of a batch over them by one process that nothing happens to."""
+    logs = make_logs(tmp_path / "logs")
+    with monkeypatch.context() as patch:
+        patch.setattr(driver, "LocalWorkers", WorkersHere)
+        run_batch([str(logs)], tmp_path / "undisturbed", BatchOptions(QUIET), Heard())
+    return logs, all_tables(tmp_path / "undisturbed")
 
 
 class Killer(Heard):
@@ -78,9 +100,9 @@ class Killer(Heard):
             os.kill(pid, signal.SIGKILL)
 
 
-def test_a_log_whose_worker_is_killed_is_done_by_another(cluster, tmp_path, monkeypatch):
-    """In the end everything is as local workers make it; a bad log fails alone, and its warnings arrive."""
-    logs, out = make_logs(tmp_path / "logs"), tmp_path / "out"
+def test_a_log_whose_worker_is_killed_is_done_by_another(cluster, undisturbed, tmp_path):
+    """In the end every byte is as one process makes it; a bad log fails alone, and its warnings arrive."""
+    (logs, expected), out = undisturbed, tmp_path / "out"
     (logs / "bad.mcap").write_bytes(b"\x89MCAP0\r\n")
     heard = Killer(out, {"slow": 1})
     result = run_batch([str(logs)], out, BatchOptions(QUIET, scheduler=cluster[0]), heard)
@@ -88,13 +110,10 @@ def test_a_log_whose_worker_is_killed_is_done_by_another(cluster, tmp_path, monk
     status = {state.name: state.status for state in result.states}
     assert status == dict.fromkeys(("one_run", "slow", "two_run"), "done") | {"bad": "failed"}
     assert "no topic has occupancy grids" in summary(out)["bad"]["reason"]
-    (warning,) = result.failed[0].outcome.warnings
+    (warning,) = heard.warnings
     assert "truncated or damaged" in warning
     assert not [path for path in tree(out) if path.startswith(".batch")]
-
-    monkeypatch.setattr(driver, "LocalWorkers", WorkersHere)
-    run_batch([str(logs / "slow")], tmp_path / "here", BatchOptions(QUIET), Heard())
-    assert table_bytes(out / "logs" / "slow") == table_bytes(tmp_path / "here" / "logs" / "slow")
+    assert all_tables(out) == expected
 
 
 def test_a_log_that_kills_every_worker_fails_alone(cluster, tmp_path):
@@ -107,6 +126,23 @@ def test_a_log_that_kills_every_worker_fails_alone(cluster, tmp_path):
     assert len(heard.killed) >= 2
     assert {state.name: state.status for state in result.states} == {"doomed": "failed", "good": "done"}
     assert "were lost one after the other" in summary(out)["doomed"]["reason"]
+
+
+def test_the_scheduler_holds_only_the_next_logs(cluster, tmp_path, monkeypatch):
+    """However many there are, it needs memory for a few for each worker; all are done, one kind of key."""
+    for name in ("LEAST_LOGS", "LOGS_PER_THREAD"):
+        monkeypatch.setattr(dask_workers, name, 1)
+    (tmp_path / "work").mkdir()
+    tasks = [LogTask(Location(f"/nowhere/{k}.mcap"), f"log{k}", tmp_path / "work", QUIET) for k in range(9)]
+    done, most = [], 0
+    with DaskWorkers(cluster[0]) as workers:
+        for task in tasks:
+            workers.submit(task)
+        for told in workers.events():
+            done.append(told.name)
+            most = max(most, len(workers._tasks))
+    assert sorted(done) == [task.name for task in tasks]
+    assert most <= 2
 
 
 def test_no_scheduler_is_one_line(monkeypatch):
@@ -126,16 +162,32 @@ def test_without_the_extra_the_option_says_what_to_install(monkeypatch):
         DaskWorkers("127.0.0.1:8786")
 
 
-def test_a_scheduler_that_is_lost_ends_the_batch_in_one_line(cluster, tmp_path):
-    """What was finished stands. This test comes last, for it takes the cluster with it."""
-    file, scheduler = cluster
-    logs, out = make_logs(tmp_path / "logs"), tmp_path / "out"
-    with started_batch(logs, "-o", out, "--scheduler", file) as process:
+def test_a_scheduler_that_is_lost_ends_the_batch_in_one_line(undisturbed, tmp_path):
+    """What was finished stands; the same call with another scheduler does the rest, and every byte is right."""
+    (logs, expected), out = undisturbed, tmp_path / "out"
+    for place in ("first", "second"):
+        (tmp_path / place).mkdir()
+    with (
+        cluster_in(tmp_path / "first") as (file, scheduler),
+        started_batch(logs, "-o", out, "--scheduler", file) as process,
+    ):
         wait_for(lambda: worker_of(out, "slow"))
+        wait_for(lambda: list(out.glob("logs/*")))
         scheduler.kill()
         code, told, err = finish(process)
     assert (code, told) == (2, "")
     assert "Traceback" not in err
     assert err.splitlines()[-1].startswith("error: the Dask scheduler at")
     assert err.splitlines()[-1].endswith("is gone; the same call again analyzes the rest")
-    assert set(summary(out)) == {path.name for path in out.glob("logs/*")} < {"slow", "one_run", "two_run"}
+    done = {path.name for path in out.glob("logs/*")}
+    assert set(summary(out)) == done
+    assert "slow" not in done
+    written = {path: path.stat().st_mtime_ns for path in out.glob("logs/*/*.parquet")}
+    heard = Heard()
+    with cluster_in(tmp_path / "second") as (file, _):
+        result = run_batch([str(logs)], out, BatchOptions(QUIET, scheduler=file), heard)
+    status = {state.name: state.status for state in result.states}
+    assert {name for name in status if status[name] == "up to date"} == done
+    assert set(heard.shares) == set(status) - done
+    assert {path: path.stat().st_mtime_ns for path in written} == written
+    assert all_tables(out) == expected

@@ -93,10 +93,10 @@ def test_logs_that_look_the_same_are_not_even_opened(batches):
 
 
 def test_new_logs_join(batches):
-    """Those that were there keep their names, though the new one has the same."""
+    """Named as if they had been there from the first."""
     save_run(batches.logs / "three" / "run", (130, 240))
-    assert batches.run() == {"one_run": "up to date", "two_run": "up to date", "run": "done"}
-    assert set(summary(batches.out)) == {"one_run", "two_run", "run"}
+    assert batches.run() == {"one_run": "up to date", "two_run": "up to date", "three_run": "done"}
+    assert set(summary(batches.out)) == {"one_run", "two_run", "three_run"}
 
 
 def test_a_log_that_has_changed_needs_leave_to_be_replaced(batches):

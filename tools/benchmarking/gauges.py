@@ -79,6 +79,11 @@ def memory_now() -> int:
     return _status_bytes("self", "VmRSS")
 
 
+def peak_now() -> int:
+    """Bytes of memory that this process held at most so far."""
+    return _status_bytes("self", "VmHWM")
+
+
 def peak_allocated(function: Callable[[], object]) -> int:
     """Bytes that Python and numpy hold at the peak of a call, its result included."""
     tracemalloc.start()

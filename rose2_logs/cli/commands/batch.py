@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from rich.progress import TaskID
 
     from rose2_logs.batch.driver import BatchResult, LogState
-    from rose2_logs.batch.task import Progress
+    from rose2_logs.batch.task import LogOutcome, Progress
 
 EXAMPLE = (
     "Example: [bold]rose2-logs batch /data/robots 'old/*.bag' -o results --workers 8[/bold]\n\n"
@@ -103,20 +103,19 @@ class BatchDisplay:
         warning(f"{name}: {reason}; it is tried again")
         self._remove(name)
 
-    def finished(self, state: LogState) -> None:
+    def finished(self, state: LogState, outcome: LogOutcome) -> None:
         """Show how a log ended."""
-        if state.outcome is not None:
-            # A log that had moved was begun under another name.
-            self._over.add(state.outcome.name)
-            self._remove(state.outcome.name)
-            for told in state.outcome.warnings:
-                warning(f"{state.name}: {told}")
+        # A log that had moved was begun under another name.
+        self._over.add(outcome.name)
+        self._remove(outcome.name)
+        for told in outcome.warnings:
+            warning(f"{state.name}: {told}")
         self._ended += 1
         row = state.row
         if state.status == "failed":
             self._failed += 1
-            if style.debug and state.outcome and state.outcome.details:
-                print_line(escape(state.outcome.details), to_error=True)
+            if style.debug and outcome.details:
+                print_line(escape(outcome.details), to_error=True)
             error(f"{state.name}: {row['reason']}")
         else:
             found = f"{row['snapshots']} maps, {row['rooms_last']} rooms, {row['run_s']:.1f} s"

@@ -1,0 +1,172 @@
+#!/usr/bin/env python3
+"""Measure `batch` as a fleet would use it.
+
+`many` runs the real driver over 100,000 logs whose analysis is only a copy of finished results, and tells what that
+costs the driver: memory, processor time, files, the summary; then the same call again, with nothing left to do.
+
+Examples
+--------
+    python tools/measure_fleet.py many -o DIR
+    python tools/measure_fleet.py many --logs 10000 -o DIR
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections import deque
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from benchmarking.gauges import memory_now, peak_now
+from benchmarking.markdown import table
+
+import rose2_logs as rl
+from rose2_logs.batch import driver
+from rose2_logs.batch.driver import LogState, run_batch
+from rose2_logs.batch.options import BatchOptions
+from rose2_logs.batch.task import LogOutcome, LogTask, Progress, analyze_task
+from rose2_logs.workflows import analyze as analysis
+
+SAMPLE = Path(__file__).parents[1] / "sample_logs" / "office.mcap"
+LOGS_PER_FOLDER = 1000
+LINKS = 10_000
+"""File systems allow a file some ten thousand names; then another copy is linked to."""
+POINTS = (0.01, 0.1, 0.25, 0.5, 0.75, 1.0)
+"""Shares of the logs at which figures are told."""
+
+
+class Copies:
+    """Stands for the analysis of a log: gives it the results of a sample log, by links to its files."""
+
+    def __init__(self, results: Path, scratch: Path) -> None:
+        self._results, self._scratch = results, scratch
+        self._summary = json.loads((results / "summary.json").read_text(encoding="utf-8"))
+        self._count = 0
+        self.cpu_s = 0.0
+
+    def __call__(self, log: Path, folder: Path, options: rl.RunOptions, *_: object) -> None:
+        """Do what `analyze_log` is called for."""
+        start = time.process_time()
+        linked = self._scratch / f"results_{self._count // LINKS}"
+        if self._count % LINKS == 0:
+            shutil.copytree(self._results, linked)
+        self._count += 1
+        for file in linked.iterdir():
+            if file.name != "summary.json":
+                os.link(file, folder / file.name)
+        about = self._summary | {"log": options.origin}
+        (folder / "summary.json").write_text(json.dumps(about), encoding="utf-8")
+        self.cpu_s += time.process_time() - start
+
+
+class WorkersHere:
+    """Carries out the tasks in this process."""
+
+    def __init__(self, _: int) -> None:
+        self._waiting: deque[LogTask] = deque()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        pass
+
+    def submit(self, task: LogTask) -> None:
+        """Accept a task."""
+        self._waiting.append(task)
+
+    def events(self) -> Iterator[Progress | LogOutcome]:
+        """Yield the outcome of each task."""
+        while self._waiting:
+            yield analyze_task(self._waiting.popleft(), lambda _: None)
+
+
+class Watch:
+    """Listens to a batch, and looks at the memory of this process on its way."""
+
+    def __init__(self, logs: int) -> None:
+        self._at = {round(share * logs) for share in POINTS}
+        self._ended = 0
+        self._start = time.process_time()
+        self.rows: list[tuple[int, int, float]] = []
+
+    def begin(self, logs: int, up_to_date: int) -> None:
+        """Look at the driver after planning."""
+        self._look()
+        self._ended = up_to_date
+
+    def progress(self, told: Progress) -> None:
+        """Leave it."""
+
+    def retry(self, name: str, reason: str) -> None:
+        """Leave it."""
+
+    def finished(self, state: LogState, outcome: LogOutcome) -> None:
+        """Look now and then."""
+        self._ended += 1
+        if self._ended in self._at:
+            self._look()
+
+    def _look(self) -> None:
+        self.rows.append((self._ended, memory_now(), time.process_time() - self._start))
+
+
+def many(count: int, place: Path) -> None:
+    """Run a batch over so many logs, then again, each in a process of its own; print what it took."""
+    logs, results = place / "logs", place / "results"
+    for number in range(count):
+        log = logs / f"robot_{number // LOGS_PER_FOLDER:03}" / f"run_{number:06}.mcap"
+        log.parent.mkdir(parents=True, exist_ok=True)
+        log.write_bytes(b"\x89MCAP0\r\n")
+    if not results.exists():
+        rl.analyze(SAMPLE, results, max_snapshots=2)
+    for step in ("first", "again"):
+        subprocess.run([sys.executable, __file__, step, "-o", str(place), "--logs", str(count)], check=True)
+    kinds = {name: sum(len(files) for *_, files in os.walk(place / "out" / name)) for name in ("logs", "tables")}
+    sizes = [(place / "out" / f"summary.{kind}").stat().st_size for kind in ("csv", "parquet")]
+    print(f"files below logs/: {kinds['logs']:,}; below tables/: {kinds['tables']:,}; "
+          f"summary.csv: {sizes[0] / 1e6:.1f} MB, summary.parquet: {sizes[1] / 1e6:.1f} MB")  # fmt: skip
+
+
+def one_call(count: int, place: Path) -> None:
+    """Call the driver once in this process."""
+    with tempfile.TemporaryDirectory(dir=place) as scratch:
+        copies = Copies(place / "results", Path(scratch))
+        analysis.analyze_log = copies  # type: ignore[assignment]
+        driver.LocalWorkers = WorkersHere  # type: ignore[assignment, misc]
+        watch, before, start = Watch(count), memory_now(), time.process_time()
+        result = run_batch([str(place / "logs")], place / "out", BatchOptions(), watch)
+        assert len(result.states) == count
+        assert not result.failed
+        rows = [(f"{ended:,}", f"{held / 1e6:.0f}", f"{seconds:.0f}") for ended, held, seconds in watch.rows]
+        print(*table(["logs ended", "memory, MB", "processor s"], rows), sep="\n")
+        print(f"before {before / 1e6:.0f} MB, peak {peak_now() / 1e6:.0f} MB, "
+              f"{time.process_time() - start - copies.cpu_s:.0f} s of processor time for the driver")  # fmt: skip
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; returns the exit code."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("step", choices=("many", "first", "again"))
+    parser.add_argument("-o", "--output", type=Path, required=True, metavar="DIR", help="folder for all files")
+    parser.add_argument("--logs", type=int, default=100_000, metavar="N", help="how many (%(default)s)")
+    given = parser.parse_args(arguments)
+    (many if given.step == "many" else one_call)(given.logs, given.output.absolute())
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
