@@ -1,11 +1,16 @@
 #!/usr/bin/env python3
 """Measure `batch` as a fleet would use it.
 
+`speed` analyzes 200 copies of a sample log with one process, with four commands side by side that have a quarter
+of the logs each and know nothing of each other, which is what the processors allow, and with a Dask cluster of four
+local processes.
+
 `many` runs the real driver over 100,000 logs whose analysis is only a copy of finished results, and tells what that
 costs the driver: memory, processor time, files, the summary; then the same call again, with nothing left to do.
 
 Examples
 --------
+    python tools/measure_fleet.py speed -o DIR
     python tools/measure_fleet.py many -o DIR
     python tools/measure_fleet.py many --logs 10000 -o DIR
 """
@@ -21,12 +26,14 @@ import sys
 import tempfile
 import time
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from benchmarking.gauges import memory_now, peak_now
+from benchmarking.gauges import ProcessTree, memory_now, peak_now
 from benchmarking.markdown import table
 
 import rose2_logs as rl
@@ -34,6 +41,7 @@ from rose2_logs.batch import driver
 from rose2_logs.batch.driver import LogState, run_batch
 from rose2_logs.batch.options import BatchOptions
 from rose2_logs.batch.task import LogOutcome, LogTask, Progress, analyze_task
+from rose2_logs.errors import Rose2LogsError
 from rose2_logs.workflows import analyze as analysis
 
 SAMPLE = Path(__file__).parents[1] / "sample_logs" / "office.mcap"
@@ -42,6 +50,86 @@ LINKS = 10_000
 """File systems allow a file some ten thousand names; then another copy is linked to."""
 POINTS = (0.01, 0.1, 0.25, 0.5, 0.75, 1.0)
 """Shares of the logs at which figures are told."""
+
+
+PROCESSES = 4
+"""Of the cluster, and commands side by side."""
+MAPS = 2
+"""Of each log that is analyzed."""
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Seconds of wall-clock time, and of processor time of all processes."""
+
+    wall_s: float
+    cpu_s: float
+
+
+def speed(count: int, place: Path, repeats: int) -> None:
+    """Analyze so many logs in three ways, in turn, and print the least that each took."""
+    folders = [place / f"quarter_{k}" for k in range(PROCESSES)]
+    for number in range(count):
+        log = folders[number % PROCESSES] / f"run_{number:03}{SAMPLE.suffix}"
+        log.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(SAMPLE, log)
+    ways: dict[str, Callable[[], Cost]] = {
+        "one process": lambda: _commands(place, [folders], "--workers", 1),
+        "four commands side by side": lambda: _commands(
+            place, [[folder] for folder in folders], "--workers", 1
+        ),
+        "a Dask cluster of four processes": lambda: _on_cluster(place, folders),
+    }
+    costs: dict[str, list[Cost]] = {name: [] for name in ways}
+    for _ in range(repeats):
+        for name, way in ways.items():
+            costs[name].append(way())
+            print(name, costs[name][-1], f"load {os.getloadavg()[0]:.1f}", file=sys.stderr, flush=True)
+    one, limit, _ = (min(cost.wall_s for cost in each) for each in costs.values())
+    rows = []
+    for name, each in costs.items():
+        wall = min(cost.wall_s for cost in each)
+        cpu = min(cost.cpu_s for cost in each)
+        figures = [f"{wall:.1f}", f"{cpu:.1f}", f"{count / wall:.2f}", f"{one / wall:.2f}"]
+        rows.append([name, *figures, f"{100 * limit / wall:.0f}%"])
+    print(*table(["logs analyzed by", "s", "processor s", "logs per second", "gain", "of the limit"], rows), sep="\n")
+
+
+def _commands(place: Path, logs: Sequence[Sequence[Path]], *options: object, besides: Sequence[int] = ()) -> Cost:
+    """Run a ``batch`` over each of some lists of folders, all at once; other processes may do their work."""
+    start = time.perf_counter()
+    with ExitStack() as stack:
+        running = []
+        for folders in logs:
+            out = stack.enter_context(tempfile.TemporaryDirectory(dir=place))
+            command = [sys.executable, "-m", "rose2_logs", "batch", *folders, "-o", out, *options]
+            command += ["--max-snapshots", MAPS]
+            running.append(subprocess.Popen(list(map(str, command)), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL))
+        trees = [ProcessTree(pid) for pid in [*(process.pid for process in running), *besides]]
+        if any([process.wait() for process in running]):
+            raise Rose2LogsError("a batch failed")
+        wall_s = time.perf_counter() - start
+        return Cost(wall_s, sum(tree.stop().cpu_s for tree in trees))
+
+
+def _on_cluster(place: Path, folders: Sequence[Path]) -> Cost:
+    from distributed import Client
+
+    with tempfile.TemporaryDirectory(dir=place) as scratch, ExitStack() as stack:
+        where = ["--scheduler-file", f"{scratch}/scheduler.json"]
+        started = []
+        for part in (
+            ["scheduler", "--host", "127.0.0.1", "--port", "0"],
+            ["worker", "--nworkers", str(PROCESSES), "--nthreads", "1", "--local-directory", scratch],
+        ):
+            command = [sys.executable, "-m", "dask", *part, *where, "--no-dashboard"]
+            process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+            started.append(stack.enter_context(process))
+            stack.callback(process.terminate)
+        with Client(scheduler_file=where[1], set_as_default=False) as client:
+            client.wait_for_workers(PROCESSES)
+        pids = [process.pid for process in started]
+        return _commands(place, [folders], "--scheduler", where[1], besides=pids)
 
 
 class Copies:
@@ -160,11 +248,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("step", choices=("many", "first", "again"))
+    parser.add_argument("step", choices=("speed", "many", "first", "again"))
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="DIR", help="folder for all files")
-    parser.add_argument("--logs", type=int, default=100_000, metavar="N", help="how many (%(default)s)")
+    parser.add_argument("--logs", type=int, metavar="N", help="how many: by default 200 for speed, else 100000")
+    parser.add_argument("--repeats", type=int, default=2, metavar="N", help="of speed (%(default)s)")
     given = parser.parse_args(arguments)
-    (many if given.step == "many" else one_call)(given.logs, given.output.absolute())
+    place = given.output.absolute()
+    if given.step == "speed":
+        speed(given.logs or 200, place, given.repeats)
+    else:
+        (many if given.step == "many" else one_call)(given.logs or 100_000, place)
     return 0
 
 

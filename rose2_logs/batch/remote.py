@@ -38,6 +38,12 @@ CONNECT_TIMEOUT_S, SILENCE_TIMEOUT_S = 30.0, 60.0
 """Of HTTP; a download may take any time as long as bytes arrive."""
 PASSING_STATUS = (408, 429)
 """HTTP codes of errors that may pass: timeout, too many requests."""
+OBJECT_STORES = frozenset({"s3", "gs", "gcs", "az", "abfs"})
+"""File systems whose outermost folders are buckets."""
+CREDENTIALS = (
+    "S3 takes them from AWS_PROFILE, or from AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY, on every machine that "
+    "works; FSSPEC_S3_ANON=true reads public buckets without"
+)
 
 
 class TransferError(LogError):
@@ -86,8 +92,10 @@ def matching(url: str) -> list[tuple[str, bool]]:
         If they cannot be listed.
     """
     files, path = _file_system(url)
-    with _asking(url):
+    with _asking(url, files, path):
         found: dict[str, Any] = files.glob(path, detail=True)
+        if not found:
+            _require_bucket(files, path)
     return [(_url_of(each, url, path), found[each]["type"] == "directory") for each in sorted(found)]
 
 
@@ -100,8 +108,11 @@ def files_below(url: str) -> list[str]:
         If they cannot be listed.
     """
     files, path = _file_system(url)
-    with _asking(url):
-        return [_relative(each, path) for each in files.find(path)]
+    with _asking(url, files, path):
+        found = files.find(path)
+        if not found:
+            _require_bucket(files, path)
+    return [_relative(each, path) for each in found]
 
 
 def files_in(url: str) -> list[str]:
@@ -113,8 +124,9 @@ def files_in(url: str) -> list[str]:
         If they cannot be listed.
     """
     files, path = _file_system(url)
-    with _asking(url):
-        return [PurePosixPath(each["name"]).name for each in files.ls(path) if each["type"] == "file"]
+    with _asking(url, files, path):
+        listed = files.ls(path, detail=True)
+    return [PurePosixPath(each["name"]).name for each in listed if each["type"] == "file"]
 
 
 def describe(url: str) -> list[RemoteFile]:
@@ -127,7 +139,7 @@ def describe(url: str) -> list[RemoteFile]:
     """
     files, path = _file_system(url)
     name = _local_name(path, PurePosixPath(path).name or "log")
-    with _asking(url):
+    with _asking(url, files, path):
         about = files.info(path)
         # HTTP knows no folders: what is not named like a log is one.
         is_folder = about["type"] == "directory"
@@ -155,11 +167,11 @@ def fetch(url: str, described: list[RemoteFile], folder: Path) -> Path:
     TransferError
         If a file does not arrive whole.
     """
-    files, _ = _file_system(url)
+    files, path = _file_system(url)
     for file in described:
         local = folder / file.name
         local.parent.mkdir(parents=True, exist_ok=True)
-        with _asking(url):
+        with _asking(url, files, path):
             files.get_file(file.path, str(local))
         arrived = local.stat().st_size
         if file.size_bytes not in (None, arrived):
@@ -194,7 +206,7 @@ def _file_system(url: str) -> tuple[Any, str]:
 
 
 @contextmanager
-def _asking(url: str) -> Iterator[None]:
+def _asking(url: str, files: Any, path: str) -> Iterator[None]:
     """Turn any failure into an error about the log; each library behind fsspec has its own."""
     shown = Location(url).address
     try:
@@ -203,18 +215,29 @@ def _asking(url: str) -> Iterator[None]:
         # Where the server does not answer at all, HTTP's file system says "not found" too.
         if isinstance(error.__cause__, OSError):
             raise TransferError(f"{shown}: {error.__cause__}") from error
+        _require_bucket(files, path)
         raise LogError(f"{shown}: there is no such file or folder") from error
     except PermissionError as error:
         raise LogError(f"{shown}: the server gives no permission: {error}") from error
     except LogError:
         raise
     except Exception as error:
+        if "Credentials" in type(error).__name__:
+            raise LogError(f"{shown}: {error}; {CREDENTIALS}") from error
         status = getattr(error, "status", None)
         # The text of an HTTP error holds the URL with its signature.
         reason = f"HTTP {status}" if isinstance(status, int) else str(error).replace(url, shown)
         refused = isinstance(status, int) and 400 <= status < 500 and status not in PASSING_STATUS
         kind = LogError if refused else TransferError
         raise kind(f"{shown}: {type(error).__name__}: {reason}") from error
+
+
+def _require_bucket(files: Any, path: str) -> None:
+    """Tell where nothing is found because an object store has no such bucket."""
+    bucket = path.partition("/")[0]
+    schemes = (files.protocol,) if isinstance(files.protocol, str) else files.protocol
+    if OBJECT_STORES.intersection(schemes) and not files.exists(bucket):
+        raise LogError(f"{schemes[0]}://{path}: there is no bucket {bucket!r} that these credentials can see")
 
 
 def _is_web(url: str) -> bool:

@@ -184,8 +184,9 @@ def test_logs_inside_an_archive(tmp_path):
 
 def test_without_the_extra_a_url_says_what_to_install(monkeypatch):
     """In one line; so does a kind of URL whose own library is not there."""
-    with pytest.raises(LogError, match="s3fs"):
-        found("s3://bucket/run*.mcap")
+    monkeypatch.setitem(sys.modules, "gcsfs", None)
+    with pytest.raises(LogError, match="gcsfs"):
+        found("gs://bucket/run*.mcap")
     monkeypatch.setitem(sys.modules, "fsspec.core", None)
     with pytest.raises(LogError, match=r"pip install 'rose2-logs\[batch\]'"):
         found("http://host/run*.mcap")

@@ -185,9 +185,11 @@ def _characters_read() -> int:
 
 def _with_all_below(pid: int) -> Iterator[int]:
     yield pid
-    with suppress(OSError):
-        for child in (PROC / str(pid) / "task" / str(pid) / "children").read_text().split():
-            yield from _with_all_below(int(child))
+    # Any thread may have started some.
+    for children in PROC.glob(f"{pid}/task/*/children"):
+        with suppress(OSError):
+            for child in children.read_text().split():
+                yield from _with_all_below(int(child))
 
 
 def _cpu_s(pid: int) -> float:
