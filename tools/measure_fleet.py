@@ -48,7 +48,7 @@ SAMPLE = Path(__file__).parents[1] / "sample_logs" / "office.mcap"
 LOGS_PER_FOLDER = 1000
 LINKS = 10_000
 """File systems allow a file some ten thousand names; then another copy is linked to."""
-POINTS = (0.01, 0.1, 0.25, 0.5, 0.75, 1.0)
+POINTS = (0.01, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.75, 1.0)
 """Shares of the logs at which figures are told."""
 
 
@@ -208,6 +208,7 @@ class Watch:
 
     def _look(self) -> None:
         self.rows.append((self._ended, memory_now(), time.process_time() - self._start))
+        print(*self.rows[-1], file=sys.stderr, flush=True)
 
 
 def many(count: int, place: Path) -> None:

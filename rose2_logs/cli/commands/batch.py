@@ -31,6 +31,8 @@ EXAMPLE = (
 EXAMPLES = {"batch": EXAMPLE}
 MOST_BARS = 10
 """At most this many logs in progress have their own bar; a cluster may work on hundreds."""
+MOST_ROWS = 200
+"""Of a batch of more logs only those that failed are listed at the end, and no more than so many of them."""
 COLORS = {"done": "green", "up to date": "green", "failed": "bold red"}
 
 
@@ -135,13 +137,15 @@ def print_batch(result: BatchResult) -> None:
     """Print one line for each log of a batch, how many went well, and where everything is."""
     from rich.table import Table
 
+    listed = result.states if len(result.states) <= MOST_ROWS else result.failed[:MOST_ROWS]
+
     table = Table(box=None, pad_edge=False)
     table.add_column("log", overflow="fold")
     table.add_column("status", no_wrap=True)
     for heading in ("maps", "rooms", "tracks", "s"):
         table.add_column(heading, justify="right", no_wrap=True)
     table.add_column("why", overflow="fold")
-    for state in result.states:
+    for state in listed:
         row, color = state.row, COLORS[state.status]
         figures = [
             "" if row[name] is None else str(row[name]) for name in ("snapshots", "rooms_last", "tracks")
@@ -149,7 +153,10 @@ def print_batch(result: BatchResult) -> None:
         seconds = "" if row["run_s"] is None else f"{row['run_s']:.1f}"
         status = f"[{color}]{state.status}[/]"
         table.add_row(shown(state.name), status, *figures, seconds, escape(with_flags(row["reason"] or "")))
-    print_table(table)
+    if listed:
+        print_table(table)
+    if others := len(result.states) - len(listed):
+        print_line(f"{others} logs that are not listed here stand in the summary")
     counts = {status: sum(state.status == status for state in result.states) for status in COLORS}
     print_line(", ".join(f"{count} {status}" for status, count in counts.items() if count))
     print_line(f"results in [bold]{shown(result.out)}[/]")
