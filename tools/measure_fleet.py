@@ -92,10 +92,15 @@ def speed(count: int, place: Path, repeats: int) -> None:
         cpu = min(cost.cpu_s for cost in each)
         figures = [f"{wall:.1f}", f"{cpu:.1f}", f"{count / wall:.2f}", f"{one / wall:.2f}"]
         rows.append([name, *figures, f"{100 * limit / wall:.0f}%"])
-    print(*table(["logs analyzed by", "s", "processor s", "logs per second", "gain", "of the limit"], rows), sep="\n")
+    print(
+        *table(["logs analyzed by", "s", "processor s", "logs per second", "gain", "of the limit"], rows),
+        sep="\n",
+    )
 
 
-def _commands(place: Path, logs: Sequence[Sequence[Path]], *options: object, besides: Sequence[int] = ()) -> Cost:
+def _commands(
+    place: Path, logs: Sequence[Sequence[Path]], *options: object, besides: Sequence[int] = ()
+) -> Cost:
     """Run a ``batch`` over each of some lists of folders, all at once; other processes may do their work."""
     start = time.perf_counter()
     with ExitStack() as stack:
@@ -104,7 +109,11 @@ def _commands(place: Path, logs: Sequence[Sequence[Path]], *options: object, bes
             out = stack.enter_context(tempfile.TemporaryDirectory(dir=place))
             command = [sys.executable, "-m", "rose2_logs", "batch", *folders, "-o", out, *options]
             command += ["--max-snapshots", MAPS]
-            running.append(subprocess.Popen(list(map(str, command)), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL))
+            running.append(
+                subprocess.Popen(
+                    list(map(str, command)), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+                )
+            )
         trees = [ProcessTree(pid) for pid in [*(process.pid for process in running), *besides]]
         if any([process.wait() for process in running]):
             raise Rose2LogsError("a batch failed")
@@ -222,7 +231,9 @@ def many(count: int, place: Path) -> None:
         rl.analyze(SAMPLE, results, max_snapshots=2)
     for step in ("first", "again"):
         subprocess.run([sys.executable, __file__, step, "-o", str(place), "--logs", str(count)], check=True)
-    kinds = {name: sum(len(files) for *_, files in os.walk(place / "out" / name)) for name in ("logs", "tables")}
+    kinds = {
+        name: sum(len(files) for *_, files in os.walk(place / "out" / name)) for name in ("logs", "tables")
+    }
     sizes = [(place / "out" / f"summary.{kind}").stat().st_size for kind in ("csv", "parquet")]
     print(f"files below logs/: {kinds['logs']:,}; below tables/: {kinds['tables']:,}; "
           f"summary.csv: {sizes[0] / 1e6:.1f} MB, summary.parquet: {sizes[1] / 1e6:.1f} MB")  # fmt: skip
@@ -250,8 +261,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("step", choices=("speed", "many", "first", "again"))
-    parser.add_argument("-o", "--output", type=Path, required=True, metavar="DIR", help="folder for all files")
-    parser.add_argument("--logs", type=int, metavar="N", help="how many: by default 200 for speed, else 100000")
+    parser.add_argument(
+        "-o", "--output", type=Path, required=True, metavar="DIR", help="folder for all files"
+    )
+    parser.add_argument(
+        "--logs", type=int, metavar="N", help="how many: by default 200 for speed, else 100000"
+    )
     parser.add_argument("--repeats", type=int, default=2, metavar="N", help="of speed (%(default)s)")
     given = parser.parse_args(arguments)
     place = given.output.absolute()

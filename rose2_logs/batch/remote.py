@@ -41,8 +41,8 @@ PASSING_STATUS = (408, 429)
 OBJECT_STORES = frozenset({"s3", "gs", "gcs", "az", "abfs"})
 """File systems whose outermost folders are buckets."""
 CREDENTIALS = (
-    "S3 takes them from AWS_PROFILE, or from AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY, on every machine that "
-    "works; FSSPEC_S3_ANON=true reads public buckets without"
+    "S3 takes them from AWS_PROFILE, or from AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY, on every machine "
+    "that works; FSSPEC_S3_ANON=true reads public buckets without"
 )
 
 

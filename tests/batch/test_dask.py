@@ -163,7 +163,7 @@ def test_without_the_extra_the_option_says_what_to_install(monkeypatch):
 
 
 def test_a_scheduler_that_is_lost_ends_the_batch_in_one_line(undisturbed, tmp_path):
-    """What was finished stands; the same call with another scheduler does the rest, and every byte is right."""
+    """What was finished stands; the same call with another scheduler does the rest, every byte right."""
     (logs, expected), out = undisturbed, tmp_path / "out"
     for place in ("first", "second"):
         (tmp_path / place).mkdir()

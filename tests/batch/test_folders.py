@@ -37,7 +37,9 @@ def test_every_log_has_a_name_of_its_own_whatever_the_order(targets: set[str]):
     assert dict(zip(backward, names_of(*backward), strict=True)) == forward
 
 
-@given(st.sets(st.from_regex(r"/([ab.]/){0,2}(run|a_run)(\.mcap|\.bag)?", fullmatch=True), min_size=2), st.data())
+@given(
+    st.sets(st.from_regex(r"/([ab.]/){0,2}(run|a_run)(\.mcap|\.bag)?", fullmatch=True), min_size=2), st.data()
+)
 def test_a_batch_that_is_resumed_names_the_rest_as_it_would_have(targets: set[str], data: st.DataObject):
     """Whichever of the logs have their names already."""
     names = dict(zip(sorted(targets), names_of(*sorted(targets)), strict=True))

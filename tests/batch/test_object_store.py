@@ -125,7 +125,9 @@ def test_no_credentials_is_one_line_that_tells_how_to_give_them(what: str, monke
     """No further try would change it."""
     monkeypatch.delenv("AWS_ACCESS_KEY_ID")
     monkeypatch.delenv("AWS_SECRET_ACCESS_KEY")
-    with pytest.raises(LogError, match=r"credentials; S3 takes them from AWS_PROFILE.*FSSPEC_S3_ANON") as told:
+    with pytest.raises(
+        LogError, match=r"credentials; S3 takes them from AWS_PROFILE.*FSSPEC_S3_ANON"
+    ) as told:
         signature_of(Location(found(f"s3://nowhere/{what}")[0]))
     assert not isinstance(told.value, TransferError)
 

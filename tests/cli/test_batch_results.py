@@ -17,12 +17,16 @@ def result_of(logs: int, failed: int) -> BatchResult:
     for number in range(logs):
         name = f"run_{number:06}"
         is_bad = number % (logs // failed) == 0
-        row = failed_row(name, f"/data/{name}.mcap", "broken") | ({} if is_bad else {"reason": "", "run_s": 1.0})
+        row = failed_row(name, f"/data/{name}.mcap", "broken") | (
+            {} if is_bad else {"reason": "", "run_s": 1.0}
+        )
         states.append(LogState(name, "failed" if is_bad else "done", row))
     return BatchResult(Path("/results"), tuple(states), (Path("/results/summary.csv"),))
 
 
-@pytest.mark.parametrize(("logs", "failed", "lines"), [(20, 4, 20), (20_000, 4, 4), (20_000, 1000, MOST_ROWS)])
+@pytest.mark.parametrize(
+    ("logs", "failed", "lines"), [(20, 4, 20), (20_000, 4, 4), (20_000, 1000, MOST_ROWS)]
+)
 def test_a_large_batch_lists_what_failed(capsys, logs: int, failed: int, lines: int):
     """And no more than can be looked through; it says how many are not listed."""
     print_batch(result_of(logs, failed))
