@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
 """Measure `batch` as a fleet would use it.
 
-`speed` analyzes 200 copies of a sample log with one process, with four commands side by side that have a quarter
-of the logs each and know nothing of each other, which is what the processors allow, and with a Dask cluster of four
-local processes.
+`speed` analyzes 200 copies of a sample log with four commands side by side that have a quarter of the logs each
+and know nothing of each other, which is what the processors allow, with a Dask cluster of four local processes,
+and with one process.
 
-`many` runs the real driver over 100,000 logs whose analysis is only a copy of finished results, and tells what that
-costs the driver: memory, processor time, files, the summary; then the same call again, with nothing left to do.
+`many` runs the real driver over 100,000 logs whose analysis is only a copy of finished results, and tells
+what that costs the driver: memory, processor time, files, the summary; then the same call again, with nothing
+left to do.
 
 Examples
 --------
@@ -31,7 +32,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 from benchmarking.gauges import ProcessTree, memory_now, peak_now
 from benchmarking.markdown import table
@@ -74,18 +75,18 @@ def speed(count: int, place: Path, repeats: int) -> None:
         log.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(SAMPLE, log)
     ways: dict[str, Callable[[], Cost]] = {
-        "one process": lambda: _commands(place, [folders], "--workers", 1),
         "four commands side by side": lambda: _commands(
             place, [[folder] for folder in folders], "--workers", 1
         ),
         "a Dask cluster of four processes": lambda: _on_cluster(place, folders),
+        "one process": lambda: _commands(place, [folders], "--workers", 1),
     }
     costs: dict[str, list[Cost]] = {name: [] for name in ways}
     for _ in range(repeats):
         for name, way in ways.items():
             costs[name].append(way())
             print(name, costs[name][-1], f"load {os.getloadavg()[0]:.1f}", file=sys.stderr, flush=True)
-    one, limit, _ = (min(cost.wall_s for cost in each) for each in costs.values())
+    limit, _, one = (min(cost.wall_s for cost in each) for each in costs.values())
     rows = []
     for name, each in costs.items():
         wall = min(cost.wall_s for cost in each)
@@ -115,7 +116,7 @@ def _commands(
                 )
             )
         trees = [ProcessTree(pid) for pid in [*(process.pid for process in running), *besides]]
-        if any([process.wait() for process in running]):
+        if sum(process.wait() for process in running):
             raise Rose2LogsError("a batch failed")
         wall_s = time.perf_counter() - start
         return Cost(wall_s, sum(tree.stop().cpu_s for tree in trees))
@@ -135,7 +136,8 @@ def _on_cluster(place: Path, folders: Sequence[Path]) -> Cost:
             process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
             started.append(stack.enter_context(process))
             stack.callback(process.terminate)
-        with Client(scheduler_file=where[1], set_as_default=False) as client:
+        connect: Any = Client
+        with connect(scheduler_file=where[1], set_as_default=False) as client:
             client.wait_for_workers(PROCESSES)
         pids = [process.pid for process in started]
         return _commands(place, [folders], "--scheduler", where[1], besides=pids)
@@ -243,8 +245,8 @@ def one_call(count: int, place: Path) -> None:
     """Call the driver once in this process."""
     with tempfile.TemporaryDirectory(dir=place) as scratch:
         copies = Copies(place / "results", Path(scratch))
-        analysis.analyze_log = copies  # type: ignore[assignment]
-        driver.LocalWorkers = WorkersHere  # type: ignore[assignment, misc]
+        vars(analysis)["analyze_log"] = copies
+        vars(driver)["LocalWorkers"] = WorkersHere
         watch, before, start = Watch(count), memory_now(), time.process_time()
         result = run_batch([str(place / "logs")], place / "out", BatchOptions(), watch)
         assert len(result.states) == count
@@ -264,9 +266,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "-o", "--output", type=Path, required=True, metavar="DIR", help="folder for all files"
     )
-    parser.add_argument(
-        "--logs", type=int, metavar="N", help="how many: by default 200 for speed, else 100000"
-    )
+    parser.add_argument("--logs", type=int, metavar="N", help="200 for speed, else 100,000")
     parser.add_argument("--repeats", type=int, default=2, metavar="N", help="of speed (%(default)s)")
     given = parser.parse_args(arguments)
     place = given.output.absolute()

@@ -25,8 +25,8 @@ CONNECT_TIMEOUT_S = 10.0
 LOOK_EVERY_S = 2.0
 """Time between two checks whether the scheduler still answers and has workers."""
 LOGS_PER_THREAD = 4
-"""Logs that the scheduler holds for each thread of its workers: one in work, the others so that none waits for
-this process. The rest of a large batch stays here, so that the scheduler needs no more memory for it."""
+"""Logs that the scheduler holds for each thread of its workers: one in work, the others so that none waits
+for this process. The rest of a large batch stays here, so that the scheduler needs no more memory for it."""
 LEAST_LOGS = 16
 """As many at least, also while no worker has joined: a cluster that grows by itself must see that there is
 work."""
