@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """Measure `batch` as a fleet would use it.
 
-`speed` analyzes 200 copies of a sample log with four commands side by side that have a quarter of the logs each
-and know nothing of each other, which is what the processors allow, with a Dask cluster of four local processes,
-and with one process.
+`speed` analyzes 200 copies of a sample log with four commands side by side that have a quarter of the logs
+each and know nothing of each other, which is what the processors allow, with a Dask cluster of four local
+processes, and with one process.
 
 `many` runs the real driver over 100,000 logs whose analysis is only a copy of finished results, and tells
 what that costs the driver: memory, processor time, files, the summary; then the same call again, with nothing

@@ -162,6 +162,22 @@ def test_without_the_extra_the_option_says_what_to_install(monkeypatch):
         DaskWorkers("127.0.0.1:8786")
 
 
+def test_a_batch_that_is_killed_goes_on_with_the_same_cluster(cluster, undisturbed, tmp_path):
+    """Its workers leave the log that they had, do the rest for the next call, and every byte is right."""
+    (logs, expected), out = undisturbed, tmp_path / "out"
+    with started_batch(logs, "-o", out, "--scheduler", cluster[0]) as process:
+        wait_for(lambda: worker_of(out, "slow"))
+        wait_for(lambda: list(out.glob("logs/*")))
+        process.kill()
+        finish(process)
+    done = {path.name for path in out.glob("logs/*")}
+    result = run_batch([str(logs)], out, BatchOptions(QUIET, scheduler=cluster[0]), Heard())
+    assert done <= {state.name for state in result.states if state.status == "up to date"} | {"slow"}
+    assert not result.failed
+    assert all_tables(out) == expected
+    assert not [path for path in tree(out) if path.startswith(".batch")]
+
+
 def test_a_scheduler_that_is_lost_ends_the_batch_in_one_line(undisturbed, tmp_path):
     """What was finished stands; the same call with another scheduler does the rest, every byte right."""
     (logs, expected), out = undisturbed, tmp_path / "out"

@@ -92,6 +92,19 @@ def test_a_record_comes_back_as_it_was_written(log: Path, tmp_path: Path):
     assert read_record(tmp_path / "nowhere") is None
 
 
+def test_the_settings_of_many_logs_are_held_once(log: Path, tmp_path: Path):
+    """They are most of a record, and a fleet has a hundred thousand of those."""
+    for name in ("one", "two"):
+        folder = tmp_path / name
+        folder.mkdir()
+        Record(f"/data/{name}", local_signature(log), name, deciding_settings(RunOptions())).write(folder)
+    one, two = (read_record(tmp_path / name) for name in ("one", "two"))
+    assert one is not None
+    assert two is not None
+    assert one.settings is two.settings
+    assert one != two
+
+
 @pytest.mark.parametrize(
     ("now", "told"),
     [
