@@ -21,6 +21,7 @@ from rose2_logs.system.files import part_of, replacing, writing
 TABLES_FOLDER = "tables"
 PARTITION = "log"
 SUMMARY_NAME = "summary"
+EVERY_TABLE = (*TABLES, BACK_PROJECTED)
 
 SUMMARY_COLUMNS: dict[str, tuple[pa.DataType, str]] = {
     "log": (pa.string(), "name of the log: its folder under logs/, its partition under tables/"),
@@ -61,7 +62,7 @@ def publish_tables(out: Path, name: str) -> None:
     OutputError
         If they cannot be written.
     """
-    for table in (*TABLES, BACK_PROJECTED):
+    for table in EVERY_TABLE:
         source = out / LOGS_FOLDER / name / f"{table}.parquet"
         target = out / TABLES_FOLDER / table / f"{PARTITION}={name}" / f"{table}.parquet"
         with writing(target):

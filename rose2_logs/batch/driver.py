@@ -8,12 +8,13 @@ import logging
 import os
 import re
 import shutil
+import tempfile
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from rose2_logs.batch import dataset
 from rose2_logs.batch.finding import find_logs
@@ -21,14 +22,24 @@ from rose2_logs.batch.folders import LOGS_FOLDER, assign_names, locked, put_in_p
 from rose2_logs.batch.local_workers import LocalWorkers
 from rose2_logs.batch.location import Location
 from rose2_logs.batch.options import BatchOptions
-from rose2_logs.batch.record import Record, Signature, deciding_settings, local_signature, read_record
+from rose2_logs.batch.record import (
+    RECORD,
+    Record,
+    Signature,
+    deciding_settings,
+    local_signature,
+    read_record,
+)
 from rose2_logs.batch.task import LogOutcome, LogTask, Progress
 from rose2_logs.errors import LogError, OutputError, ParameterError
 from rose2_logs.io.discovery import BAG_DESCRIPTION
-from rose2_logs.runs.summary import SUMMARY
+from rose2_logs.runs.summary import SUMMARY, write_json
 from rose2_logs.runs.tables import BACK_PROJECTED, TABLES
 from rose2_logs.system.files import require_utf8
 from rose2_logs.system.workers import usable_cpus
+
+if TYPE_CHECKING:
+    from rose2_logs.batch.store import Store
 
 logger = logging.getLogger(__name__)
 
@@ -54,9 +65,9 @@ class LogState:
 
 @dataclass(frozen=True)
 class BatchResult:
-    """The outcome of a batch: how each log ended, sorted by name, and the files of the summary."""
+    """The outcome of a batch: where its results are, how each log ended, sorted by name, and its summary."""
 
-    out: Path
+    out: str
     states: tuple[LogState, ...]
     files: tuple[Path, ...]
 
@@ -111,7 +122,8 @@ def run_batch(arguments: Sequence[str], out: Path, options: BatchOptions, listen
     arguments : sequence of str
         Logs, folders, patterns, URLs; see `find_logs`.
     out : path
-        Output folder, created if needed. Workers on other machines must see it at the same path.
+        Output folder, created if needed. Workers on other machines must see it at the same path. Or a URL of
+        an object store, to which the workers upload their results.
     options : BatchOptions
         What to take from each log, how to analyze it, and by which workers.
     listener : Listener
@@ -120,7 +132,7 @@ def run_batch(arguments: Sequence[str], out: Path, options: BatchOptions, listen
     Raises
     ------
     LogError
-        If there are no logs.
+        If there are no logs, or a URL for results cannot be written to.
     ParameterError
         If the scheduler does not answer.
     OutputError
@@ -130,27 +142,60 @@ def run_batch(arguments: Sequence[str], out: Path, options: BatchOptions, listen
         If the scheduler is lost.
     """
     # A path holds one of the two slashes of a URL.
-    if re.match(r"[a-z][a-z0-9+.-]+:/", str(out)):
-        raise ParameterError(f"{out}: results go to a folder, not to a URL")
+    if url := re.match(r"([a-z][a-z0-9+.-]+):/+(.+)", str(out)):
+        if url[1] in ("http", "https", "file"):
+            raise ParameterError(f"{out}: results go to a folder or to an object store")
+        with tempfile.TemporaryDirectory(prefix="rose2_logs_") as scratch:
+            return _run_batch(arguments, Path(scratch), f"{url[1]}://{url[2]}", options, listener)
     out = Path(os.path.abspath(out))  # noqa: PTH100 (as in find_logs)
     require_utf8(out)
-    logs = find_logs(arguments, out)
-    with locked(out), work_folder(out) as work:
-        batch = _Batch(out, work, options, listener)
+    return _run_batch(arguments, out, "", options, listener)
+
+
+def _run_batch(
+    arguments: Sequence[str], out: Path, url: str, options: BatchOptions, listener: Listener
+) -> BatchResult:
+    """Run a batch whose results go to a folder, or by way of its workers to a URL.
+
+    Then the folder holds only records and summaries of the logs.
+    """
+    logs = [log for log in find_logs(arguments, out) if not (url and log.target.startswith(f"{url}/"))]
+    with locked(out), work_folder(out) as work, _opened(url, work.name) as store:
+        batch = _Batch(out, work, options, listener, store)
         tasks = batch.plan(logs)
         try:
             batch.carry_out(tasks)
         finally:
             files = batch.sum_up()
-    return BatchResult(out, tuple(sorted(batch.states, key=lambda state: state.name)), files)
+    return BatchResult(url or str(out), tuple(sorted(batch.states, key=lambda state: state.name)), files)
+
+
+@contextmanager
+def _opened(url: str, run: str) -> Iterator[Store | None]:
+    """Open a store for results, where there is a URL of one."""
+    if not url:
+        yield None
+        return
+    from rose2_logs.batch.store import Store
+
+    store = Store(url, run)
+    store.open()
+    try:
+        yield store
+    finally:
+        store.close()
 
 
 class _Batch:
     """A running batch: earlier results, tasks under way, and how the logs so far ended."""
 
-    def __init__(self, out: Path, work: Path, options: BatchOptions, listener: Listener) -> None:
+    def __init__(
+        self, out: Path, work: Path, options: BatchOptions, listener: Listener, store: Store | None = None
+    ) -> None:
         self.states: list[LogState] = []
         self._out = out
+        self._store = store
+        self._in_store = store.fetch(out) if store else {}
         self._work = work
         self._options = options
         self._listener = listener
@@ -175,6 +220,7 @@ class _Batch:
                 task,
                 is_whole=self._is_whole(known_name),
                 may_replace=self._may_replace,
+                store=self._store.url if self._store else "",
             )
             if task.stands_by(look):
                 self.states.append(LogState(name, "up to date", dataset.summary_row(self._out, name)))
@@ -212,12 +258,19 @@ class _Batch:
         finished = [name for name, record in self._records.items() if record is not None]
         rows = {state.name: state.row for state in self.states}
         new = {state.name for state in self.states if state.status == "done"}
-        for name in finished:
-            if name not in new:
-                dataset.publish_tables(self._out, name)
-        dataset.withdraw_tables(self._out, finished)
+        if self._store is None:
+            for name in finished:
+                if name not in new:
+                    dataset.publish_tables(self._out, name)
+            dataset.withdraw_tables(self._out, finished)
+        else:
+            self._store.withdraw_tables(finished)
         others = [dataset.summary_row(self._out, name) for name in finished if name not in rows]
-        return dataset.write_summary_tables(self._out, [*rows.values(), *others])
+        files = dataset.write_summary_tables(self._out, [*rows.values(), *others])
+        if self._store is not None:
+            for file in files:
+                self._store.put(file, file.name)
+        return files
 
     def _moved(self, looks: dict[Location, Signature | None], known: dict[str, str]) -> dict[Location, str]:
         """Earlier results of logs that seem to have moved, by name and size; the workers make sure."""
@@ -250,10 +303,8 @@ class _Batch:
         wanted += ["*.rose2.mcap"] if asked.annotated_log else []
         wanted += [f"{BACK_PROJECTED}.parquet"] if asked.back_project else []
         wanted += [BAG_DESCRIPTION] if asked.bag else []
-        try:
-            there = os.listdir(self._out / LOGS_FOLDER / name)  # noqa: PTH208 (names alone)
-        except OSError:
-            return False
+        folder = self._out / LOGS_FOLDER / name
+        there = self._in_store.get(name, []) if self._store else _names_in(folder)
         return all(fnmatch.filter(there, each) for each in wanted)
 
     def _check_settings(self, names: set[str]) -> None:
@@ -266,7 +317,7 @@ class _Batch:
         if others and not self._may_replace:
             name, difference = next(iter(others.items()))
             raise OutputError(
-                f"{self._out}: holds results of other options ({len(others)} logs; {name}: {difference}); "
+                f"{self._store.url if self._store else self._out}: holds results of other options ({len(others)} logs; {name}: {difference}); "
                 "choose another folder, or allow overwriting to analyze the logs given now again "
                 "(overwrite=True)"
             )
@@ -293,11 +344,17 @@ class _Batch:
             if outcome.results is not None:
                 put_in_place(outcome.results, self._out, name)
             elif outcome.record is not None:
+                folder.mkdir(parents=True, exist_ok=True)
                 outcome.record.write(folder)
+            if self._store is not None and outcome.summary is not None:
+                write_json(folder / SUMMARY, outcome.summary)
+            elif self._store is not None and outcome.record is not None:
+                self._store.put(folder / RECORD, f"{LOGS_FOLDER}/{name}/{RECORD}")
             if outcome.status != "failed":
                 self._records[name] = read_record(folder)
-                dataset.publish_tables(self._out, name)
-        except (OSError, OutputError) as error:
+                if self._store is None:
+                    dataset.publish_tables(self._out, name)
+        except (OSError, OutputError, LogError) as error:
             outcome = dataclasses.replace(outcome, status="failed", reason=f"{folder}: {error}")
         # With what lost workers may have left of it.
         shutil.rmtree(self._work / task.name, ignore_errors=True)
@@ -308,6 +365,13 @@ class _Batch:
         status = "up to date" if outcome.status == "unchanged" else outcome.status
         self.states.append(LogState(name, status, row))
         self._listener.finished(self.states[-1], outcome)
+
+
+def _names_in(folder: Path) -> list[str]:
+    try:
+        return os.listdir(folder)  # noqa: PTH208 (names alone)
+    except OSError:
+        return []
 
 
 def _local_look(log: Location) -> Signature | None:

@@ -16,7 +16,6 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from rose2_logs.batch.location import Location
-from rose2_logs.batch.task import RUNNING
 from rose2_logs.io.discovery import stem_of
 from rose2_logs.system import files
 from rose2_logs.system.files import writing
@@ -25,7 +24,8 @@ LOGS_FOLDER = "logs"
 WORK_FOLDER = ".batch"
 """In the folder for results: unfinished results and the lock. It may be removed while no batch runs."""
 UNFINISHED, REPLACED, LOCK = "unfinished", "replaced", "lock"
-
+RUNNING = "running"
+"""File in the folder for unfinished results that is there as long as the batch runs."""
 
 LONGEST_BYTES = 120
 """File systems allow names of 255 bytes; endings and ``log=`` are added."""

@@ -80,7 +80,7 @@ def check(url: str) -> None:
     LogError
         If not.
     """
-    _file_system(url)
+    file_system(url)
 
 
 def matching(url: str) -> list[tuple[str, bool]]:
@@ -91,8 +91,8 @@ def matching(url: str) -> list[tuple[str, bool]]:
     LogError
         If they cannot be listed.
     """
-    files, path = _file_system(url)
-    with _asking(url, files, path):
+    files, path = file_system(url)
+    with asking(url, files, path):
         found: dict[str, Any] = files.glob(path, detail=True)
         if not found:
             _require_bucket(files, path)
@@ -107,8 +107,8 @@ def files_below(url: str) -> list[str]:
     LogError
         If they cannot be listed.
     """
-    files, path = _file_system(url)
-    with _asking(url, files, path):
+    files, path = file_system(url)
+    with asking(url, files, path):
         found = files.find(path)
         if not found:
             _require_bucket(files, path)
@@ -123,8 +123,8 @@ def files_in(url: str) -> list[str]:
     LogError
         If they cannot be listed.
     """
-    files, path = _file_system(url)
-    with _asking(url, files, path):
+    files, path = file_system(url)
+    with asking(url, files, path):
         listed = files.ls(path, detail=True)
     return [PurePosixPath(each["name"]).name for each in listed if each["type"] == "file"]
 
@@ -137,9 +137,9 @@ def describe(url: str) -> list[RemoteFile]:
     LogError
         If there is no such log, or the server does not answer.
     """
-    files, path = _file_system(url)
+    files, path = file_system(url)
     name = _local_name(path, PurePosixPath(path).name or "log")
-    with _asking(url, files, path):
+    with asking(url, files, path):
         about = files.info(path)
         # HTTP knows no folders: what is not named like a log is one.
         is_folder = about["type"] == "directory"
@@ -167,11 +167,11 @@ def fetch(url: str, described: list[RemoteFile], folder: Path) -> Path:
     TransferError
         If a file does not arrive whole.
     """
-    files, path = _file_system(url)
+    files, path = file_system(url)
     for file in described:
         local = folder / file.name
         local.parent.mkdir(parents=True, exist_ok=True)
-        with _asking(url, files, path):
+        with asking(url, files, path):
             files.get_file(file.path, str(local))
         arrived = local.stat().st_size
         if file.size_bytes not in (None, arrived):
@@ -181,7 +181,14 @@ def fetch(url: str, described: list[RemoteFile], folder: Path) -> Path:
     return folder / PurePosixPath(described[0].name).parts[0]
 
 
-def _file_system(url: str) -> tuple[Any, str]:
+def file_system(url: str) -> tuple[Any, str]:
+    """Open the file system of a URL, and tell what it calls the URL.
+
+    Raises
+    ------
+    LogError
+        If the packages are not installed that it takes.
+    """
     shown = Location(url).address
     try:
         from fsspec.core import url_to_fs
@@ -206,7 +213,7 @@ def _file_system(url: str) -> tuple[Any, str]:
 
 
 @contextmanager
-def _asking(url: str, files: Any, path: str) -> Iterator[None]:
+def asking(url: str, files: Any, path: str) -> Iterator[None]:
     """Turn any failure into an error about the log; each library behind fsspec has its own."""
     shown = Location(url).address
     try:

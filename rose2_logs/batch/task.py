@@ -17,9 +17,10 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from rose2_logs import __version__
+from rose2_logs.batch.folders import RUNNING
 from rose2_logs.batch.location import Location
 from rose2_logs.batch.record import Record, Signature, deciding_settings, signature_of
 from rose2_logs.config.run_options import RunOptions
@@ -32,7 +33,6 @@ REPORT_EVERY_S = 0.5
 """Minimum time between two reports of a log's progress: what an eye can follow."""
 MOST_WARNINGS = 5
 """Maximum number of warnings of one log that are shown; the rest are counted."""
-RUNNING = "running"
 TRANSIENT = frozenset(
     {
         errno.EIO,
@@ -80,6 +80,8 @@ class LogTask:
         Whether the earlier results may be replaced if the log has changed.
     attempt : int
         Number of the try, from 1.
+    store : str
+        URL that results are uploaded to by the worker; empty if they are put in place from `work`.
     version : str
         Version of rose2-logs that made the task.
     """
@@ -93,6 +95,7 @@ class LogTask:
     is_whole: bool = False
     may_replace: bool = False
     attempt: int = 1
+    store: str = ""
     version: str = __version__
 
     def stands_by(self, signature: Signature | None) -> bool:
@@ -124,7 +127,9 @@ class LogOutcome:
     results : path, optional
         Folder with the new results, complete, to be put in place.
     record : Record, optional
-        The new record of an unchanged log.
+        The new record of an unchanged log, or of one whose results were uploaded.
+    summary : dict, optional
+        What ``summary.json`` of uploaded results holds.
     reason : str
         Why it failed, in one line.
     is_transient : bool
@@ -143,6 +148,7 @@ class LogOutcome:
     status: Literal["done", "unchanged", "failed"]
     results: Path | None = None
     record: Record | None = None
+    summary: dict[str, Any] | None = None
     reason: str = ""
     is_transient: bool = False
     tries: int = 1
@@ -223,6 +229,7 @@ def _analyze(task: LogTask, report: Report, warning_log: WarningLog) -> LogOutco
 
 
 def _analyze_local(task: LogTask, path: Path, signature: Signature, report: Report) -> LogOutcome:
+    from rose2_logs.batch.store import Store
     from rose2_logs.runs.provenance import fingerprint
     from rose2_logs.runs.summary import SUMMARY
     from rose2_logs.workflows.analyze import analyze_log
@@ -243,7 +250,7 @@ def _analyze_local(task: LogTask, path: Path, signature: Signature, report: Repo
         def on_snapshot(_: object, share: float) -> None:
             nonlocal reported
             if time.monotonic() - reported >= REPORT_EVERY_S:
-                if not (task.work / RUNNING).exists():
+                if not (task.store or (task.work / RUNNING).exists()):
                     raise BatchOverError("the batch has ended")
                 reported = time.monotonic()
                 report(Progress(task.name, share))
@@ -253,8 +260,15 @@ def _analyze_local(task: LogTask, path: Path, signature: Signature, report: Repo
         if not task.log.is_remote and signature_of(task.log).files != signature.files:
             raise LogError(f"{task.log.address}: changed while it was read; run again when it is whole")
         summary = json.loads((folder / SUMMARY).read_text(encoding="utf-8"))
-        _record(task, signature, summary["input"]["sha256"]).write(folder)
-        return LogOutcome(task.name, "done", results=folder)
+        record = _record(task, signature, summary["input"]["sha256"])
+        record.write(folder)
+        if not task.store:
+            return LogOutcome(task.name, "done", results=folder)
+        store = Store(task.store, task.work.name)
+        if not store.is_open():
+            raise BatchOverError("the batch has ended")
+        store.upload(folder, task.name)
+        return LogOutcome(task.name, "done", record=record, summary=summary)
 
 
 def _confirmed(task: LogTask, known: Record, signature: Signature) -> Record:
@@ -285,6 +299,10 @@ def _attempt_folder(task: LogTask) -> Iterator[Path]:
 
     Its name holds those of the machine and the process, for people who look for them.
     """
+    if task.store:
+        with tempfile.TemporaryDirectory(prefix="rose2_logs_", ignore_cleanup_errors=True) as scratch:
+            yield Path(scratch)
+        return
     if not (task.work / RUNNING).exists():
         raise OutputError(
             f"{task.work.parents[2]}: not seen from {platform.node()}; workers must share that folder"

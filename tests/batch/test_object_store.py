@@ -7,7 +7,18 @@ import signal
 from pathlib import Path
 
 import pytest
-from batches import Heard, finish, make_logs, run_batch, started_batch, summary, table_bytes, worker_of
+from batches import (
+    Heard,
+    WorkersHere,
+    finish,
+    make_logs,
+    run_batch,
+    started_batch,
+    summary,
+    table_bytes,
+    tree,
+    worker_of,
+)
 from commands import wait_for
 
 from rose2_logs.batch import driver
@@ -109,6 +120,65 @@ def test_a_batch_that_is_killed_goes_on_and_ends_with_every_byte_right(bucket, t
     assert signature_of(Location(f"{url}/slow")).proves_unchanged_since(before)
     files.pipe(f"{name}/runs/slow/map0.yaml", files.cat(f"{name}/runs/slow/map0.yaml") + b"\n")
     assert not signature_of(Location(f"{url}/slow")).proves_unchanged_since(before)
+
+
+def test_results_in_a_bucket_survive_a_kill_and_are_those_of_a_folder(bucket, tmp_path):
+    """Logs and results are in one bucket; what is there whole is not made again, and nothing else is left."""
+    files, name, logs = bucket
+    files.rm(f"{name}/runs/bag", recursive=True)
+    url, out = f"s3://{name}", f"s3://{name}/results"
+
+    def finished() -> set[str]:
+        files.invalidate_cache()
+        return {path.split("/")[-2] for path in files.glob(f"{name}/results/logs/*/.batch.json")}
+
+    with started_batch(url, "-o", out, "--workers", 2) as process:
+        wait_for(finished)
+        os.killpg(process.pid, signal.SIGKILL)
+        finish(process)
+    done = finished()
+    assert done
+    assert "slow" not in done
+    heard, options = Heard(), BatchOptions(QUIET, workers=1)
+    result = driver.run_batch([url], out, options, heard)
+    assert {state.name for state in result.states if state.status == "up to date"} == done
+    assert set(heard.shares) == LOGS - done
+    assert result.out == out
+
+    code, _, err = run_batch(logs, "-o", tmp_path / "out", "--workers", 2)
+    assert code == 0, err
+    files.invalidate_cache()
+    below = {path.removeprefix(f"{name}/results/") for path in files.find(f"{name}/results")}
+    assert below == {*tree(tmp_path / "out")}
+    for path in below:
+        if path.endswith(".parquet") and path != "summary.parquet":
+            assert files.cat(f"{name}/results/{path}") == (tmp_path / "out" / path).read_bytes()
+    rows = files.cat(f"{name}/results/summary.csv").decode().splitlines()
+    assert [row.split(",")[:2] for row in rows[1:]] == [[log, "done"] for log in sorted(LOGS)]
+
+    again = driver.run_batch([url], out, options, Heard())
+    assert {state.status for state in again.states} == {"up to date"}
+    with pytest.raises(LogError, match="there is no bucket 'nowhere'"):
+        driver.run_batch([url], "s3://nowhere/results", options, Heard())
+
+
+def test_results_of_a_log_that_changed_replace_the_earlier_ones(bucket, monkeypatch):
+    """Also in the data set; what the new ones lack is removed, and so is what belongs to no log."""
+    files, name, _ = bucket
+    monkeypatch.setattr(driver, "LocalWorkers", WorkersHere)
+    url, out = f"s3://{name}/runs/one/run", f"s3://{name}/results"
+    full = RunOptions(recording=False, annotated_log=False, back_project=True)
+    driver.run_batch([url], out, BatchOptions(full), Heard())
+    files.pipe(f"{name}/results/tables/rooms/log=gone/rooms.parquet", b"")
+    files.rm_file(f"{name}/runs/one/run/map0.yaml")
+    kept = files.cat(f"{name}/results/tables/maps/log=run/maps.parquet")
+    assert driver.run_batch([url], out, BatchOptions(QUIET), Heard()).failed
+    files.invalidate_cache()
+    assert files.cat(f"{name}/results/tables/maps/log=run/maps.parquet") == kept
+    assert not driver.run_batch([url], out, BatchOptions(QUIET, overwrite=True), Heard()).failed
+    files.invalidate_cache()
+    assert files.cat(f"{name}/results/tables/maps/log=run/maps.parquet") != kept
+    assert not [path for path in files.find(f"{name}/results") if "back_projected" in path or "gone" in path]
 
 
 @pytest.mark.parametrize("what", ["runs", "runs/*.mcap", "runs/a.mcap"])

@@ -300,8 +300,9 @@ def test_a_log_that_changes_while_it_is_read_fails(batches, monkeypatch):
     assert batches.snapshots("one_run") == 2
 
 
-def test_results_go_to_a_folder(batches):
-    """A URL for results is refused, not taken for a folder's name."""
-    batches.out = Path("s3://bucket/results")
-    with pytest.raises(ParameterError, match="not to a URL"):
+@pytest.mark.parametrize("url", ["https://host/results", "file:///results"])
+def test_results_go_to_a_folder_or_a_store(batches, url: str):
+    """Another URL for results is refused, not taken for a folder's name."""
+    batches.out = Path(url)
+    with pytest.raises(ParameterError, match="to a folder or to an object store"):
         batches.run()

@@ -21,7 +21,7 @@ def result_of(logs: int, failed: int) -> BatchResult:
             {} if is_bad else {"reason": "", "run_s": 1.0}
         )
         states.append(LogState(name, "failed" if is_bad else "done", row))
-    return BatchResult(Path("/results"), tuple(states), (Path("/results/summary.csv"),))
+    return BatchResult("/results", tuple(states), (Path("/results/summary.csv"),))
 
 
 @pytest.mark.parametrize(
