@@ -146,7 +146,8 @@ def run_batch(arguments: Sequence[str], out: Path, options: BatchOptions, listen
         if url[1] in ("http", "https", "file"):
             raise ParameterError(f"{out}: results go to a folder or to an object store")
         with tempfile.TemporaryDirectory(prefix="rose2_logs_") as scratch:
-            return _run_batch(arguments, Path(scratch), f"{url[1]}://{url[2]}", options, listener)
+            place = f"{url[1]}://{url[2].rstrip('/')}"
+            return _run_batch(arguments, Path(scratch), place, options, listener)
     out = Path(os.path.abspath(out))  # noqa: PTH100 (as in find_logs)
     require_utf8(out)
     return _run_batch(arguments, out, "", options, listener)
@@ -195,6 +196,7 @@ class _Batch:
         self.states: list[LogState] = []
         self._out = out
         self._store = store
+        self._url = store.url if store else ""
         self._in_store = store.fetch(out) if store else {}
         self._work = work
         self._options = options
@@ -220,7 +222,7 @@ class _Batch:
                 task,
                 is_whole=self._is_whole(known_name),
                 may_replace=self._may_replace,
-                store=self._store.url if self._store else "",
+                store=self._url,
             )
             if task.stands_by(look):
                 self.states.append(LogState(name, "up to date", dataset.summary_row(self._out, name)))
@@ -317,7 +319,8 @@ class _Batch:
         if others and not self._may_replace:
             name, difference = next(iter(others.items()))
             raise OutputError(
-                f"{self._store.url if self._store else self._out}: holds results of other options ({len(others)} logs; {name}: {difference}); "
+                f"{self._url or self._out}: holds results of other options "
+                f"({len(others)} logs; {name}: {difference}); "
                 "choose another folder, or allow overwriting to analyze the logs given now again "
                 "(overwrite=True)"
             )

@@ -12,6 +12,9 @@ from rose2_logs.batch.record import RECORD
 from rose2_logs.batch.remote import asking, file_system
 from rose2_logs.runs.summary import SUMMARY
 
+AT_ONCE = 500
+"""Small files that are fetched side by side and held in memory at the same time."""
+
 
 class Store:
     """A folder for results behind a URL, as workers and the process that runs the batch see it.
@@ -69,17 +72,18 @@ class Store:
             for path in self._files.find(logs):
                 name, _, file = path.removeprefix(logs).partition("/")
                 found[name].append(file)
-            wanted = [
-                (name, file) for name, files in found.items() for file in {RECORD, SUMMARY}.intersection(files)
-            ]
-            content = self._files.cat([f"{logs}{name}/{file}" for name, file in wanted]) if wanted else {}
-        for name, file in wanted:
-            (folder / LOGS_FOLDER / name).mkdir(parents=True, exist_ok=True)
-            (folder / LOGS_FOLDER / name / file).write_bytes(content[f"{logs}{name}/{file}"])
+            wanted = [f"{name}/{file}" for name in found for file in (RECORD, SUMMARY) if file in found[name]]
+            for first in range(0, len(wanted), AT_ONCE):
+                part = {
+                    f"{logs}{each}": folder / LOGS_FOLDER / each for each in wanted[first : first + AT_ONCE]
+                }
+                for path, content in self._files.cat(list(part)).items():
+                    part[path].parent.mkdir(parents=True, exist_ok=True)
+                    part[path].write_bytes(content)
         return found
 
     def upload(self, results: Path, name: str) -> None:
-        """Replace what the store has of a log: its record goes first and comes last, so that no part counts."""
+        """Replace what the store has of a log: its record goes first and comes last, so no part counts."""
         folder = f"{self._path}/{LOGS_FOLDER}/{name}"
         files = {f"{folder}/{path.name}": path for path in sorted(results.iterdir())}
         record = files.pop(f"{folder}/{RECORD}")

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import csv
+import os
 import subprocess
+import sys
 from collections import deque
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Self
 
-from commands import ROSE2_LOGS, WAIT_S, started
+from commands import ROSE2_LOGS, WAIT_S, started, wait_for
 from saved_maps import save_run
 
 from rose2_logs.batch.driver import LogState
 from rose2_logs.batch.task import LogOutcome, LogTask, Progress, analyze_task
 from rose2_logs.runs.tables import TABLES
 
+DASK = Path(sys.executable).with_name("dask")
 SLOW = tuple(range(116, 222, 4))
 """Of how many columns the maps of a log know, that takes long enough to be caught while it is analyzed."""
 
@@ -46,6 +49,29 @@ def run_batch(*arguments: object) -> tuple[int, str, str]:
     """Run ``rose2-logs batch``."""
     with started_batch(*arguments) as process:
         return finish(process)
+
+
+@contextmanager
+def running(*arguments: object):
+    """A process of Dask, which is ended whatever happens."""
+    # The scheduler gives a log up at its second loss instead of its fourth.
+    settings = {"DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "1"}
+    silent = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    with started(DASK, *arguments, "--no-dashboard", env=os.environ | settings, **silent) as process:
+        yield process
+        process.terminate()
+        process.wait(WAIT_S)
+
+
+@contextmanager
+def cluster_in(folder: Path) -> Iterator[tuple[str, subprocess.Popen[str]]]:
+    """A scheduler, as its file and its process, with two workers, which are started again when they die."""
+    file = folder / "scheduler.json"
+    starting = ("scheduler", "--host", "127.0.0.1", "--port", 0, "--scheduler-file", file)
+    with running(*starting) as scheduler:
+        wait_for(file.exists)
+        with running("worker", "--scheduler-file", file, "--nworkers", 2, "--nthreads", 1):
+            yield str(file), scheduler
 
 
 class Heard:

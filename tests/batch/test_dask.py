@@ -8,13 +8,13 @@ import socket
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 from batches import (
     Heard,
     WorkersHere,
+    cluster_in,
     finish,
     make_logs,
     started_batch,
@@ -22,7 +22,7 @@ from batches import (
     tree,
     worker_of,
 )
-from commands import WAIT_S, started, wait_for
+from commands import wait_for
 from saved_maps import save_run
 
 from rose2_logs.batch import dask_workers, driver
@@ -34,31 +34,7 @@ from rose2_logs.batch.task import LogTask, Progress
 from rose2_logs.config.run_options import RunOptions
 from rose2_logs.errors import ParameterError
 
-DASK = Path(sys.executable).with_name("dask")
 QUIET = RunOptions(recording=False, annotated_log=False)
-
-
-@contextmanager
-def running(*arguments: object):
-    """A process of Dask, which is ended whatever happens."""
-    # The scheduler gives a log up at its second loss instead of its fourth.
-    settings = {"DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "1"}
-    silent = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    with started(DASK, *arguments, "--no-dashboard", env=os.environ | settings, **silent) as process:
-        yield process
-        process.terminate()
-        process.wait(WAIT_S)
-
-
-@contextmanager
-def cluster_in(folder: Path) -> Iterator[tuple[str, subprocess.Popen[str]]]:
-    """A scheduler, as its file and its process, with two workers, which are started again when they die."""
-    file = folder / "scheduler.json"
-    starting = ("scheduler", "--host", "127.0.0.1", "--port", 0, "--scheduler-file", file)
-    with running(*starting) as scheduler:
-        wait_for(file.exists)
-        with running("worker", "--scheduler-file", file, "--nworkers", 2, "--nthreads", 1):
-            yield str(file), scheduler
 
 
 @pytest.fixture(scope="module")

@@ -10,6 +10,7 @@ import pytest
 from batches import (
     Heard,
     WorkersHere,
+    cluster_in,
     finish,
     make_logs,
     run_batch,
@@ -160,6 +161,21 @@ def test_results_in_a_bucket_survive_a_kill_and_are_those_of_a_folder(bucket, tm
     assert {state.status for state in again.states} == {"up to date"}
     with pytest.raises(LogError, match="there is no bucket 'nowhere'"):
         driver.run_batch([url], "s3://nowhere/results", options, Heard())
+
+
+def test_workers_of_a_cluster_need_no_common_folder(bucket, tmp_path):
+    """Only the store: a worker makes no folder that another process would have to see."""
+    files, name, logs = bucket
+    out = f"s3://{name}/results/"
+    with cluster_in(tmp_path) as (file, _):
+        urls = [f"s3://{name}/runs/{log}" for log in ("one/run", "two/run")]
+        result = driver.run_batch(urls, out, BatchOptions(QUIET, scheduler=file), Heard())
+    assert {state.name: state.status for state in result.states} == {"one_run": "done", "two_run": "done"}
+    run_batch(logs / "one", logs / "two", "-o", tmp_path / "out")
+    files.invalidate_cache()
+    for path in (tmp_path / "out").glob("logs/*/*.parquet"):
+        stored = f"{name}/results/{path.relative_to(tmp_path / 'out').as_posix()}"
+        assert files.cat(stored) == path.read_bytes()
 
 
 def test_results_of_a_log_that_changed_replace_the_earlier_ones(bucket, monkeypatch):
