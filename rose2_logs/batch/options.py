@@ -39,7 +39,7 @@ class BatchOptions:
     scheduler: str | None = option(
         None,
         "Address, or scheduler file, of the scheduler of a Dask cluster that does the work. Its workers must "
-        "see OUT and local logs at the same paths as this machine.",
+        "see OUT, unless it is a URL, and local logs at the same paths as this machine.",
         panel=MACHINES,
         commands=BATCH,
         metavar="ADDRESS",

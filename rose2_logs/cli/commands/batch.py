@@ -50,8 +50,9 @@ def batch(
         typer.Option(
             "--out",
             "-o",
-            help="Folder for results: those of a log go to OUT/logs/NAME/, the tables of all logs to "
-            "OUT/tables/, one row per log to OUT/summary.csv and OUT/summary.parquet.",
+            help="Folder for results, or URL of an object store (s3://...): those of a log go to "
+            "OUT/logs/NAME/, the tables of all logs to OUT/tables/, one row per log to OUT/summary.csv and "
+            "OUT/summary.parquet.",
         ),
     ],
     options: BatchOptions,
