@@ -19,7 +19,7 @@ from rose2_logs.batch.driver import LogState
 from rose2_logs.batch.task import LogOutcome, LogTask, Progress, analyze_task
 from rose2_logs.runs.tables import TABLES
 
-DASK = Path(sys.executable).with_name("dask")
+DASK = (sys.executable, "-m", "dask")
 SLOW = tuple(range(116, 222, 4))
 """Of how many columns the maps of a log know, that takes long enough to be caught while it is analyzed."""
 
@@ -57,7 +57,7 @@ def running(*arguments: object):
     # The scheduler gives a log up at its second loss instead of its fourth.
     settings = {"DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "1"}
     silent = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    with started(DASK, *arguments, "--no-dashboard", env=os.environ | settings, **silent) as process:
+    with started(*DASK, *arguments, "--no-dashboard", env=os.environ | settings, **silent) as process:
         yield process
         process.terminate()
         process.wait(WAIT_S)
