@@ -55,6 +55,8 @@ POINTS = (0.01, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.75, 1.0)
 
 PROCESSES = 4
 """Of the cluster, and commands side by side."""
+WITHOUT_PROFILER = {"DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED": "false"}
+"""Dask looks at what each worker does a hundred times a second, for its dashboard."""
 MAPS = 2
 """Of each log that is analyzed."""
 
@@ -133,7 +135,12 @@ def _on_cluster(place: Path, folders: Sequence[Path]) -> Cost:
             ["worker", "--nworkers", str(PROCESSES), "--nthreads", "1", "--local-directory", scratch],
         ):
             command = [sys.executable, "-m", "dask", *part, *where, "--no-dashboard"]
-            process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+            process = subprocess.Popen(
+                command,
+                env=os.environ | WITHOUT_PROFILER,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+            )
             started.append(stack.enter_context(process))
             stack.callback(process.terminate)
         connect: Any = Client

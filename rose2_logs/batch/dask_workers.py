@@ -9,6 +9,7 @@ import uuid
 from collections import deque
 from collections.abc import Iterator
 from concurrent.futures import CancelledError
+from functools import cache
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -16,7 +17,7 @@ from typing import Any, Self
 from rose2_logs.batch.remote import EXTRA
 from rose2_logs.batch.task import LogOutcome, LogTask, Progress, analyze_task
 from rose2_logs.errors import ParameterError
-from rose2_logs.system.workers import WorkerError
+from rose2_logs.system.workers import WorkerError, limit_process_to_one_thread
 
 logger = logging.getLogger(__name__)
 
@@ -176,9 +177,16 @@ class DaskWorkers:
         return LogOutcome(task.name, "failed", reason=reason, details=str(error))
 
 
+@cache
+def _limit_threads() -> None:
+    """Give each log one thread, once in each worker process: the others of the machine have logs of their own."""
+    limit_process_to_one_thread()
+
+
 def analyze_on_worker(task: LogTask, topic: str) -> LogOutcome:
     """Carry out a task in a Dask worker; its progress is reported through the scheduler."""
     from distributed import get_worker
 
+    _limit_threads()
     worker = get_worker()
     return analyze_task(task, lambda news: worker.log_event(topic, [news.name, news.share]))

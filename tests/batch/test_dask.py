@@ -178,6 +178,7 @@ def test_a_scheduler_that_is_lost_ends_the_batch_in_one_line(undisturbed, tmp_pa
     heard = Heard()
     with cluster_in(tmp_path / "second") as (file, _):
         result = run_batch([str(logs)], out, BatchOptions(QUIET, scheduler=file), heard)
+    assert not result.failed, result.failed
     status = {state.name: state.status for state in result.states}
     assert {name for name in status if status[name] == "up to date"} == done
     assert set(heard.shares) == set(status) - done
