@@ -179,7 +179,7 @@ class DaskWorkers:
 
 @cache
 def _limit_threads() -> None:
-    """Give each log one thread, once in each worker process: the others of the machine have logs of their own."""
+    """Give each log one thread: the other processors of the machine have logs of their own."""
     limit_process_to_one_thread()
 
 
