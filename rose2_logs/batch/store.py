@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 from rose2_logs.batch.dataset import EVERY_TABLE, PARTITION, TABLES_FOLDER
@@ -37,7 +38,6 @@ class Store:
     def __init__(self, url: str, run: str) -> None:
         self.url = url
         self._files, self._path = file_system(url)
-        self._asking = lambda: asking(url, self._files, self._path)
         self._mark = f"{self._path}/{WORK_FOLDER}/{run}"
 
     def open(self) -> None:
@@ -115,3 +115,6 @@ class Store:
             for path in self._files.find(f"{self._path}/{TABLES_FOLDER}"):
                 if path.split("/")[-2] not in wanted:
                     self._files.rm_file(path)
+
+    def _asking(self) -> AbstractContextManager[None]:
+        return asking(self.url, self._files, self._path)
