@@ -160,7 +160,13 @@ def _run_batch(
 
     Then the folder holds only records and summaries of the logs.
     """
-    logs = [log for log in find_logs(arguments, out) if not (url and log.target.startswith(f"{url}/"))]
+    logs = find_logs(arguments, out)
+    if url:
+        logs = [log for log in logs if not log.target.startswith(f"{url}/{LOGS_FOLDER}/")]
+        if not logs:
+            raise LogError(
+                f"{url}: no log there but results; name the logs, or choose another place for results"
+            )
     with locked(out), work_folder(out) as work, _opened(url, work.name) as store:
         batch = _Batch(out, work, options, listener, store)
         tasks = batch.plan(logs)

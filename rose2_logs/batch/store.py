@@ -55,8 +55,9 @@ class Store:
 
     def close(self) -> None:
         """Leave it to others."""
-        with self._asking():
-            self._files.rm_file(self._mark)
+        if self.is_open():
+            with self._asking():
+                self._files.rm_file(self._mark)
 
     def fetch(self, folder: Path) -> dict[str, list[str]]:
         """Copy records and summaries of the logs in the store to where a folder of results has them.
