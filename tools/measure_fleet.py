@@ -43,6 +43,7 @@ from rose2_logs.batch.driver import LogState, run_batch
 from rose2_logs.batch.options import BatchOptions
 from rose2_logs.batch.task import LogOutcome, LogTask, Progress, analyze_task
 from rose2_logs.errors import Rose2LogsError
+from rose2_logs.runs.provenance import fingerprint
 from rose2_logs.workflows import analyze as analysis
 
 SAMPLE = Path(__file__).parents[1] / "sample_logs" / "office.mcap"
@@ -169,7 +170,7 @@ class Copies:
         for file in linked.iterdir():
             if file.name != "summary.json":
                 os.link(file, folder / file.name)
-        about = self._summary | {"log": options.origin}
+        about = self._summary | {"log": options.origin, "input": self._summary["input"] | fingerprint(log)}
         (folder / "summary.json").write_text(json.dumps(about), encoding="utf-8")
         self.cpu_s += time.process_time() - start
 
