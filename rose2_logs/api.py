@@ -465,7 +465,7 @@ def compare(
     Parameters
     ----------
     a, b : Run, str or path
-        The runs, or the folders of their results.
+        The runs, or the folders of their results; ``load(folder, part=1)`` takes a part of a run.
     out : str or path, optional
         Folder for tables, a picture and a recording of the comparison.
     parameters : Parameters or mapping, optional
@@ -497,9 +497,7 @@ def compare(
     used = Parameters.from_any(parameters)
     if out is None:
         return compare_stored(run_a, run_b, parameters=used)
-    return compare_runs(
-        run_a.folder, run_b.folder, _path(out, "out"), overwrite=overwrite, parameters=used
-    ).comparison
+    return compare_runs(run_a, run_b, _path(out, "out"), overwrite=overwrite, parameters=used).comparison
 
 
 def evaluate(

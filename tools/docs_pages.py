@@ -136,9 +136,8 @@ def tables_page() -> str:
         "otherwise. The files contain these descriptions, too: `rose2_logs.load(folder).rooms.columns`, or "
         "`pyarrow.parquet.read_schema(path).field(name).metadata`.",
         "",
-        "Where the map was begun anew within the log, or several nodes publish it, each table has one "
-        f"column more, `{table_schemas.PART.name}`: {_meaning(table_schemas.PART)}. Its events may be "
-        "`part_begun`, with track 0.",
+        "`part` is 1 unless the map was begun anew within the log, or several nodes publish it: then each "
+        "part has its own coverage and its own last map.",
     ]
     for name, (schema, about) in TABLES.items():
         lines += ["", f"## {name}", "", about, "", "| column | type | meaning |", "|---|---|---|"]

@@ -251,7 +251,7 @@ def comparison_picture(log: Path) -> tuple[str, Image]:
         folder = Path(name)
         for run, end_s in (("half", HALF_WAY_S), ("whole", None)):
             analyze_log(log, folder / run, RunOptions(end_s=end_s, recording=False))
-        compare_runs(folder / "half", folder / "whole", folder / "changes", recording=False)
+        compare_runs(Run(folder / "half"), Run(folder / "whole"), folder / "changes", recording=False)
         with PillowImage.open(folder / "changes" / "comparison.png") as picture:
             return "compare", np.asarray(picture)
 

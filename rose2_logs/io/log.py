@@ -21,7 +21,7 @@ from rose2_logs.io.cell_values import MAPS_LOOKED_AT, CellReading, reading_of
 from rose2_logs.io.grids import Cells, Grid, MapWarning, Patch
 from rose2_logs.io.map_stream import MapChecks, MapStream, ReadCounts, without_far_cells
 from rose2_logs.io.messages import is_called_map, is_patch_type, ros_type
-from rose2_logs.io.parts import Part, Parts, find_parts, find_saved_parts
+from rose2_logs.io.parts import Part, Parts, find_parts, find_saved_parts, likeliest
 from rose2_logs.io.poses import RobotPath
 from rose2_logs.io.saved_maps import MapFilesSource
 from rose2_logs.io.scan_topics import mappable_topics
@@ -342,17 +342,21 @@ class LogReader:
         return self._chosen(found)
 
     def _chosen(self, found: Parts) -> tuple[dict[int, Part], int]:
-        """The parts that were asked for, else all if they are of one run, else the likeliest."""
+        """The part that was asked for; else all in the time range, or one if they are of several runs."""
         count, number = len(found.parts), self._asked_part
         if number is not None and not 1 <= number <= count:
             raise LogError(f"{self.info.path}: {self.topic} has no part {number}; it has {count}")
-        if number is None and count > 1:
-            number = None if found.is_one_run else found.likeliest()
+        numbered = dict(enumerate(found.parts, start=1))
+        in_range = {
+            place: part for place, part in numbered.items() if len(self._selection.in_range(part.times))
+        }
+        if number is None and len(in_range) > 1:
+            number = None if found.is_one_run else likeliest(in_range)
             other = "takes one alone" if number is None else "takes another"
-            other = f"part={2 if number == 1 else 1} {other}"
-            text = f"{self.info.path}: {self.topic}: {found.text(number)}; {other}"
+            other = f"part={next(place for place in in_range if place != number)} {other}"
+            text = f"{self.info.path}: {self.topic}: {found.text(number, in_range)}; {other}"
             log_warning(logger, "parts", text, file=self.info.path, topic=self.topic)
-        taken = {place: part for place, part in enumerate(found.parts, start=1) if number in (None, place)}
+        taken = (in_range or numbered) if number is None else {number: numbered[number]}
         return taken, count
 
     def _grid(self, time_ns: int) -> Grid | None:

@@ -161,8 +161,10 @@ def inspect_log(path: LogPath, limits: ReadingParameters = DEFAULT_LIMITS) -> Lo
     return source.info
 
 
-def map_topics(path: LogPath, limits: ReadingParameters = DEFAULT_LIMITS) -> list[str]:
-    """Names of the topics of a log that hold maps, ascending.
+def map_topics(
+    path: LogPath, limits: ReadingParameters = DEFAULT_LIMITS, asked: Sequence[str] = ()
+) -> list[str]:
+    """Names of the topics of a log that hold maps, ascending; or of those that are asked for, each once.
 
     Parameters
     ----------
@@ -170,15 +172,19 @@ def map_topics(path: LogPath, limits: ReadingParameters = DEFAULT_LIMITS) -> lis
         As for `open_log`.
     limits : ReadingParameters
         The largest sizes that are accepted.
+    asked : sequence of str
+        The topics that are wanted, in their order; by default all.
 
     Raises
     ------
     NoMapTopicError
-        If there are none; the message says what could be done.
+        If there are none, or one that is asked for is none of them; the message says what could be done.
     LogError
         If the log cannot be opened.
     """
     info = inspect_log(path, limits)
+    if asked:
+        return list(dict.fromkeys(choose_topic(info, topic) for topic in asked))
     found = [topic.name for topic in info.topics if topic.is_map and topic.message_count != 0]
     return sorted(set(found)) or [choose_topic(info)]
 

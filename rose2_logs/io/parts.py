@@ -8,7 +8,7 @@ several runs, one part is read.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -103,12 +103,6 @@ class Parts:
     why: str = ""
     is_one_run: bool = False
 
-    def likeliest(self) -> int:
-        """Return the number, from 1, of the part with most maps that differ, then most free area."""
-        places = range(len(self.parts))
-        key = [(each.maps, each.free_m2) for each in self.parts]
-        return max(places, key=lambda place: (*key[place], place)) + 1
-
     def with_patches(self, times: Times) -> Parts:
         """Give each of several parts that follow one another all times (N,) from its first map on."""
         begins = [0, *(int(np.searchsorted(times, part.times[0])) for part in self.parts[1:]), len(times)]
@@ -118,14 +112,20 @@ class Parts:
         )
         return replace(self, parts=tuple(parts))
 
-    def text(self, number: int | None) -> str:
-        """Return what is told of the choice of one part, or of all."""
+    def text(self, number: int | None, in_range: Mapping[int, Part]) -> str:
+        """Return what is told of the choice of one part, or of all, among the numbered ones in the range."""
         sizes = ", ".join(
             f"{place} of {counted(len(each.times), 'map')} ({each.free_m2:.0f} m2 free at its end)"
-            for place, each in enumerate(self.parts, start=1)
+            for place, each in in_range.items()
         )
         done = "each has its own coverage and tracks" if number is None else f"part {number} is analyzed"
-        return f"{self.why}, so that there are {len(self.parts)} parts: {sizes}; {done}"
+        some = f", {len(in_range)} of them in the time range" if len(in_range) < len(self.parts) else ""
+        return f"{self.why}, so that there are {len(self.parts)} parts{some}: {sizes}; {done}"
+
+
+def likeliest(parts: Mapping[int, Part]) -> int:
+    """Return the number of the part with most maps that differ, then most free area, then the last."""
+    return max(parts, key=lambda number: (parts[number].maps, parts[number].free_m2, number))
 
 
 class _Maps:

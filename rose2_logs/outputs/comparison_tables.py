@@ -12,6 +12,7 @@ from rose2_logs.comparison.final_layout import FinalLayout
 from rose2_logs.comparison.layouts import LayoutComparison
 from rose2_logs.model.occupancy import FloatArray
 from rose2_logs.runs.parquet_table import ParquetTable, Row
+from rose2_logs.runs.run import Run
 from rose2_logs.runs.summary import write_json
 
 ENDS = ("x0_m", "y0_m", "x1_m", "y1_m")
@@ -78,10 +79,8 @@ def _ends(layout: str, ends_m: FloatArray | None) -> Row:
     return {f"{layout}_{name}": value for name, value in zip(ENDS, values, strict=True)}
 
 
-def write_comparison_summary(
-    path: Path, comparison: LayoutComparison, folder_a: Path, folder_b: Path
-) -> None:
-    """Write how the layouts are aligned and how much they have in common.
+def write_comparison_summary(path: Path, comparison: LayoutComparison, run_a: Run, run_b: Run) -> None:
+    """Write how the last layouts of two runs are aligned and how much they have in common.
 
     Raises
     ------
@@ -91,8 +90,8 @@ def write_comparison_summary(
     placement, walls = comparison.placement, comparison.walls
     x, y, yaw = placement.motion.pose
     summary = {
-        "a": {"results": str(folder_a), **_layout(comparison.a)},
-        "b": {"results": str(folder_b), **_layout(comparison.b)},
+        "a": {"results": str(run_a.folder), "part": run_a.part, **_layout(comparison.a)},
+        "b": {"results": str(run_b.folder), "part": run_b.part, **_layout(comparison.b)},
         "same_building": comparison.same_building,
         "ambiguous": comparison.ambiguous,
         "b_fits_if_scaled_by": comparison.scale,

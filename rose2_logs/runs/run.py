@@ -34,7 +34,8 @@ class Run(StoredRun, Sequence["RunSnapshot"]):
     temporary : TemporaryDirectory, optional
         Holds the folder, which is deleted together with this object.
     part : int, optional
-        Take one part alone of a run in which maps were begun anew; `parts` lists them.
+        Take one part alone of a run in which maps were begun anew; `parts` lists them. Of other runs, part 1
+        is all of it.
 
     Attributes
     ----------
@@ -82,13 +83,13 @@ class Run(StoredRun, Sequence["RunSnapshot"]):
 
     @cached_property
     def rooms(self) -> Table:
-        """One row per room and map; `in_last_map` says whether the last map shows the room's track."""
+        """One row per room and map; `in_last_map`: whether the last map of its part shows its track."""
         import pyarrow as pa
 
         rows, tracks = self.table("rooms"), self.table("tracks", ["track", "in_last_map"])
         last = tracks["track"].to_numpy()[tracks["in_last_map"].to_numpy(zero_copy_only=False)]
         column = pa.array(np.isin(rows["track"].to_numpy(), last))
-        meaning = {"description": "whether the run's last map shows the room's track"}
+        meaning = {"description": "whether the last map of its part shows the room's track"}
         field = pa.field("in_last_map", pa.bool_(), nullable=False, metadata=meaning)
         return Table("rooms", rows.append_column(field, column))
 
@@ -219,9 +220,9 @@ class Run(StoredRun, Sequence["RunSnapshot"]):
         return {}
 
 
-def named_run(folder: Path, names: Path | None) -> Run:
-    """Open a stored run, whose rooms are called by other names where a file of names is given."""
-    run = Run(folder)
+def named_run(folder: Path, names: Path | None, part: int | None = None) -> Run:
+    """Open a stored run, or a part of it; its rooms have other names where a file of names is given."""
+    run = Run(folder, part=part)
     if names is not None:
         run.rename(names)
     return run

@@ -49,8 +49,6 @@ class RunStore:
         For the guess of kinds of rooms.
     back_project : bool
         Whether to write the table of the back-projected rooms, too.
-    has_parts : bool
-        Whether the log has maps that were begun anew, or of several publishers: the tables then say the part.
     """
 
     def __init__(
@@ -60,24 +58,21 @@ class RunStore:
         kinds: KindParameters | None = None,
         *,
         back_project: bool = False,
-        has_parts: bool = False,
     ) -> None:
         self._folder = folder
         self._parameters = parameters
         self._kinds = kinds or KindParameters()
-        self._has_parts = has_parts
         self._names = (*TABLES, BACK_PROJECTED) if back_project else TABLES
         self._stack = ExitStack()
         self._tables: dict[str, ParquetTable] = {}
 
     def __enter__(self) -> Self:
-        from rose2_logs.runs.table_schemas import SCHEMAS, with_part
+        from rose2_logs.runs.table_schemas import SCHEMAS
 
         with ExitStack() as opening:
             for name in (ALONG, *self._names):
                 path = table_path(self._folder, name)
-                schema = with_part(name) if self._has_parts else SCHEMAS[name]
-                self._tables[name] = opening.enter_context(ParquetTable(path, schema))
+                self._tables[name] = opening.enter_context(ParquetTable(path, SCHEMAS[name]))
             self._stack = opening.pop_all()
         return self
 
@@ -140,13 +135,13 @@ class RunStore:
                 "known_final_share": convergence.known_final_share[index],
             }
             self._tables["snapshots"].add([row | final])
-        for part, of_part in summary.parts.items() or [(None, summary)]:
+        for part, of_part in summary.parts.items() or [(tables.ONLY_PART, summary)]:
             for track, of_track in sorted(of_part.histories.tracks.items()):
                 in_last_map = track in of_part.histories.in_last_map
                 row = tables.track_row(
                     track, of_track, of_part.convergence, self._kinds, in_last_map=in_last_map
                 )
-                self._tables["tracks"].add([tables.part_key(part) | row])
+                self._tables["tracks"].add([row | {"part": part}])
         for name in ("snapshots", "tracks"):
             self._tables[name].close()
         for name in self._names:

@@ -28,7 +28,7 @@ from rose2_logs.model.rooms import Doorway
 from rose2_logs.runs.names import names_in, tell_unused
 from rose2_logs.runs.summary import RESULTS_FORMAT, SUMMARY
 from rose2_logs.runs.summary_schema import what_it_lacks
-from rose2_logs.runs.tables import BACK_PROJECTED, TABLES, Row, unpack_image
+from rose2_logs.runs.tables import BACK_PROJECTED, ONLY_PART, TABLES, Row, unpack_image
 from rose2_logs.system.files import reason_of, require_utf8
 from rose2_logs.system.text import counted, percent
 from rose2_logs.tracking.registration import RigidMotion
@@ -70,20 +70,20 @@ class StoredRun:
     folder : path
         The folder with ``summary.json``.
     part : int, optional
-        The part to take alone, of a run in which maps were begun anew.
+        The part to take alone, of a run in which maps were begun anew; of others, part 1 is all of it.
     """
 
     def __init__(self, folder: Path, part: int | None = None) -> None:
         self.folder = folder
         require_utf8(folder)
         self.summary: dict[str, Any] = _read_summary(folder)
-        self.part = part
+        self.part = part if self._parts else None
         whole = self.summary["results"]
-        if part is not None:
+        if part is not None and (self._parts or part != ONLY_PART):
             of_part = next((each for each in self._parts if each["part"] == part), None)
             if of_part is None:
-                has = f"it has {', '.join(map(str, self.parts))}" if self._parts else "it has no parts"
-                raise ParameterError(f"{folder}: no part {part!r}; {has}")
+                has = ", ".join(map(str, self.parts or (ONLY_PART,)))
+                raise ParameterError(f"{folder}: no part {part!r}; it has {has}")
             results = self.summary["results"] | of_part["results"]
             self.summary |= {"results": results, "layout": of_part["layout"]}
         self._require_parameters()
@@ -173,9 +173,9 @@ class StoredRun:
         rows = self.table("tracks").to_pylist()
         tracks = [row["track"] for row in rows]
         shapes = self.shapes("tracks", [row["polygon_wkb"] for row in rows])
-        named = self.part or next(reversed(self.parts), None)
+        named = self.part or next(reversed(self.parts), ONLY_PART)
         in_frame = [
-            shape if row.get("part") == named else shapely.Polygon()
+            shape if row["part"] == named else shapely.Polygon()
             for row, shape in zip(rows, shapes, strict=True)
         ]
         found = given.of(tracks, in_frame)
@@ -232,12 +232,12 @@ class StoredRun:
         """
         import pyarrow.parquet as pq
 
-        from rose2_logs.runs.table_schemas import SCHEMAS, with_part
+        from rose2_logs.runs.table_schemas import SCHEMAS
 
         path = self.folder / f"{name}.parquet"
         with _reading(path):
             found = pq.read_schema(path)
-        wanted = with_part(name) if self._parts else SCHEMAS[name]
+        wanted = SCHEMAS[name]
         for field in wanted:
             at = found.get_field_index(field.name)
             if at < 0 or found.field(at).type != field.type:
@@ -289,7 +289,7 @@ class StoredRun:
         if not 0 <= coverage <= 1:
             raise ParameterError(f"the coverage is a share from 0 to 1, not {coverage:g}; half is 0.5")
         # Each part has its own coverage; that of the last one leads to the run's last map.
-        part = self.columns.get("part", np.zeros(len(numbers)))
+        part = self.columns["part"]
         covered = np.flatnonzero((self.columns["coverage"] >= coverage) & (part == part[-1]))
         return int(numbers[covered[0]] if len(covered) else numbers[-1])
 

@@ -27,6 +27,7 @@ def write_summary(
     selection: Mapping[str, Any],
     messages: Mapping[str, int],
     decided: Mapping[str, Any],
+    names: Mapping[str, Any] | None = None,
     files: list[str],
     warnings: Mapping[str, Any],
     facts: Mapping[str, Any],
@@ -47,6 +48,8 @@ def write_summary(
         Which maps were requested, and how many messages were used or left out.
     decided : mapping
         What was decided about how the log is read.
+    names : mapping, optional
+        Which file gave the rooms names.
     files : list of str
         Names of the other files of the results.
     warnings : mapping
@@ -75,6 +78,7 @@ def write_summary(
         "parameters": info.parameters.resolved(),
         "messages": dict(messages),
         "decided": dict(decided),
+        **({} if names is None else {"names": dict(names)}),
         "warnings": dict(warnings),
         "results": {
             "snapshots": totals.snapshots,

@@ -111,6 +111,13 @@ class SummaryOfPart(TypedDict):
     layout: Layout
 
 
+class NamesGiven(TypedDict):
+    """The file that gave rooms names."""
+
+    file: str
+    sha256: str
+
+
 class Summary(TypedDict):
     """The whole file; sinks may add further keys."""
 
@@ -124,6 +131,7 @@ class Summary(TypedDict):
     parameters: dict[str, Any]
     messages: Messages
     decided: dict[str, Any]
+    names: NotRequired[NamesGiven]
     warnings: Warnings
     results: Results
     layout: Layout

@@ -46,9 +46,17 @@ _NULLABLE = frozenset(
     }
 )
 
+_PART: dict[str, tuple[pa.DataType, str]] = {
+    "part": (
+        pa.int32(),
+        "part of the log, from 1, whose maps grow from each other; 1 in a log in one piece",
+    ),
+}
+
 _SNAPSHOT: dict[str, tuple[pa.DataType, str]] = {
     "snapshot": (pa.int32(), "number of the snapshot among the distinct maps, from 0"),
     "log_time_ns": (pa.int64(), "when the map was recorded, nanoseconds since the epoch"),
+    **_PART,
 }
 
 _EVIDENCE: dict[str, tuple[pa.DataType, str]] = {
@@ -176,10 +184,11 @@ ROOMS = _table(
 EVENTS = _table(
     {
         **_SNAPSHOT,
-        "kind": (pa.string(), "shifted, continued, returned, born, split, merged or lost"),
+        "kind": (pa.string(), "part_begun, shifted, continued, returned, born, split, merged or lost"),
         "track": (
             pa.int32(),
-            "the track concerned; for a merge the one that remains; 0 if the whole map shifted",
+            "the track concerned; for a merge the one that remains; 0 if the whole map shifted or was begun "
+            "anew",
         ),
         "others": (pa.list_(pa.int32()), "tracks of the parts of a split, tracks that a merge ended"),
         "overlap_iou": (
@@ -240,6 +249,7 @@ BACK_PROJECTED = _table(
 TRACKS = _table(
     {
         "track": (pa.int32(), "number of the room over the run, from 1"),
+        **_PART,
         **_CALLED,
         "first_snapshot": (pa.int32(), "first map that shows it"),
         "first_time_s": (pa.float64(), "when that was, log time since the first map, seconds"),
@@ -248,7 +258,7 @@ TRACKS = _table(
         "last_time_s": (pa.float64(), "when that was, seconds"),
         "last_coverage": (pa.float64(), "coverage then, share in [0, 1]"),
         "maps": (pa.int32(), "number of maps that show it"),
-        "in_last_map": (pa.bool_(), "whether the run's last map shows it"),
+        "in_last_map": (pa.bool_(), "whether the last map of its part shows it"),
         "area_m2": (pa.float64(), "its last area, as far as it was seen, square meters"),
         "predicted_area_m2": (pa.float64(), "area of its last shape, with the predicted part, square meters"),
         "area_settled_snapshot": (pa.int32(), "map from which on its area was within 10 % of the last"),
@@ -344,20 +354,6 @@ SCHEMAS = {
     "back_projected": BACK_PROJECTED,
 }
 """The schema of each table of a run."""
-
-PART = pa.field(
-    "part",
-    pa.int32(),
-    nullable=False,
-    metadata={"description": "part of the log, from 1; maps of one part grow from each other"},
-)
-"""First column of each table of a log in which maps were begun anew, or are of several publishers."""
-
-
-def with_part(name: str) -> pa.Schema:
-    """Return the schema of a table with the column `PART`."""
-    return SCHEMAS[name].insert(0, PART)
-
 
 ROOM_CHANGES = _table(
     {

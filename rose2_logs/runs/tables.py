@@ -28,6 +28,9 @@ FREE, BETWEEN, OCCUPIED = 0, 50, 100
 occupied. Unknown cells are -1."""
 COMPRESSION_LEVEL = 3
 """Of zstd, its default: what is gained above it takes longer than it is worth."""
+ONLY_PART = 1
+"""What the tables say of a log in one piece: a number and no null, so that queries over many logs that group
+or select by part lose none of them."""
 CELLS_AT_ONCE = 2**20
 """Cells of an image that are converted and compressed at once."""
 
@@ -36,15 +39,11 @@ Row = dict[str, Any]
 
 def snapshot_key(step: TrackedSnapshot | BackProjectedSnapshot) -> Row:
     """Return what all tables with rows per map begin with."""
-    return part_key(step.part) | {
+    return {
         "snapshot": step.snapshot.index,
         "log_time_ns": step.snapshot.log_time_ns,
+        "part": step.part or ONLY_PART,
     }
-
-
-def part_key(part: int | None) -> Row:
-    """Return the column that a run in parts has besides."""
-    return {} if part is None else {"part": part}
 
 
 def snapshot_row(step: TrackedSnapshot, ref: SnapshotRef) -> Row:

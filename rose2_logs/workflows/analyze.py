@@ -18,6 +18,7 @@ from rose2_logs.errors import AlreadyWholeError, InvalidMapError, OutputError, P
 from rose2_logs.io import open_log
 from rose2_logs.io.discovery import stem_of
 from rose2_logs.io.log import LogReader
+from rose2_logs.io.room_names import read_room_names
 from rose2_logs.model.analysis import left_out_note
 from rose2_logs.model.room_names import TrackNames
 from rose2_logs.outputs.mcap.viewer_layouts import bag_metadata_path, foxglove_path, rviz_path
@@ -133,6 +134,7 @@ def _analyze_log(
     require_short((folder, *output.files))
     output.refuse_log(path)
     refuse_existing(output.files, overwrite=options.overwrite or options.resume)
+    names = _names_given(options)
     with (
         open_log(
             path,
@@ -156,7 +158,7 @@ def _analyze_log(
         )
         info = _run_info(path, reader, options)
         prepared = output.prepared(_facts(info, options), overwrite=options.overwrite, resume=options.resume)
-        with _refused_if_named_otherwise(folder, options), prepared as (work, journal):
+        with _refused_if_named_otherwise(folder, names), prepared as (work, journal):
             planned = _planned_files(work, path, options)
             called = TrackNames()
             outputs = [*sinks, *_make_sinks(planned, options, reader, called)]
@@ -172,6 +174,7 @@ def _analyze_log(
                 selection=dataclasses.asdict(options.selection),
                 messages=dataclasses.asdict(reader.counts),
                 decided=reader.decided,
+                names=names,
                 files=[file.name for name, file in planned.items() if name != "summary"],
                 warnings=warnings.as_json(),
                 facts=_facts_of(outputs),
@@ -182,21 +185,32 @@ def _analyze_log(
 
 
 @contextmanager
-def _refused_if_named_otherwise(folder: Path, options: RunOptions) -> Iterator[None]:
-    """Refuse to leave complete results as they are if their rooms were to get other names."""
+def _refused_if_named_otherwise(folder: Path, names: dict[str, Any] | None) -> Iterator[None]:
+    """Refuse to leave complete results as they are if their rooms are to get other names, or none."""
     try:
         yield
     except AlreadyWholeError:
-        if options.names is not None:
-            run = StoredRun(folder)
-            before = dict(run.names)
-            run.rename(Path(options.names))
-            if run.names != before:
-                raise OutputError(
-                    f"{folder}: is whole already, with other names of rooms; overwrite=True analyzes it "
-                    "again, and report, figure and export take names, too"
-                ) from None
+        before = StoredRun(folder).summary.get("names")
+        if (before and before["sha256"]) != (names and names["sha256"]):
+            raise OutputError(
+                f"{folder}: is whole already, with {'other' if before else 'no'} names of rooms; "
+                "overwrite=True analyzes it again, and report, figure and export take names, too"
+            ) from None
         raise
+
+
+def _names_given(options: RunOptions) -> dict[str, Any] | None:
+    """Return which file of names was given, as JSON values for the summary; None for none.
+
+    Raises
+    ------
+    ParameterError
+        If it cannot be read.
+    """
+    if options.names is None:
+        return None
+    read_room_names(Path(options.names))
+    return {"file": options.names, "sha256": fingerprint(Path(options.names))["sha256"]}
 
 
 def _facts_of(sinks: Sequence[Sink]) -> dict[str, Any]:
@@ -241,13 +255,7 @@ def _follow(
         base_frame=options.base_frame,
         names=names,
     )
-    store = RunStore(
-        folder,
-        parameters.occupancy,
-        parameters.kinds,
-        back_project=options.back_project,
-        has_parts=reader.part_count > 1,
-    )
+    store = RunStore(folder, parameters.occupancy, parameters.kinds, back_project=options.back_project)
     tracks: set[int] = set()
     used: set[str] = set()
     with store, abandoned_on_error(sinks):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,7 +10,7 @@ from rose2_logs.comparison.layouts import LayoutComparison, compare_layouts
 from rose2_logs.config.parameters import Parameters
 from rose2_logs.errors import OutputError, ResultsError
 from rose2_logs.runs.last_layout import read_final_layout
-from rose2_logs.runs.run import Run, named_run
+from rose2_logs.runs.run import Run
 from rose2_logs.runs.summary import SUMMARY
 from rose2_logs.system.files import refuse_existing, writing
 
@@ -33,21 +34,20 @@ class ComparisonResult:
 
 
 def compare_runs(
-    folder_a: Path,
-    folder_b: Path,
+    run_a: Run,
+    run_b: Run,
     folder: Path,
     *,
     recording: bool = True,
     overwrite: bool = False,
     parameters: Parameters | None = None,
-    names: Path | None = None,
 ) -> ComparisonResult:
     """Compare the last layouts of two runs and write what differs.
 
     Parameters
     ----------
-    folder_a, folder_b : path
-        Results of `analyze_log`; B is laid over A.
+    run_a, run_b : Run
+        The stored runs, or parts of them; B is laid over A.
     folder : path
         Receives the files of `FILES`.
     recording : bool
@@ -56,13 +56,11 @@ def compare_runs(
         Whether an earlier comparison may be replaced.
     parameters : Parameters, optional
         Of the comparison.
-    names : path, optional
-        Other names for the rooms of A, see `Run.rename`.
 
     Raises
     ------
     ResultsError
-        If a folder holds no results, or the last map of a run has too few walls to be aligned.
+        If results cannot be read, or the last map of a run has too few walls to be aligned.
     OutputError
         If the folder is that of a run, there is a comparison already and it may not be replaced, or a file
         cannot be written.
@@ -76,10 +74,9 @@ def compare_runs(
         raise OutputError(f"{folder}: holds the results of a run; write the comparison to another folder")
     files = tuple(folder / name for name in FILES)
     refuse_existing(files, overwrite=overwrite)
-    name_a, name_b = _names(folder_a, folder_b)
-    comparison = compare_stored(named_run(folder_a, names), Run(folder_b), name_a, name_b, parameters)
+    comparison = compare_stored(run_a, run_b, *_names(run_a, run_b), parameters)
     write_comparison_tables(files[0], files[1], comparison)
-    write_comparison_summary(files[2], comparison, folder_a, folder_b)
+    write_comparison_summary(files[2], comparison, run_a, run_b)
     drawing = draw_comparison(comparison)
     drawing.save(files[3], width_px=None)
     write_page(files[4], comparison_page(comparison, drawing))
@@ -125,10 +122,17 @@ def compare_stored(
     return comparison
 
 
-def _names(folder_a: Path, folder_b: Path) -> tuple[str, str]:
-    """Name two folders by the shortest ends of their paths that differ."""
-    parts_a, parts_b = folder_a.resolve().parts, folder_b.resolve().parts
-    for count in range(1, max(len(parts_a), len(parts_b))):
-        if parts_a[-count:] != parts_b[-count:]:
-            return "/".join(parts_a[-count:]), "/".join(parts_b[-count:])
-    return folder_a.resolve().name, folder_b.resolve().name
+def _names(run_a: Run, run_b: Run) -> tuple[str, str]:
+    """Name two runs by the shortest ends of their folders' paths that differ, and their parts."""
+    name_a, name_b = _ends_that_differ(run_a.folder.resolve().parts, run_b.folder.resolve().parts)
+    return (
+        name_a if run_a.part is None else f"{name_a}, part {run_a.part}",
+        name_b if run_b.part is None else f"{name_b}, part {run_b.part}",
+    )
+
+
+def _ends_that_differ(a: Sequence[str], b: Sequence[str]) -> tuple[str, str]:
+    for count in range(1, max(len(a), len(b))):
+        if a[-count:] != b[-count:]:
+            return "/".join(a[-count:]), "/".join(b[-count:])
+    return a[-1], b[-1]

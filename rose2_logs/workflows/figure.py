@@ -23,6 +23,7 @@ def write_figure(
     width_px: int = FIGURE_WIDTH_PX,
     overwrite: bool = False,
     names: Path | None = None,
+    part: int | None = None,
 ) -> Path:
     """Draw the layout of a map.
 
@@ -32,7 +33,7 @@ def write_figure(
         Results of a log.
     out : path, optional
         The picture, ``.png`` or ``.svg``; by default ``<name>.figure.png`` in the folder, with the number of
-        the map in its name if it is not the last, and ``back_projected`` if it is.
+        a part that is named, the number of the map if it is not the last, and ``back_projected`` if it is.
     snapshot, coverage : int, float, optional
         Which map, see `Run.choose`.
     back_projected : bool
@@ -43,6 +44,8 @@ def write_figure(
         Whether a picture may be replaced.
     names : path, optional
         Other names for rooms, see `Run.rename`.
+    part : int, optional
+        The part that the map is chosen from, of a run in which maps were begun anew; by default the last.
 
     Returns
     -------
@@ -54,11 +57,11 @@ def write_figure(
     LogError
         If the results cannot be read.
     ParameterError
-        If there is no such map, or the picture would be of another kind.
+        If there is no such map or part, or the picture would be of another kind.
     OutputError
         If the picture exists and may not be replaced, or cannot be written.
     """
-    results = named_run(folder, names)
+    results = named_run(folder, names, part)
     number = results.choose(snapshot, coverage)
     stem = f"{_stem(results, number)}.back_projected" if back_projected else _stem(results, number)
     out = folder / f"{stem}.figure.png" if out is None else out
@@ -77,6 +80,7 @@ def export_plan(
     *,
     overwrite: bool = False,
     names: Path | None = None,
+    part: int | None = None,
 ) -> list[Path]:
     """Write the floor plan of a map for other programs.
 
@@ -89,11 +93,13 @@ def export_plan(
     out : path, optional
         Folder for the files; by default that of the results.
     snapshot, coverage : int, float, optional
-        Which map, see `Run.choose`; its number is part of the files' names if it is not the last.
+        Which map, see `Run.choose`; its number stands in the files' names if it is not the last.
     overwrite : bool
         Whether files may be replaced.
     names : path, optional
         Other names for rooms, see `Run.rename`.
+    part : int, optional
+        As for `write_figure`; its number stands in the files' names.
 
     Returns
     -------
@@ -105,7 +111,7 @@ def export_plan(
     LogError, ParameterError, OutputError
         As `write_figure`, or if there is no such format.
     """
-    results = named_run(folder, names)
+    results = named_run(folder, names, part)
     number = results.choose(snapshot, coverage)
     out = folder if out is None else out
     stem = _stem(results, number)
@@ -114,5 +120,6 @@ def export_plan(
 
 
 def _stem(results: Run, number: int) -> str:
-    """Beginning of the files' names: the log's, and the map's number unless it is the last."""
-    return results.name if number == results.choose() else f"{results.name}.snapshot{number}"
+    """Beginning of the files' names: the log, the part if one is named, the map unless it is the last."""
+    stem = results.name if results.part is None else f"{results.name}.part{results.part}"
+    return stem if number == results.choose() else f"{stem}.snapshot{number}"

@@ -8,6 +8,7 @@ import signal
 from pathlib import Path
 
 import duckdb
+import numpy as np
 import pandas as pd
 import pyarrow.dataset as ds
 import pyarrow.parquet as pq
@@ -26,9 +27,11 @@ from batches import (
     worker_of,
 )
 from commands import is_running, wait_for
+from reader_logs import START_NS, Map, McapLog
 from saved_maps import save_run
 
 from rose2_logs.batch import driver
+from rose2_logs.batch.dataset import publish_tables
 from rose2_logs.batch.folders import locked
 from rose2_logs.batch.options import BatchOptions
 from rose2_logs.batch.record import RECORD
@@ -104,6 +107,29 @@ def test_the_data_set_holds_the_rows_of_all_logs(batch, table):
         f"select log, count(*) from read_parquet('{root}/*/*.parquet', hive_partitioning=true) group by log"
     ).fetchall()
     assert dict(rows) == {name: count for name, count in expected.items() if count}
+
+
+def test_a_log_in_parts_is_read_with_others_by_the_usual_libraries(tmp_path: Path):
+    """Some take the columns of the first log, which is in one piece; grouping by part loses no log."""
+    for name, widths in (("a", (60, 110)), ("b", (60, 170, 60, 110, 150))):
+        log = McapLog(tmp_path / f"{name}.mcap")
+        for k, columns in enumerate(widths):
+            cells = np.full((100, 200), -1, np.int8)
+            cells[9:91, 5:columns] = 100
+            cells[10:90, 6 : columns - 1] = 0
+            log.add("/map", START_NS + k * 10**9, Map(cells))
+        options = RunOptions(recording=False, annotated_log=False)
+        analyze_log(log.close(), tmp_path / "logs" / name, options)
+        publish_tables(tmp_path, name)
+    root = tmp_path / "tables" / "snapshots"
+    expected = {("a", 1): 2, ("b", 1): 2, ("b", 2): 3}
+    assert dict(pd.read_parquet(root).groupby(["log", "part"], observed=True).size()) == expected
+    assert ds.dataset(root, partitioning="hive").to_table()["part"].to_pylist() == [1, 1, 1, 1, 2, 2, 2]
+    rows = duckdb.sql(
+        f"select log, part, count(*) from read_parquet('{root}/*/*.parquet', hive_partitioning=true) "
+        "group by log, part"
+    ).fetchall()
+    assert {(log, part): count for log, part, count in rows} == expected
 
 
 def test_the_summary_is_the_same_as_csv_and_parquet(batch):

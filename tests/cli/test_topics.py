@@ -71,11 +71,24 @@ def test_a_single_topic_has_the_folder_of_the_log(cli, log: Path, tmp_path: Path
     assert topics_in(tmp_path / "one") == {"run": "/a/map"}
 
 
-def test_a_topic_that_is_not_there_does_not_stop_the_others(cli, log: Path, tmp_path: Path):
-    code, _, err = cli("analyze", log, "-o", tmp_path, "--topic", "/b", "--topic", "/map", *QUIET)
+def test_a_topic_that_is_not_there_is_refused_before_the_others_are_analyzed(cli, log: Path, tmp_path: Path):
+    out = tmp_path / "out"
+    code, _, err = cli("analyze", log, "-o", out, "--topic", "/map", "--topic", "/b", *QUIET)
     assert code == 2
-    assert "/b is not a topic with occupancy grids" in err
-    assert topics_in(tmp_path / "run") == {"map": "/map"}
+    assert err.startswith(f"error: {log}: /b is not a topic with occupancy grids")
+    assert not out.exists()
+    # Another log that has all of them is analyzed.
+    more = McapLog(tmp_path / "more.mcap")
+    for k, topic in enumerate(("/map", "/b")):
+        more.add(topic, START_NS + k, Map(np.zeros((20, 20), np.int8)))
+    both = ("--topic", "/map", "--topic", "/b", *QUIET)
+    assert cli("analyze", log, more.close(), "-o", out, *both)[0] == 2
+    assert topics_in(out) == {"more/map": "/map", "more/b": "/b"}
+
+
+def test_one_topic_in_two_spellings_is_analyzed_once(cli, log: Path, tmp_path: Path):
+    assert cli("analyze", log, "-o", tmp_path, "--topic", "map", "--topic", "/map", *QUIET)[0] == 0
+    assert topics_in(tmp_path) == {"run": "/map"}
 
 
 @pytest.mark.parametrize("other", ["--topic", "--map-from"])

@@ -71,15 +71,40 @@ def test_parts_without_a_map_in_the_time_range_are_left_out(tmp_path):
     path = log_of(tmp_path / "run.mcap", [seen(columns) for columns in (*GROWING, *GROWING)])
     for selected, numbers in (
         ({}, [1, 2]),
+        ({"start_s": 4.0, "end_s": 5.0}, [1, 2]),
         ({"end_s": 3.0}, [1]),
         ({"start_s": 6.0}, [2]),
         ({"max_snapshots": 2}, [1, 2]),
     ):
-        with open_log(path, selection=rl.Selection(**selected)) as reader:
+        with (
+            collect_warnings() as warnings,
+            open_log(path, selection=rl.Selection(**selected)) as reader,
+        ):
             lasts = reader.lasts()
             assert list(lasts) == numbers
             assert lasts[numbers[-1]].log_time_ns == reader.last().log_time_ns
             assert {reader.part_at(each.log_time_ns) for each in reader.snapshots()} <= set(numbers)
+            assert reader.decided["parts"] == {"count": 2, "analyzed": numbers}
+            assert ("parts" in warnings.kinds) == (len(numbers) > 1)
+
+
+def test_parts_in_the_time_range_are_told_with_their_numbers(tmp_path):
+    path = log_of(tmp_path / "run.mcap", [seen(columns) for columns in GROWING * 3])
+    with collect_warnings() as warnings, open_log(path, selection=rl.Selection(start_s=6.0)) as reader:
+        assert list(reader.lasts()) == [2, 3]
+    (told,) = warnings.kinds["parts"].first
+    assert "there are 3 parts, 2 of them in the time range: 2 of 5 maps (33 m2" in told["message"]
+    assert told["message"].endswith("part=2 takes one alone")
+
+
+def test_of_publishers_in_turn_only_those_in_the_time_range_are_chosen_from(tmp_path):
+    """The one that tells most ends before the range begins."""
+    pairs = [each for columns in GROWING for each in (Map(seen(columns)), Map(seen(140, 150)))]
+    more = [Map(seen(140 + k, 150)) for k in range(2)]
+    path = log_of(tmp_path / "run.mcap", [*pairs, *more])
+    assert read(path)[1] == {"count": 2, "analyzed": [1]}
+    free, parts, kinds = read(path, selection=rl.Selection(start_s=9.0))
+    assert (free, parts, kinds) == ([135, 136], {"count": 2, "analyzed": [2]}, {})
 
 
 def test_the_place_where_a_map_is_begun_anew_is_found_in_a_long_log(tmp_path):

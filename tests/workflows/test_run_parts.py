@@ -57,11 +57,11 @@ def test_each_part_has_its_own_coverage_tracks_and_last_map(folder: Path):
     assert [snapshots[last]["final_iou"] for last in (2, 6)] == pytest.approx([1, 1])
 
 
-def test_every_table_says_the_part_and_only_that_more(folder: Path):
+def test_every_table_says_the_part(folder: Path):
     run = Run(folder)
     for name in (*TABLES, BACK_PROJECTED):
         table = run.table(name)
-        assert table.column_names == ["part", *SCHEMAS[name].names]
+        assert table.column_names == SCHEMAS[name].names
         key = "first_snapshot" if name == "tracks" else "snapshot"
         assert {(row[key] >= 3, row["part"]) for row in table.select([key, "part"]).to_pylist()} == {
             (False, 1),
@@ -152,16 +152,22 @@ def test_a_recording_shows_one_part_behind_the_other_along_coverage(folder: Path
     assert sorted(steps) == [int(100 * each) + 100 * (k > 2) for k, each in enumerate(coverage)]
 
 
-def test_a_log_without_parts_has_none_in_its_results(tmp_path: Path):
+def test_a_log_in_one_piece_is_part_1_in_its_tables(tmp_path: Path):
+    """So that the tables of many logs have the same columns, and none is lost where they are grouped."""
     log = McapLog(tmp_path / "run.mcap")
     for k, columns in enumerate(FIRST):
         log.add("/map", START_NS + k * 10**9, two_rooms(columns))
-    run = rl.analyze(log.close())
+    run = rl.analyze(log.close(), back_project=True)
     assert run.parts == ()
-    assert "part" not in run.table("rooms").column_names
     assert "parts" not in run.summary
-    with pytest.raises(ParameterError, match="it has no parts"):
-        Run(run.folder, part=1)
+    for name in (*TABLES, BACK_PROJECTED):
+        assert set(run.table(name)["part"].to_pylist()) <= {1}
+    whole = Run(run.folder, part=1)
+    assert whole.part is None
+    assert whole.tracks["track"].tolist() == run.tracks["track"].tolist()
+    for wrong in (2, "1"):
+        with pytest.raises(ParameterError, match=f"no part {wrong!r}; it has 1"):
+            Run(run.folder, part=wrong)
 
 
 def test_damaged_parts_of_a_summary_are_told(folder: Path, tmp_path: Path):

@@ -18,8 +18,9 @@ from saved_maps import save_map, save_run, two_rooms
 
 from rose2_logs.cli.main import main
 from rose2_logs.config.parameters import Parameters
-from rose2_logs.errors import AlreadyWholeError, InvalidMapError, OutputError
+from rose2_logs.errors import AlreadyWholeError, InvalidMapError, OutputError, ParameterError
 from rose2_logs.runs.output_folder import OutputFolder, difference
+from rose2_logs.runs.run import Run
 from rose2_logs.runs.tables import TABLES
 from rose2_logs.system.files import locked
 from rose2_logs.workflows.analyze import RunOptions, analyze_log
@@ -197,11 +198,26 @@ def test_whole_results_are_not_taken_for_those_with_other_names(log: Path, tmp_p
     names.write_text("name,track\nKitchen,1\n")
     analyze_log(log, out, RunOptions(**OPTIONS))
     again = RunOptions(**OPTIONS, resume=True, names=str(names))
-    with pytest.raises(OutputError, match="other names of rooms"):
+    with pytest.raises(OutputError, match="with no names of rooms"):
         analyze_log(log, out, again)
     analyze_log(log, out, RunOptions(**OPTIONS, names=str(names), overwrite=True))
     with pytest.raises(AlreadyWholeError, match="nothing is left to do"):
         analyze_log(log, out, again)
+    names.write_text("name,track\nPantry,2\n")
+    for other in (again, RunOptions(**OPTIONS, resume=True)):
+        with pytest.raises(OutputError, match="with other names of rooms"):
+            analyze_log(log, out, other)
+    assert set(Run(out).names.values()) == {"Kitchen"}
+    (tmp_path / "moved.csv").write_text("name,track\nKitchen,1\n")
+    with pytest.raises(AlreadyWholeError):
+        analyze_log(log, out, RunOptions(**OPTIONS, resume=True, names=str(tmp_path / "moved.csv")))
+
+
+def test_names_that_cannot_be_read_are_refused_before_the_log_is(log: Path, tmp_path: Path):
+    gone = RunOptions(**OPTIONS, names=str(tmp_path / "gone.csv"))
+    with pytest.raises(ParameterError, match=r"gone\.csv"):
+        analyze_log(tmp_path / "no.mcap", tmp_path / "out", gone)
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_run_killed_after_all_is_in_place_is_whole(log: Path, fresh, tmp_path: Path):

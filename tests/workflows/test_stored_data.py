@@ -15,6 +15,7 @@ import rose2_logs as rl
 from rose2_logs.errors import OutputError, ResultsError
 from rose2_logs.outputs.exports.formats import FORMATS
 from rose2_logs.outputs.report.page import write_report
+from rose2_logs.runs.run import Run
 from rose2_logs.workflows.compare import FILES, compare_runs
 from rose2_logs.workflows.figure import export_plan, write_figure
 
@@ -100,7 +101,7 @@ def test_runs_are_compared_by_their_stored_walls_and_maps(folders, tmp_path: Pat
     """A run with itself: everything is the same, and lies where it lay."""
     full, bare = folders
     for number, (a, b) in enumerate([(full, bare), (bare, full)]):
-        compare_runs(a, b, tmp_path / str(number), recording=False)
+        compare_runs(Run(a), Run(b), tmp_path / str(number), recording=False)
     for name in FILES[:2]:
         assert (tmp_path / "0" / name).read_bytes() == (tmp_path / "1" / name).read_bytes()
     found = rl.compare(full, bare)

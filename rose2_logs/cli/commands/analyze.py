@@ -81,12 +81,13 @@ def analyze(
         other = "--topic" if topics else "--map-from"
         raise ParameterError(f"--all-topics and {other} exclude each other; pass one of them")
     # Whatever is wrong with them is told before the first log is read.
-    asked: list[str | None] = [*dict.fromkeys(topics or [])]
+    asked = list(dict.fromkeys(topics or []))
     of_topics = [dataclasses.replace(options, topic=topic) for topic in asked or [None]]
     failed = 0
     for log, name in zip(logs, names, strict=True):
         try:
-            chosen = _of_all_topics(log, options) if all_topics else of_topics
+            # A topic that the log lacks is told before others are analyzed.
+            chosen = of_topics if len(asked) < 2 and not all_topics else _of_topics(log, options, asked)
         except Rose2LogsError as error:
             failed += 1
             _tell(error, is_only=len(logs) == 1)
@@ -101,11 +102,11 @@ def analyze(
         raise typer.Exit(EXIT_KNOWN)
 
 
-def _of_all_topics(log: Path, options: RunOptions) -> list[RunOptions]:
-    """Options for each topic of a log that holds maps."""
+def _of_topics(log: Path, options: RunOptions, asked: Sequence[str]) -> list[RunOptions]:
+    """Options for each topic of a log that is asked for, or that holds maps."""
     from rose2_logs.io import map_topics
 
-    return [dataclasses.replace(options, topic=topic) for topic in map_topics(log, options.reading)]
+    return [dataclasses.replace(options, topic=topic) for topic in map_topics(log, options.reading, asked)]
 
 
 def _folders(folder: Path, chosen: Sequence[RunOptions]) -> list[Path]:

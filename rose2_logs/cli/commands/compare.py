@@ -27,6 +27,17 @@ WALLS_SHOWN = 12
 """Walls that are printed, the longest of each kind first; the table holds all."""
 
 
+PartA = Annotated[
+    int | None,
+    typer.Option(
+        metavar="N",
+        help="Part of A, from 1, where its map was begun anew within the log. By default the last.",
+        show_default=False,
+    ),
+]
+PartB = Annotated[int | None, typer.Option(metavar="N", help="The same for B.", show_default=False)]
+
+
 def compare(
     a: Annotated[
         Path, typer.Argument(metavar="A", help="Results of analyze: the layout as it was, the reference.")
@@ -47,13 +58,15 @@ def compare(
             show_default=False,
         ),
     ] = None,
+    part_a: PartA = None,
+    part_b: PartB = None,
 ) -> None:
     """Compare the last layouts of two runs: rooms and walls that are new, missing or moved."""
+    from rose2_logs.runs.run import named_run
     from rose2_logs.workflows.compare import compare_runs
 
-    result = compare_runs(
-        a, b, out, recording=not no_rrd, overwrite=overwrite, parameters=parameters, names=names
-    )
+    run_a, run_b = named_run(a, names, part_a), named_run(b, None, part_b)
+    result = compare_runs(run_a, run_b, out, recording=not no_rrd, overwrite=overwrite, parameters=parameters)
     print_comparison(result)
 
 

@@ -43,6 +43,15 @@ Coverage = Annotated[
 Last = Annotated[
     bool, typer.Option("--last", help="The last map, which is the default.", rich_help_panel=WHICH_MAP)
 ]
+Part = Annotated[
+    int | None,
+    typer.Option(
+        metavar="N",
+        help="Part of the run, from 1, where the map was begun anew within the log. By default the last.",
+        show_default=False,
+        rich_help_panel=WHICH_MAP,
+    ),
+]
 Overwrite = Annotated[
     bool, typer.Option("--overwrite", help="Replace files that exist already.", rich_help_panel=WHAT)
 ]
@@ -86,15 +95,7 @@ def report(
             rich_help_panel=WHAT,
         ),
     ] = PANELS,
-    part: Annotated[
-        int | None,
-        typer.Option(
-            metavar="N",
-            help="Part of the run, from 1, where the map was begun anew within the log. By default the last.",
-            show_default=False,
-            rich_help_panel=WHAT,
-        ),
-    ] = None,
+    part: Part = None,
     names: Names = None,
     overwrite: Overwrite = False,
 ) -> None:
@@ -115,6 +116,7 @@ def figure(
     snapshot: Snapshot = None,
     coverage: Coverage = None,
     last: Last = False,
+    part: Part = None,
     back_projected: Annotated[
         bool,
         typer.Option(
@@ -152,7 +154,14 @@ def figure(
 
     choice = _choice(snapshot, coverage, last)
     picture = write_figure(
-        folder, out, *choice, back_projected=back_projected, width_px=width, overwrite=overwrite, names=names
+        folder,
+        out,
+        *choice,
+        back_projected=back_projected,
+        width_px=width,
+        overwrite=overwrite,
+        names=names,
+        part=part,
     )
     print_file(picture)
 
@@ -172,6 +181,7 @@ def export(
     snapshot: Snapshot = None,
     coverage: Coverage = None,
     last: Last = False,
+    part: Part = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -190,7 +200,7 @@ def export(
     from rose2_logs.workflows.figure import export_plan
 
     choice = _choice(snapshot, coverage, last)
-    for file in export_plan(folder, formats, out, *choice, overwrite=overwrite, names=names):
+    for file in export_plan(folder, formats, out, *choice, overwrite=overwrite, names=names, part=part):
         print_file(file)
 
 
