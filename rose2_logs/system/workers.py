@@ -8,6 +8,7 @@ import os
 import shutil
 import signal
 import sys
+import tempfile
 import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
@@ -17,6 +18,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from functools import lru_cache
 from multiprocessing.context import BaseContext
 from multiprocessing.reduction import ForkingPickler
+from multiprocessing.util import Finalize
 from types import ModuleType, TracebackType
 from typing import TYPE_CHECKING, Any, Generic, Self, TypeVar
 
@@ -42,6 +44,12 @@ START_METHOD = "forkserver" if sys.platform == "linux" else "spawn"
 once for all of them; on other systems, forking after imports is not safe for all libraries."""
 THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "RAYON_NUM_THREADS")
 """Where OpenMP, the linear algebra libraries and Rerun read the number of threads when they are loaded."""
+SOCKET_NAME_BYTES = 107
+"""The longest name of a socket on Linux (unix(7))."""
+NAME_IN_FOLDER = "/pymp-12345678/listener-12345678"
+"""How multiprocessing names its sockets in the folder for temporary files."""
+SHORT_FOLDERS = ("/tmp", "/var/tmp", "/dev/shm")
+"""Where sockets lie if the folder for temporary files has too long a name for them."""
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3
 """Options of the GNU C library's `mallopt` (malloc.h)."""
 KEPT_ARRAY_BYTES, KEPT_BYTES = 32 << 20, 1 << 30
@@ -292,6 +300,7 @@ def _start_fork_server() -> None:
     """Start the process that workers are forked from, unless it runs; it imports with signals blocked."""
     from multiprocessing import forkserver, resource_tracker
 
+    _keep_socket_names_short()
     with held_back():
         before = signal.pthread_sigmask(signal.SIG_BLOCK, STOPPING)
         try:
@@ -302,6 +311,21 @@ def _start_fork_server() -> None:
             forkserver.ensure_running()
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _keep_socket_names_short() -> None:
+    """Give multiprocessing a private folder for its sockets where their names would be too long otherwise."""
+    config: dict[str, Any] = multiprocessing.current_process()._config  # type: ignore[attr-defined]
+    longest = os.fsencode(tempfile.gettempdir() + NAME_IN_FOLDER)
+    if config.get("tempdir") is not None or len(longest) <= SOCKET_NAME_BYTES:
+        return
+    for place in SHORT_FOLDERS:
+        with suppress(OSError):
+            folder = tempfile.mkdtemp(prefix="rose2_logs_", dir=place)
+            # Removed when multiprocessing would remove its own: after what uses the sockets.
+            Finalize(None, shutil.rmtree, (folder, True), exitpriority=-100)
+            config["tempdir"] = folder
+            return
 
 
 class _Task:

@@ -10,6 +10,7 @@ import shutil
 import sqlite3
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -95,6 +96,21 @@ def test_rerun_is_not_started_where_it_would_end_the_process(
     done = run(f'{limit}; exec "$@"', *command)
     assert (done.returncode, len(errors(done.stderr))) == (2, 1), done.stderr
     assert "comparison.rrd" in done.stderr
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="names of sockets are short on Linux")
+@pytest.mark.parametrize("length", [60, 75, 76, 150])
+def test_a_folder_for_temporary_files_may_have_a_long_name(log: Path, tmp_path: Path, length: int):
+    """Names of sockets have 107 bytes at most. Other files lie where they always do; nothing is left."""
+    with tempfile.TemporaryDirectory() as short:
+        long = Path(short) / ("x" * (length - len(short) - 1))
+        long.mkdir()
+        done = run(
+            'exec "$@"', "analyze", log, "-o", tmp_path / "out", *QUICK, "--workers", 2, TMPDIR=str(long)
+        )
+        assert (done.returncode, done.stderr) == (0, "")
+        assert is_whole(tmp_path / "out" / "maps")
+        assert list(long.iterdir()) == []
 
 
 @pytest.mark.parametrize("limit", ["ulimit -v 200000", "ulimit -n 8"])

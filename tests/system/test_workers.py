@@ -11,6 +11,7 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from types import SimpleNamespace
 
 import numpy as np
@@ -255,3 +256,29 @@ def test_an_interrupt_waits_for_a_process_to_be_started(monkeypatch):
         WorkerProcess().start()
     assert started
     assert signal.getsignal(signal.SIGINT) is before
+
+
+SCRIPT = """
+import math, os, sys
+from rose2_logs.system import workers
+
+workers.SHORT_FOLDERS = ("/there/is/no/such/folder", sys.argv[1])
+with workers.Workers(math.factorial, 2) as pool:
+    print([result for _, result in pool.map(range(5))], len(os.listdir(sys.argv[1])))
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="sockets with names are used on Linux only")
+def test_sockets_lie_in_a_private_folder_where_their_names_would_be_too_long(tmp_path: Path):
+    """It is used then only, and is gone afterwards."""
+    with TemporaryDirectory() as short:
+        for length, folders in ((75 - len(short) - 1, 0), (76 - len(short) - 1, 1)):
+            temporary, sockets = Path(short) / ("x" * length), tmp_path / str(folders)
+            temporary.mkdir()
+            sockets.mkdir()
+            done = subprocess.run(
+                [sys.executable, "-c", SCRIPT, sockets],
+                capture_output=True, text=True, check=False, env=os.environ | {"TMPDIR": str(temporary)},
+            )  # fmt: skip
+            assert (done.stdout, done.stderr) == (f"[1, 1, 2, 6, 24] {folders}\n", "")
+            assert not [*sockets.iterdir(), *temporary.iterdir()]

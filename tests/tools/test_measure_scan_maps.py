@@ -44,12 +44,14 @@ def test_a_map_that_is_shifted_does_not_agree(table):
 
     with rl.open_log(table[1] / "flat_6.mcap") as reader:
         recorded = reader.last()
-    same = agreement(recorded, recorded)
-    assert (same.agree, same.walls, same.known, same.rooms.iou_sym) == (100, 100, 100, 100)
+        way = reader.robot_path("map").until(recorded.log_time_ns)[:, :2]
+    same = agreement(recorded, recorded, way)
+    assert (same.agree, same.walls, same.known, same.rooms.iou_sym, same.entered.iou_sym) == (100,) * 5
+    assert 0 < same.entered.rooms_gt < same.rooms.rooms_gt
     x, y = recorded.geometry.origin_xy_m
     moved = replace(recorded, geometry=replace(recorded.geometry, origin_xy_m=(x + 0.3, y)))
-    assert agreement(recorded, moved).agree < 98
-    assert agreement(recorded, moved).walls < 80
+    assert agreement(recorded, moved, way).agree < 98
+    assert agreement(recorded, moved, way).walls < 80
 
 
 def test_carmen_logs_have_a_row_without_agreement(tmp_path, capsys):
