@@ -110,8 +110,7 @@ def decoder(
     }.get(ros_type(message_type))
     if decode is None or encoding not in ("cdr", "ros1"):
         return None
-    open_fields = CdrFields if encoding == "cdr" else Ros1Fields
-    return lambda data: decode(open_fields(data, most_cells))
+    return lambda data: decode(fields_of(data, encoding, most_cells))
 
 
 class Fields:
@@ -234,6 +233,11 @@ class Ros1Fields(Fields):
         """Take a std_msgs/Header: stamp in nanoseconds and frame."""
         self.integers("I")
         return super().header()
+
+
+def fields_of(data: bytes | memoryview, encoding: str, most_cells: int = MOST_CELLS) -> Fields:
+    """Open a message of ROS to take its fields one after the other; the encoding is ``cdr`` or ``ros1``."""
+    return (CdrFields if encoding == "cdr" else Ros1Fields)(memoryview(data), most_cells)
 
 
 def _occupancy_grid(fields: Fields) -> Grid | None:

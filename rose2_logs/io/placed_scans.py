@@ -13,10 +13,10 @@ import numpy as np
 
 from rose2_logs.config.mapping import MappingParameters
 from rose2_logs.errors import InvalidMapError, LogError, NoMapTopicError
-from rose2_logs.io.messages import CdrFields, Fields, Ros1Fields
+from rose2_logs.io.messages import fields_of
 from rose2_logs.io.scan_topics import scan_topics, transform_topics
 from rose2_logs.io.scans import Scan, scan_of, transforms_of
-from rose2_logs.io.source import DamagedMessageError, LoggedBytes, MessageSource
+from rose2_logs.io.source import LoggedBytes, MessageSource
 from rose2_logs.mapping.log_odds import Beams, beams_of
 from rose2_logs.mapping.transforms import Link, NotPlacedError, Transform, TransformTree, rotated
 from rose2_logs.system.warnings import log_warning
@@ -142,7 +142,7 @@ class RosScans:
         now_ns = 0
         for message in self._source.stream((self.topic, *self._moving_topics)):
             now_ns = max(now_ns, message.log_time_ns)
-            data = _data(message)
+            data = message.data_if_whole()
             if message.topic != self.topic:
                 # Most transforms are of joints and wheels.
                 if data is None or (needed and not any(child in data for child in needed)):
@@ -200,7 +200,7 @@ class RosScans:
         """Return a tree with the fixed transforms, which hold at all times, whenever they were recorded."""
         tree = TransformTree(self._parameters)
         for message in self._source.stream(self._fixed_topics) if self._fixed_topics else ():
-            if (data := _data(message)) is not None:
+            if (data := message.data_if_whole()) is not None:
                 for transform in _transforms_in(message, data):
                     tree.add(transform, is_fixed=True)
         return tree
@@ -216,7 +216,7 @@ class RosScans:
             stream = self._source.stream(self._moving_topics) if self._moving_topics else iter(())
             links: set[Link] = set()
             for message in islice(stream, TRIED_TRANSFORMS):
-                if (data := _data(message)) is None:
+                if (data := message.data_if_whole()) is None:
                     continue
                 new = [each for each in _transforms_in(message, data) if _link(each) not in links]
                 for transform in new:
@@ -240,13 +240,14 @@ class RosScans:
 
     def _frame_of_scans(self) -> str:
         for message in self._source.stream((self.topic,)):
-            if (scan := self._scan_in(message, _data(message))) is not None:
+            if (scan := self._scan_in(message, message.data_if_whole())) is not None:
                 return scan.frame_id
         raise LogError(f"{self._source.info.path}: no scan on {self.topic} can be read")
 
     def _scan_in(self, message: LoggedBytes, data: bytes | None) -> Scan | None:
         try:
-            scan = None if data is None else scan_of(_fields(message, data), self._types[message.encoding])
+            fields = None if data is None else fields_of(data, message.encoding)
+            scan = None if fields is None else scan_of(fields, self._types[message.encoding])
         except (InvalidMapError, KeyError):
             scan = None
         if scan is None:
@@ -305,20 +306,9 @@ def _link(transform: Transform) -> Link:
     return transform.parent, transform.child
 
 
-def _data(message: LoggedBytes) -> bytes | None:
-    try:
-        return bytes(message.data())
-    except DamagedMessageError:
-        return None
-
-
-def _fields(message: LoggedBytes, data: bytes) -> Fields:
-    return (CdrFields if message.encoding == "cdr" else Ros1Fields)(memoryview(data))
-
-
 def _transforms_in(message: LoggedBytes, data: bytes) -> list[Transform]:
     """Transforms of a message; none if it is damaged."""
     try:
-        return list(transforms_of(_fields(message, data)))
+        return list(transforms_of(fields_of(data, message.encoding)))
     except InvalidMapError:
         return []

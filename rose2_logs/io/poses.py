@@ -13,8 +13,8 @@ import numpy as np
 
 from rose2_logs.errors import InvalidMapError
 from rose2_logs.io.grids import yaw_of
-from rose2_logs.io.messages import CdrFields, Fields, Ros1Fields, ros_type
-from rose2_logs.io.source import DamagedMessageError, LoggedBytes, LogInfo, MessageSource
+from rose2_logs.io.messages import Fields, fields_of, ros_type
+from rose2_logs.io.source import LoggedBytes, LogInfo, MessageSource
 from rose2_logs.model.occupancy import FloatArray
 from rose2_logs.system.warnings import log_warning
 
@@ -169,9 +169,9 @@ def _choose(
 def _tell_other_frame(source: MessageSource, topics: tuple[str, ...], wanted: _Wanted) -> None:
     """Warn that poses are not in the frame of the map, and no transforms lead from one to the other."""
     for message in islice(source.stream(topics), 1):
-        data = _data(message)
+        data = message.data_if_whole()
         try:
-            frame = "" if data is None else _plain(_fields(message, data).header()[1])
+            frame = "" if data is None else _plain(fields_of(data, message.encoding).header()[1])
         except InvalidMapError:
             return
         if frame and frame != wanted.frame:
@@ -203,9 +203,9 @@ def _connected(source: MessageSource, topics: tuple[str, ...], wanted: _Wanted) 
     path = source.info.path
     edges: dict[str, _Edge] = {}
     for message in islice(source.stream(topics), TRIED_MESSAGES):
-        if (data := _data(message)) is not None:
+        if (data := message.data_if_whole()) is not None:
             with suppress(InvalidMapError):
-                edges |= _transforms(_fields(message, data))
+                edges |= _transforms(fields_of(data, message.encoding))
     if robots := _robots_in(wanted, edges):
         if len(robots) > 1:
             text = (
@@ -244,11 +244,11 @@ def _transformed(
     for message in messages:
         if message.log_time_ns < start_ns - LEAD_NS and "static" not in message.topic:
             continue
-        data = _data(message)
+        data = message.data_if_whole()
         if data is None or (chain and not any(child in data for child in chain)):
             continue
         try:
-            edges |= _transforms(_fields(message, data))
+            edges |= _transforms(fields_of(data, message.encoding))
         except InvalidMapError:
             continue
         if latest_ns is not None and message.log_time_ns - latest_ns < POSE_STEP_S * 1e9:
@@ -268,27 +268,16 @@ def _posed(
         time_ns = message.log_time_ns
         if time_ns < start_ns or (latest_ns is not None and time_ns - latest_ns < POSE_STEP_S * 1e9):
             continue
-        data = _data(message)
+        data = message.data_if_whole()
         if data is None:
             continue
         try:
-            pose = read(_fields(message, data))
+            pose = read(fields_of(data, message.encoding))
         except InvalidMapError:
             continue
         if all(map(math.isfinite, pose)):
             latest_ns = time_ns
             yield time_ns, pose
-
-
-def _data(message: LoggedBytes) -> bytes | None:
-    try:
-        return bytes(message.data())
-    except DamagedMessageError:
-        return None
-
-
-def _fields(message: LoggedBytes, data: bytes) -> Fields:
-    return (CdrFields if message.encoding == "cdr" else Ros1Fields)(memoryview(data))
 
 
 def _transforms(fields: Fields) -> dict[str, _Edge]:

@@ -127,6 +127,13 @@ class LoggedBytes:
     encoding: str
     data: Callable[[], bytes | memoryview] = field(repr=False)
 
+    def data_if_whole(self) -> bytes | None:
+        """Return its bytes; None if they are lost."""
+        try:
+            return bytes(self.data())
+        except DamagedMessageError:
+            return None
+
 
 class MessageSource(ABC):
     """An open log: what it contains, and its map messages by topic and log time.
