@@ -36,6 +36,8 @@ FREE_BELOW, OCCUPIED_ABOVE = USUAL.free_max_percent, USUAL.occupied_min_percent
 UNKNOWN_BYTE = 255
 HALF = 50
 """Percent at which nothing speaks for free or for occupied."""
+HALVES = (HALF, HALF - 1, HALF + 1)
+"""What 127 and 128 of 255 are in percent, as they are rounded."""
 LETHAL_COST = 254
 LEAST_CELLS = 1000
 """Known cells, 2.5 m2 of 5 cm, below which the numbers of the maps decide nothing."""
@@ -58,6 +60,9 @@ UNKNOWN_SHARE = 0.01
 """Cells that are unknown, at least, if one number stands for it: 4 % are, with two around a building."""
 BORDER_WALL_SHARE = 0.05
 """Where less of the border of the free cells is wall, the map tells no rooms."""
+NARROW_M = 0.4
+"""Where the free cells are narrower on average, no robot got anywhere: the floor of buildings is 1 m or more
+wide between walls and furniture, walls are 0.1 to 0.3 m thick."""
 BORDER_LEAST_SIDES = 200
 """Cell sides, 10 m of 5 cm, below which the border of the free cells says nothing."""
 
@@ -126,9 +131,10 @@ def _zero_one_table() -> Cells:
     return table
 
 
-def _without_fifty(table: Cells) -> Cells:
+def _without(table: Cells, number: int) -> Cells:
+    """The same with one number that is unknown."""
     table = table.copy()
-    table[HALF] = UNKNOWN
+    table[number] = UNKNOWN
     return table
 
 
@@ -154,7 +160,7 @@ READINGS = {
     ),
     "fifty_unknown": CellReading(
         "percent, 50 is unknown",
-        _without_fifty(_bytes()),
+        _without(_bytes(), HALF),
         why="no cell is -1 and many are 50: these are read as unknown",
     ),
     "costs": CellReading(
@@ -206,24 +212,36 @@ def decide(counts: Counts) -> CellReading:
     total = int(known.sum())
     if total < LEAST_CELLS:
         return STORED
-    if known[LETHAL_COST] > max(WALL_SHARE * total, known[HIGHEST_PERCENT]):
+    lethal = known[LETHAL_COST]
+    if max(WALL_SHARE * total, known[HIGHEST_PERCENT]) < lethal <= WALLS_AT_MOST * total:
         return READINGS["costs"]
-    if known[0] and known[1] > WALL_SHARE * total and not known[2:].any():
-        return READINGS["zero_one"]
-    is_fifty_unknown = (
-        known[HALF] > UNKNOWN_SHARE * total
-        and known[HALF] > SPIKE_RATIO * (known[HALF - 1] + known[HALF + 1])
-        and counts[UNKNOWN_BYTE] < UNKNOWN_SHARE * known[HALF]
+    unknown = next((number for number in HALVES if _is_unknown(number, counts)), None)
+    if unknown is not None:
+        known[unknown] = 0
+    if known[0] and known[1] and not known[2:].any():
+        found = READINGS["zero_one"]
+    else:
+        found = _of_percent(known[: HIGHEST_PERCENT + 1])
+    if unknown is None:
+        return found
+    why = f"no cell is -1 and many are {unknown}: these are read as unknown"
+    return replace(
+        found,
+        name=f"{found.name}, {unknown} is unknown",
+        table=_without(_bytes() if found.table is None else found.table, unknown),
+        why=f"{why}; {found.why}" if found.why else why,
+    )
+
+
+def _is_unknown(number: int, counts: Counts) -> bool:
+    """Whether a number stands for unknown: no cell is -1, and it comes far more often than its neighbors."""
+    known = counts[:UNKNOWN_BYTE]
+    return bool(
+        counts[number] > UNKNOWN_SHARE * known.sum()
+        and counts[number] > SPIKE_RATIO * (counts[number - 1] + counts[number + 1])
+        and counts[UNKNOWN_BYTE] < UNKNOWN_SHARE * counts[number]
         and not _are_inflated_costs(known)
     )
-    if not is_fifty_unknown:
-        return _of_percent(known[: HIGHEST_PERCENT + 1])
-    known[HALF] = 0
-    found, fifty = _of_percent(known[: HIGHEST_PERCENT + 1]), READINGS["fifty_unknown"]
-    if found.table is None:
-        return fifty
-    why = f"{fifty.why}; {found.why}"
-    return replace(found, name=f"{found.name}, 50 is unknown", table=_without_fifty(found.table), why=why)
 
 
 def _of_percent(known: Counts) -> CellReading:
@@ -280,7 +298,7 @@ def _threshold_table(free_below: float, occupied_above: float) -> Cells:
 
 def oddity(snapshot: OccupancySnapshot, parameters: OccupancyParameters) -> tuple[str, str] | None:
     """Say why the rooms of a map mean little: kind of the warning and its text; None where nothing is odd."""
-    free, _ = classify(snapshot.cells, parameters)
+    free, occupied = classify(snapshot.cells, parameters)
     if not free.any() and bool((snapshot.cells != UNKNOWN).any()):
         return "nothing_free", (
             "none of its cells is free, so it has no rooms; if free cells hold higher values, raise the "
@@ -292,6 +310,14 @@ def oddity(snapshot: OccupancySnapshot, parameters: OccupancyParameters) -> tupl
             "the floor of a building has 0.1: this is noise, or a picture of something else, and no map of a "
             "building"
         )
+    if np.count_nonzero(occupied) > np.count_nonzero(free) >= BORDER_LEAST_SIDES:
+        width_m = 2 * snapshot.geometry.resolution_m / max(sides_per_cell(free), 1e-9)
+        if width_m < NARROW_M:
+            return "swapped", (
+                f"most of its known cells are occupied, and its free ones are lines {width_m:.2f} m wide, as "
+                "walls are: free and occupied seem to be swapped, and its rooms mean nothing; a saved map is "
+                "read the other way round with negate: 1 in its description"
+            )
     text = few_walls(snapshot, parameters)
     return None if text is None else ("few_walls", text)
 

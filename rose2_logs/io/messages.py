@@ -39,9 +39,9 @@ PADDING_BYTES = 8
 def ros_type(name: str) -> str:
     """Normalize the name of a ROS message type to ``package/Type``, without ``/msg/``.
 
-    DDS spells it ``package::msg::dds_::Type_``, and tools that read it write it with slashes.
+    DDS spells it ``package::msg::dds_::Type_``, tools that read it write slashes, and Python writes dots.
     """
-    plain = name.replace("::", "/")
+    plain = name.replace("::", "/").replace(".msg.", "/")
     if "/dds_/" in plain:
         plain = plain.replace("/dds_/", "/").removesuffix("_")
     return plain.replace("/msg/", "/")

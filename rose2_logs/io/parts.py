@@ -45,6 +45,8 @@ WALL_REACH_M = 0.2
 SAME_WALLS_SHARE = 0.5
 """Share of a map's walls that are walls in the next map of its run, too: after loop closures it is 80 %, of a
 mask it is 3 %. Floors of one building share so many that only their names tell."""
+TURN_WALLS_SHARE = 0.8
+"""The same where buildings come in turn: of one that the log comes back to, nearly all walls are there."""
 KEPT_SHARE = 0.8
 """Share of a map's free area that the next map of its run has at least."""
 FLOOR = re.compile(
@@ -146,7 +148,7 @@ class _Maps:
     ) -> None:
         self._times, self._read, self._occupancy = times, read, occupancy
         self._facts: dict[int, MapFacts | None] = {}
-        self._is_continued: dict[tuple[int, int], bool] = {}
+        self._walls_kept: dict[tuple[int, int], float] = {}
         self._has_moved: dict[tuple[int, int], bool] = {}
         self._held: tuple[int, _Seen | None] = (-1, None)
 
@@ -161,19 +163,25 @@ class _Maps:
         then, there = self.facts(before), self.facts(now)
         if then is None or there is None or then.free_m2 < LEAST_AREA_M2:
             return False
-        return there.free_m2 < least_share * then.free_m2 or not self._has_walls(before, now)
+        if there.free_m2 < least_share * then.free_m2:
+            return True
+        return self.walls_kept(before, now) < SAME_WALLS_SHARE and not self._is_moved(before, now)
 
-    def _has_walls(self, before: int, now: int) -> bool:
-        """Whether a map shows the walls of an earlier one, maybe moved as a whole."""
-        if (before, now) not in self._is_continued:
+    def walls_kept(self, before: int, now: int) -> float:
+        """Share of the walls of an earlier map that a map shows where they were."""
+        if (before, now) not in self._walls_kept:
             self._look(before)
             self._look(now)
-        if not self._is_continued[before, now] and (before, now) not in self._has_moved:
+        return self._walls_kept[before, now]
+
+    def _is_moved(self, before: int, now: int) -> bool:
+        """Whether a map shows the walls of an earlier one, moved as a whole."""
+        if (before, now) not in self._has_moved:
             then, there = (self._read(int(self._times[place])) for place in (before, now))
             if then is None or there is None:
                 return False
             self._has_moved[before, now] = _has_moved(then, there, self._occupancy)
-        return self._is_continued[before, now] or self._has_moved[before, now]
+        return self._has_moved[before, now]
 
     def _look(self, place: int) -> None:
         """Read a map, and compare it with the one that was read before."""
@@ -182,7 +190,7 @@ class _Maps:
             return
         now = self._read(int(self._times[place]))
         if held is not None and now is not None:
-            self._is_continued[before, place] = _is_continued(held, now, self._occupancy)
+            self._walls_kept[before, place] = _walls_kept(held, now, self._occupancy)
         self._held = place, None if now is None else _Seen.of(now, self._occupancy)
         self._facts[place] = None if self._held[1] is None else self._held[1].facts
 
@@ -214,13 +222,15 @@ def find_parts(
         of_each = [[place for place, one in enumerate(publishers) if one == name] for name in names]
         parts = [_part(times, places, maps.facts, _spread(places)) for places in of_each]
         return Parts(tuple(parts), f"{', '.join(names)} publish in turn")
-    if publishers is None and (grids_in_turn := _grids_in_turn(min(len(times), LOOKED_AT), maps.facts)):
-        grids = [(found := maps.facts(place)) and _grid(found.geometry) for place in range(len(times))]
-        parts = [
-            _part(times, [place for place, grid in enumerate(grids) if grid == publisher], maps.facts)
-            for publisher in grids_in_turn
-        ]
+    first, all_maps = range(min(len(times), LOOKED_AT)), range(len(times))
+    if publishers is None and (grids_in_turn := _grids_in_turn(first, maps.facts)):
+        grids = [_grid_of(place, maps.facts) for place in all_maps]
+        of_each = [[place for place in all_maps if grids[place] == grid] for grid in grids_in_turn]
+        parts = [_part(times, places, maps.facts) for places in of_each]
         return Parts(tuple(parts), "maps of several grids come in turn, as of several publishers")
+    if publishers is None and len(_buildings_in_turn(first, maps)) > 1:
+        parts = [_part(times, places, maps.facts) for places in _buildings_in_turn(all_maps, maps)]
+        return Parts(tuple(parts), "maps of several buildings come in turn, as of several publishers")
     spread = _spread(range(len(times)))
     begins = [0, *_begins(spread, maps), len(times)]
     parts = [_part(times, range(low, high), maps.facts, spread) for low, high in pairwise(begins)]
@@ -292,7 +302,7 @@ def find_saved_parts(
         is_next = latest is None or _floor(names[place]) == _floor(names[place - 1])
         if now is not None and latest is not None and area_m2 >= LEAST_AREA_M2:
             is_kept = area_m2 >= KEPT_SHARE * latest.facts.free_m2
-            is_next &= is_kept and _is_continued(latest, now, occupancy)
+            is_next &= is_kept and _walls_kept(latest, now, occupancy) >= SAME_WALLS_SHARE
         if not is_next:
             begins.append(place)
         # A bad map between others, without free cells, parts nothing.
@@ -311,19 +321,19 @@ def _floor(name: str) -> str:
     return found[0] if found else ""
 
 
-def _is_continued(before: _Seen, now: Grid, occupancy: OccupancyParameters) -> bool:
-    """Whether a map knows most of the floor of another one, and has most of its walls."""
+def _walls_kept(before: _Seen, now: Grid, occupancy: OccupancyParameters) -> float:
+    """Share of the walls of another map that a map has; 0 if it does not know its floor, 1 without walls."""
     floor = _around(now, before.floor_m, 0.0)
     if np.count_nonzero(floor != UNKNOWN) < FALLEN_SHARE * len(floor):
-        return False
+        return 0.0
     free, near = (each[:, 0] for each in classify(_around(now, before.walls_m, 0.0), occupancy))
     # Most walls are where they were: only around the others is more to look at.
     away = np.flatnonzero(~near)
     near[away] = classify(_around(now, before.walls_m[away], WALL_REACH_M), occupancy)[1].any(axis=1)
     shown = near | free
     if np.count_nonzero(shown) < LEAST_WALL_CELLS:
-        return True
-    return bool(np.count_nonzero(near) >= SAME_WALLS_SHARE * np.count_nonzero(shown))
+        return 1.0
+    return float(np.count_nonzero(near) / np.count_nonzero(shown))
 
 
 def _some(cells: BoolArray, geometry: GridGeometry) -> FloatArray:
@@ -359,29 +369,62 @@ def _has_moved(before: Grid, now: Grid, occupancy: OccupancyParameters) -> bool:
     return fit.share(walls.points, fit.best(walls)) >= SAME_WALLS_SHARE
 
 
-def _grid(geometry: GridGeometry) -> GridGeometry:
-    return replace(geometry, yaw_rad=round(geometry.yaw_rad, 6))
+def _grid_of(place: int, facts: Callable[[int], MapFacts | None]) -> GridGeometry | None:
+    """The grid of a map, its place rounded to cells: less is the rounding of one publisher's numbers."""
+    if (found := facts(place)) is None:
+        return None
+    of, cell_m = found.geometry, found.geometry.resolution_m
+    x, y = (round(each / cell_m) * cell_m for each in of.origin_xy_m)
+    return replace(of, origin_xy_m=(x, y), yaw_rad=round(of.yaw_rad, 3))
 
 
-def _grids_in_turn(count: int, facts: Callable[[int], MapFacts | None]) -> list[GridGeometry]:
+def _grids_in_turn(places: Sequence[int], facts: Callable[[int], MapFacts | None]) -> list[GridGeometry]:
     """Grids between which the maps go back and forth, and find again what they had left; else none."""
     left: dict[GridGeometry, float] = {}
     returns = found_again = switches = 0
     latest: MapFacts | None = None
-    for place in range(count):
-        if (found := facts(place)) is None:
+    before: GridGeometry | None = None
+    for place in places:
+        found, grid = facts(place), _grid_of(place, facts)
+        if found is None or grid is None:
             continue
-        grid = _grid(found.geometry)
-        if latest is not None and grid != _grid(latest.geometry):
+        if latest is not None and grid != before:
             if grid in left:
                 returns += 1
                 found_again += found.free_m2 >= BACK_SHARE * left[grid]
             low, high = sorted((latest.free_m2, found.free_m2))
             switches += 1 if high - low > ANOTHER_SHARE * high else -1
         left[grid] = found.free_m2
-        latest = found
+        latest, before = found, grid
     is_in_turn = found_again >= max(LEAST_RETURNS, len(left) - 1) and 2 * found_again > returns
     return list(left) if is_in_turn and len(left) > 1 and switches > 0 else []
+
+
+def _buildings_in_turn(places: Sequence[int], maps: _Maps) -> list[list[int]]:
+    """Maps that grow from each other, by their places, where the log goes back and forth between these.
+
+    A bad map is none that the log comes back to, nor is where a map was before it was moved as a whole.
+    Without such turns, nothing.
+    """
+    grown: list[list[int]] = []
+    returns: list[int] = []
+    latest = 0
+    for place in places:
+        found = maps.facts(place)
+        if found is None or (grown and found.free_m2 < LEAST_AREA_M2):
+            continue
+        kept = [(maps.walls_kept(each[-1], place), each[-1]) for each in grown]
+        building = max(range(len(grown)), key=lambda each: kept[each], default=0)
+        if not grown or kept[building][0] < TURN_WALLS_SHARE:
+            building = len(grown)
+            grown.append([])
+            returns.append(0)
+        elif building != latest:
+            returns[building] += 1
+        grown[building].append(place)
+        latest = building
+    in_turn = [places for places, times in zip(grown, returns, strict=True) if times]
+    return grown if len(in_turn) > 1 and sum(returns) >= max(LEAST_RETURNS, len(grown) - 1) else []
 
 
 def _begins(spread: Sequence[int], maps: _Maps) -> list[int]:

@@ -74,6 +74,9 @@ STORED_AS = {
     "probabilities, fifty is unknown": lambda cells: np.where(
         cells == -1, np.int8(50), probabilities(cells, 0.5)
     ),
+    "forty-nine is unknown": lambda cells: changed(cells, unknown=49),
+    "fifty-one is unknown": lambda cells: changed(cells, unknown=51),
+    "zero and one, fifty is unknown": lambda cells: changed(cells, wall=1, unknown=50),
     "costs": lambda cells: changed(cells, wall=254),
     "faint walls": lambda cells: changed(cells, wall=40),
     "walls just above one half": lambda cells: changed(cells, wall=58),
@@ -195,8 +198,12 @@ def test_maps_that_are_none_of_a_building_are_told_of_by_kind():
     without = np.where(building() == 100, -1, building())
     full = np.full((90, 90), 100, np.int8)
     strewn = noise.choice(np.array([-1, 0, 100], np.int8), (200, 200))
-    told = [oddity(snapshot_of(cells), usual) for cells in (without, full, strewn)]
-    assert [each[0] for each in told] == ["few_walls", "nothing_free", "no_building"]
+    swapped = changed(building(), free=100, wall=0)
+    told = [oddity(snapshot_of(cells), usual) for cells in (without, full, strewn, swapped)]
+    assert [each[0] for each in told] == ["few_walls", "nothing_free", "no_building", "swapped"]
+    # A building in solid black is none of these.
+    solid = np.where(building() == -1, 100, building()).astype(np.int8)
+    assert oddity(snapshot_of(np.pad(solid, 100, constant_values=100)), usual) is None
     assert all("\n" not in each[1] for each in told)
 
 

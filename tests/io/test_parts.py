@@ -209,6 +209,33 @@ def test_another_building_of_the_same_size_is_a_part_of_its_own(far_m, tmp_path)
     assert read(log_of(tmp_path / "bad.mcap", [*growing, other, HOUSE]))[1] is None
 
 
+@pytest.mark.parametrize("count", [5, 70])
+def test_publishers_with_one_grid_are_told_apart_by_their_buildings(count, tmp_path):
+    """As two robots have whose mapping nodes are set up alike, also where the log names no publisher."""
+    growing = [GROWING[min(5 * k // count, 4)] for k in range(count)]
+    pairs = [(np.where(np.arange(200) < columns, HOUSE, -1), OTHER) for columns in growing]
+    path = log_of(tmp_path / "run.mcap", [each for pair in pairs for each in pair])
+    free, part, kinds = read(path)
+    assert part == {"analyzed": [1], "count": 2}
+    assert "maps of several buildings come in turn" in kinds["parts"].first[0]["message"]
+    assert len(free) == len(GROWING)
+    assert free == sorted(free)
+    assert len(read(path, part=2)[0]) == 1
+
+
+def test_bad_maps_between_others_are_of_no_publisher(tmp_path):
+    """Each is another one, and none is found again."""
+    growing = [np.where(np.arange(200) < columns, HOUSE, -1) for columns in GROWING]
+    bad = [OTHER, seen(190), building([2, 50, 98], [2, 75, 198])]
+    maps = [*growing, *(each for one in bad for each in (one, HOUSE))]
+    assert read(log_of(tmp_path / "run.mcap", maps))[1] is None
+
+
+def test_an_origin_that_is_rounded_now_and_then_is_of_one_publisher(tmp_path):
+    maps = [Map(seen(each), origin=(-1.0 + 1e-3 * (k % 2), 2.0)) for k, each in enumerate(GROWING)]
+    assert read(log_of(tmp_path / "run.mcap", maps))[1] is None
+
+
 def test_a_map_that_is_moved_as_a_whole_stays_of_one_part(tmp_path):
     growing = [np.where(np.arange(200) < columns, HOUSE, -1) for columns in GROWING]
     moved = [Map(HOUSE, origin=(0.5, 2.5)), Map(HOUSE, origin=(0.5, 2.5), stamp_ns=START_NS + 1)]
