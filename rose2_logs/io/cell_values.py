@@ -51,9 +51,9 @@ WALL_SHARE = 0.01
 """Known cells that are walls at least: 4 to 10 % are, in the maps of buildings that were looked at."""
 WALLS_AT_MOST = 1 / 3
 """Known cells above one half at most, if these are walls: a map with more is noise, or of no building."""
-FAINT_RATIO = 4
+FAINT_RATIO = 2
 """Walls are faint where so many times more cells lie between the thresholds than above the upper one: up to
-0.9 times in saved maps whose walls are clear, 20 times in one whose walls are not."""
+once in saved maps whose walls are clear, 18 times in one whose walls are not."""
 SPIKE_RATIO = 5
 """A number stands for something of its own if it comes so many times as often as its two neighbors."""
 UNKNOWN_SHARE = 0.01
@@ -315,8 +315,8 @@ def oddity(snapshot: OccupancySnapshot, parameters: OccupancyParameters) -> tupl
         if width_m < NARROW_M:
             return "swapped", (
                 f"most of its known cells are occupied, and its free ones are lines {width_m:.2f} m wide, as "
-                "walls are: free and occupied seem to be swapped, and its rooms mean nothing; a saved map is "
-                "read the other way round with negate: 1 in its description"
+                "walls are: free and occupied seem to be swapped, and its rooms mean nothing; negate in the "
+                "description of a saved map swaps them"
             )
     text = few_walls(snapshot, parameters)
     return None if text is None else ("few_walls", text)

@@ -348,7 +348,7 @@ def _cells(
     occupancy = _occupancy(path, described, shade)
     free_below, occupied_above = _thresholds(path, described)
     if mode == "scale":
-        percent = np.round((occupancy - free_below) / (occupied_above - free_below) * 100)
+        percent = np.round((occupancy - free_below) / max(occupied_above - free_below, 1e-6) * 100)
         percent = np.where(occupancy < free_below, 0, np.where(occupancy > occupied_above, 100, percent))
         return (percent if opaque is None else np.where(opaque, percent, UNKNOWN)).astype(np.int8)
     unknown = ~opaque if opaque is not None else np.zeros(shade.shape, np.bool_)
@@ -381,9 +381,9 @@ def _thresholds(path: Path, described: Mapping[str, Any]) -> tuple[float, float]
     """Return ``free_thresh`` and ``occupied_thresh``."""
     occupied_above = _number(path, described, "occupied_thresh", OCCUPIED_THRESH)
     free_below = _number(path, described, "free_thresh", FREE_THRESH)
-    if not 0 <= free_below < occupied_above <= 1:
+    if not 0 <= free_below <= occupied_above <= 1:
         raise InvalidMapError(
-            f"{path}: free_thresh {free_below} must be below occupied_thresh {occupied_above}, both in 0..1"
+            f"{path}: free_thresh {free_below} must not be above occupied_thresh {occupied_above}, both in 0..1"
         )
     return free_below, occupied_above
 
