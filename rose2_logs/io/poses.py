@@ -25,8 +25,12 @@ ODOMETRY_TYPES = ("nav_msgs/Odometry",)
 POSE_TYPES = ("geometry_msgs/PoseStamped", "geometry_msgs/PoseWithCovarianceStamped")
 BASE_FRAMES = ("base_link", "base_footprint", "base", "base_frame")
 """Frames of a mobile base (REP 105, REP 120, and common drivers), the most common first."""
+PREFIXED_FRAMES = BASE_FRAMES[:2]
+"""Those that may follow the name of a robot and ``_``; ``arm_base`` would be something else."""
 ODOMETRY_FRAME = "odom"
-"""Frame whose only child is the robot's base, whatever its name (REP 105)."""
+"""Frame whose only child is the base, whatever its name (REP 105); also in odom_combined and the like."""
+FRAMES_TOLD = 5
+"""Frames that are named where none is a robot's base."""
 REQUESTED_POSES = ("goal", "initial")
 """Topics with this in their name carry requested poses, not where the robot was."""
 POSE_STEP_S = 0.25
@@ -123,11 +127,12 @@ class _Wanted:
             return [self.base]
         if self.base:
             return [name for name in edges if self.base in (name, name.rsplit("/", 1)[-1])]
-        rank = {name: place for place, name in enumerate(BASE_FRAMES)}
-        # With several robots, frame names start with the robot's name.
-        named = [name for name in edges if name.rsplit("/", 1)[-1] in rank]
-        own = f"{_plain(self.namespace)}/"
-        return sorted(named, key=lambda name: (rank[name.rsplit("/", 1)[-1]], not name.startswith(own), name))
+        # With several robots, frame names start with the robot's name: robot1/base_link, robot1_base_link.
+        named = {name: found for name in edges if (found := _robot_and_base(name))}
+        own = (_plain(self.namespace), self.namespace.rpartition("/")[2])
+        return sorted(
+            named, key=lambda name: (named[name][0] not in own, BASE_FRAMES.index(named[name][1]), name)
+        )
 
 
 def _choose(
@@ -141,11 +146,13 @@ def _choose(
         found = _connected(source, topics, wanted)
         if found is not None:
             connected.append((topics, found))
-            if _namespace(topics[0]) == wanted.namespace:
+            if (space := _namespace(topics[0])) == wanted.namespace or (space and _holds(space, wanted)):
                 break
     if connected:
         topics, wanted = connected[0]
-        if others := [name for names, _ in connected[1:] for name in names if name not in topics]:
+        if others := dict.fromkeys(
+            name for names, _ in connected[1:] for name in names if name not in topics
+        ):
             text = (
                 f"{path}: the robot's way is that of {topics[0]}; {', '.join(others)} tell of other robots, "
                 "which are not shown"
@@ -163,6 +170,14 @@ def _choose(
         if topics := tuple(order[:1]):
             _tell_other_frame(source, topics, wanted)
             return topics, _posed(source.stream(topics), read, start_ns)
+    if transforms and not wanted.base:
+        frames = sorted(_first_transforms(source, transforms))
+        known = f"{', '.join(frames[:FRAMES_TOLD])}{' ...' if len(frames) > FRAMES_TOLD else ''}"
+        text = (
+            f"{path}: the robot's way is not known: no transforms lead from {wanted.frame!r} to a frame with "
+            f"the name of a base, such as {BASE_FRAMES[0]}; base_frame=NAME names it, of {known or 'none'}"
+        )
+        log_warning(logger, "base_frame", text, file=path)
     return (), iter(())
 
 
@@ -183,6 +198,11 @@ def _tell_other_frame(source: MessageSource, topics: tuple[str, ...], wanted: _W
             log_warning(logger, "other_frame", text, file=source.info.path, topic=topics[0])
 
 
+def _holds(space: str, wanted: _Wanted) -> bool:
+    """Whether the map's topic is in a namespace or in one below it."""
+    return f"{wanted.namespace}/".startswith(f"{space}/")
+
+
 def _namespace(topic: str) -> str:
     """Namespace of a topic, without the slash at its end: nothing for ``/map``."""
     return f"/{topic.lstrip('/')}".rpartition("/")[0]
@@ -201,11 +221,7 @@ def _groups(topics: tuple[str, ...], namespace: str) -> list[tuple[str, ...]]:
 def _connected(source: MessageSource, topics: tuple[str, ...], wanted: _Wanted) -> _Wanted | None:
     """Whose pose transforms tell, by their first messages; None if they do not lead to the map's frame."""
     path = source.info.path
-    edges: dict[str, _Edge] = {}
-    for message in islice(source.stream(topics), TRIED_MESSAGES):
-        if (data := message.data_if_whole()) is not None:
-            with suppress(InvalidMapError):
-                edges |= _transforms(fields_of(data, message.encoding))
+    edges = _first_transforms(source, topics)
     if robots := _robots_in(wanted, edges):
         if len(robots) > 1:
             text = (
@@ -214,12 +230,26 @@ def _connected(source: MessageSource, topics: tuple[str, ...], wanted: _Wanted) 
             )
             log_warning(logger, "one_robot", text, file=path, topic=topics[0])
         return replace(wanted, base=robots[0])
-    below = [name for name, edge in edges.items() if edge.parent.rsplit("/", 1)[-1] == ODOMETRY_FRAME]
+    below = [
+        name for name, edge in edges.items() if edge.parent.rsplit("/", 1)[-1].startswith(ODOMETRY_FRAME)
+    ]
     if wanted.base or len(below) != 1 or not _robots_in(replace(wanted, base=below[0]), edges):
         return None
-    text = f"{path}: the robot's base is taken to be {below[0]!r}, the only frame below {ODOMETRY_FRAME}"
+    text = (
+        f"{path}: the robot's base is taken to be {below[0]!r}, the only frame below {edges[below[0]].parent}"
+    )
     log_warning(logger, "base_frame", f"{text}; base_frame=NAME names another", file=path, topic=topics[0])
     return replace(wanted, base=below[0])
+
+
+def _first_transforms(source: MessageSource, topics: tuple[str, ...]) -> dict[str, _Edge]:
+    """Transforms in the first messages of some topics, by child frame."""
+    edges: dict[str, _Edge] = {}
+    for message in islice(source.stream(topics), TRIED_MESSAGES):
+        if (data := message.data_if_whole()) is not None:
+            with suppress(InvalidMapError):
+                edges |= _transforms(fields_of(data, message.encoding))
+    return edges
 
 
 def _topics(info: LogInfo, types: tuple[str, ...]) -> tuple[str, ...]:
@@ -309,6 +339,15 @@ def _planar(fields: Fields) -> Pose:
     return x, y, yaw_of(*quaternion)
 
 
+def _robot_and_base(frame: str) -> tuple[str, str] | None:
+    """Name of the robot, nothing for a single one, and kind of base of a frame; None if it is no base."""
+    robot, _, kind = frame.rpartition("/")
+    if kind in BASE_FRAMES:
+        return robot, kind
+    kind = next((each for each in PREFIXED_FRAMES if frame.endswith(f"_{each}")), "")
+    return (frame.removesuffix(f"_{kind}"), kind) if kind else None
+
+
 def _base_in(wanted: _Wanted, edges: dict[str, _Edge]) -> tuple[Pose | None, tuple[str, ...]]:
     """Pose of the robot's base in the map's frame, and the chain of frames from the base up to it."""
     for name in wanted.bases(edges):
@@ -324,12 +363,20 @@ def _base_in(wanted: _Wanted, edges: dict[str, _Edge]) -> tuple[Pose | None, tup
 
 
 def _robots_in(wanted: _Wanted, edges: dict[str, _Edge]) -> list[str]:
-    """Bases that lead to the map's frame, the likeliest first, one for each beginning of their names."""
-    robots: dict[str, str] = {}
-    for name in wanted.bases(edges):
-        if _base_in(replace(wanted, base=name), edges)[0] is not None:
-            robots.setdefault(name.rpartition("/")[0], name)
-    return list(robots.values())
+    """Bases that lead to the map's frame, the likeliest first, one for each robot.
+
+    Of a robot is what has its name, and what it carries, such as an arm with a base of its own.
+    """
+    robots: dict[str, tuple[str, ...]] = {}
+    names: set[str] = set()
+    for base in wanted.bases(edges):
+        pose, chain = _base_in(replace(wanted, base=base), edges)
+        robot, _ = _robot_and_base(base) or (base, "")
+        is_carried = any(base in other or name in chain for name, other in robots.items())
+        if pose is not None and robot not in names and not is_carried:
+            names.add(robot)
+            robots[base] = chain
+    return list(robots)
 
 
 def _composed(outer: Pose, inner: Pose) -> Pose:

@@ -383,7 +383,7 @@ def _thresholds(path: Path, described: Mapping[str, Any]) -> tuple[float, float]
     free_below = _number(path, described, "free_thresh", FREE_THRESH)
     if not 0 <= free_below <= occupied_above <= 1:
         raise InvalidMapError(
-            f"{path}: free_thresh {free_below} must not be above occupied_thresh {occupied_above}, both in 0..1"
+            f"{path}: free_thresh {free_below} must not exceed occupied_thresh {occupied_above}, both in 0..1"
         )
     return free_below, occupied_above
 

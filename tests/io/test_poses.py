@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -232,6 +233,62 @@ def test_a_base_of_another_name_is_found_below_odom_or_named(tmp_path, caplog):
         assert log.robot_path("map", "wheel").origin == "/tf"
         assert log.robot_path("map", "arm").origin == ""
     assert "no transforms lead from 'map' to the base frame 'arm'" in caplog.text
+
+
+def chain(topic: str, *frames: str, y: float = 0.0) -> Iterator[Message]:
+    """Transforms from frame to frame, of which the last one moves."""
+    for tick in range(100):
+        time = tick * SECOND // 5
+        below = [(time, *pair, 0.0, 0.0, 0.0) for pair in pairwise(frames)]
+        below[-1] = (time, *frames[-2:], tick / 20, y, 0.0)
+        yield time, topic, TF, ROS2.types[TF]([transform(ROS2, *each) for each in below])
+
+
+def test_names_of_robots_may_end_with_an_underscore(tmp_path, caplog):
+    robots = [("robot1_odom", "robot1_base_link", 1.0), ("robot2_odom", "robot2_base_link", 7.0)]
+    messages = [each for odom, base, y in robots for each in chain("/tf", "map", odom, base, y=y)]
+    with open_log(write(tmp_path / "run.mcap", messages)) as log:
+        for topic, y in (("/map", 1.0), ("/robot2/map", 7.0)):
+            assert set(RobotPath(log.source, "map", map_topic=topic).until(2**62)[:, 1]) == {y}
+    assert "robot2_base_link are other robots" in caplog.text
+
+
+def test_a_robot_is_not_what_it_carries(tmp_path, caplog):
+    """The arm has a base of its own, 30 cm from that of the robot."""
+    messages = [
+        *chain("/tf", "map", "odom", "base_footprint"),
+        (
+            0,
+            "/tf_static",
+            TF,
+            ROS2.types[TF]([transform(ROS2, 0, "base_footprint", "arm/base_link", 0, 0.3, 0)]),
+        ),
+    ]
+    assert set(way(write(tmp_path / "run.mcap", messages))[1][:, 1]) == {0.0}
+    assert not caplog.text
+
+
+def test_the_map_may_lie_deeper_in_a_namespace_than_the_transforms(tmp_path, caplog):
+    spaces = (("/fleet/a/tf", 1.0), ("/fleet/b/tf", 7.0))
+    messages = [each for topic, y in spaces for each in chain(topic, "map", "odom", "base_link", y=y)]
+    with open_log(write(tmp_path / "run.mcap", messages)) as log:
+        found = RobotPath(log.source, "map", map_topic="/fleet/b/slam/map")
+    assert found.origin == "/fleet/b/tf"
+    assert not caplog.text
+
+
+def test_a_base_below_odometry_of_another_name(tmp_path, caplog):
+    assert len(way(write(tmp_path / "run.mcap", chain("/tf", "map", "odom_combined", "chassis")))[1]) > 1
+    assert "taken to be 'chassis', the only frame below odom_combined" in caplog.text
+
+
+def test_transforms_that_lead_to_no_base_are_told_of(tmp_path, caplog):
+    path = write(tmp_path / "run.mcap", chain("/tf", "map", "chassis"))
+    assert way(path)[0] == ""
+    assert "the robot's way is not known" in caplog.text
+    assert "base_frame=NAME names it, of chassis" in caplog.text
+    with open_log(path) as log:
+        assert len(log.robot_path("map", "chassis").until(2**62)) > 1
 
 
 def test_odometry_in_another_frame_than_the_map_is_told_of(tmp_path, caplog):
