@@ -49,6 +49,7 @@ from simulation.make_building import simulate_building
 import rose2_logs as rl
 from rose2_logs.evaluation.scores import Scores, score
 from rose2_logs.io.carmen import SCAN_TOPIC
+from rose2_logs.io.poses import POSE_STEP_M
 from rose2_logs.model.occupancy import OccupancySnapshot
 
 LIDAR = Lidar(beams=360)
@@ -59,6 +60,8 @@ SECTORS = 8
 """Parts of a scan that are measured from one place each: the robot moves less than half a cell in a scan."""
 TRANSFORM_PERIOD_S = 0.05
 START_NS = 1_700_000_000_000_000_000
+ENTERED_M = 1.0
+"""Way in a room that the robot has been in; less is a doorway that belongs to the room."""
 
 
 @dataclass(frozen=True)
@@ -198,8 +201,7 @@ def agreement(recorded: OccupancySnapshot, built: OccupancySnapshot, way_m: Floa
     built_walls = binary_dilation(on_recorded == 100, np.ones((3, 3)))
     truth, found = (rl.segment(each).labels for each in (recorded, built))
     found = _moved(found, built, recorded, nothing=0)
-    row, column = recorded.geometry.world_to_cell(way_m).T
-    entered = (np.where(np.isin(rooms, rooms[row, column]), rooms, 0) for rooms in (truth, found))
+    entered = (_entered(rooms, recorded.geometry.world_to_cell(way_m)) for rooms in (truth, found))
     return Agreement(
         agree=100 * float((recorded.cells == on_recorded)[both].mean()),
         walls=100 * float(built_walls[is_wall].mean()),
@@ -207,6 +209,12 @@ def agreement(recorded: OccupancySnapshot, built: OccupancySnapshot, way_m: Floa
         rooms=score(truth, found),
         entered=score(*entered),
     )
+
+
+def _entered(rooms: NDArray[np.int32], way: NDArray[np.intp]) -> NDArray[np.int32]:
+    """The rooms (H, W) in which a part of the robot's way lies; its cells are (N, 2), `POSE_STEP_M` apart."""
+    stood = np.bincount(rooms[tuple(way.T)], minlength=int(rooms.max()) + 1)
+    return np.where((stood * POSE_STEP_M >= ENTERED_M)[rooms], rooms, 0)
 
 
 def _moved(
