@@ -49,7 +49,6 @@ from simulation.make_building import simulate_building
 import rose2_logs as rl
 from rose2_logs.evaluation.scores import Scores, score
 from rose2_logs.io.carmen import SCAN_TOPIC
-from rose2_logs.io.poses import POSE_STEP_M
 from rose2_logs.model.occupancy import OccupancySnapshot
 
 LIDAR = Lidar(beams=360)
@@ -60,8 +59,6 @@ SECTORS = 8
 """Parts of a scan that are measured from one place each: the robot moves less than half a cell in a scan."""
 TRANSFORM_PERIOD_S = 0.05
 START_NS = 1_700_000_000_000_000_000
-ENTERED_M = 1.0
-"""Way in a room that the robot has been in; less is a doorway that belongs to the room."""
 
 
 @dataclass(frozen=True)
@@ -201,7 +198,8 @@ def agreement(recorded: OccupancySnapshot, built: OccupancySnapshot, way_m: Floa
     built_walls = binary_dilation(on_recorded == 100, np.ones((3, 3)))
     truth, found = (rl.segment(each).labels for each in (recorded, built))
     found = _moved(found, built, recorded, nothing=0)
-    entered = (_entered(rooms, recorded.geometry.world_to_cell(way_m)) for rooms in (truth, found))
+    way = recorded.geometry.world_to_cell(way_m)
+    entered = (_entered(*rooms, way) for rooms in ((truth, found), (found, truth)))
     return Agreement(
         agree=100 * float((recorded.cells == on_recorded)[both].mean()),
         walls=100 * float(built_walls[is_wall].mean()),
@@ -211,10 +209,19 @@ def agreement(recorded: OccupancySnapshot, built: OccupancySnapshot, way_m: Floa
     )
 
 
-def _entered(rooms: NDArray[np.int32], way: NDArray[np.intp]) -> NDArray[np.int32]:
-    """The rooms (H, W) in which a part of the robot's way lies; its cells are (N, 2), `POSE_STEP_M` apart."""
-    stood = np.bincount(rooms[tuple(way.T)], minlength=int(rooms.max()) + 1)
-    return np.where((stood * POSE_STEP_M >= ENTERED_M)[rooms], rooms, 0)
+def _entered(rooms: NDArray[np.int32], others: NDArray[np.int32], way: NDArray[np.intp]) -> NDArray[np.int32]:
+    """The rooms (H, W) that the robot has been in, or in the room that they mostly are of the other map.
+
+    The cells of its way are (N, 2); which room has those in a doorway may differ between the maps.
+    """
+    counts = (int(rooms.max()) + 1, int(others.max()) + 1)
+    pairs = rooms.astype(np.int64) * counts[1] + others
+    shared = np.bincount(pairs.ravel(), minlength=counts[0] * counts[1]).reshape(counts)
+    counterpart = np.where(2 * shared.max(axis=1) > shared.sum(axis=1), shared.argmax(axis=1), 0)
+    been, been_there = (np.zeros(count, bool) for count in counts)
+    been[rooms[tuple(way.T)]] = been_there[others[tuple(way.T)]] = True
+    been_there[0] = False
+    return np.where((been | been_there[counterpart])[rooms], rooms, 0)
 
 
 def _moved(
