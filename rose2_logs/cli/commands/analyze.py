@@ -82,7 +82,7 @@ def analyze(
         raise ParameterError(f"--all-topics and {other} exclude each other; pass one of them")
     # Whatever is wrong with them is told before the first log is read.
     asked = list(dict.fromkeys(topics or []))
-    of_topics = [dataclasses.replace(options, topic=topic) for topic in asked or [None]]
+    of_topics = [dataclasses.replace(options, topic=topic) for topic in asked] or [options]
     failed = 0
     for log, name in zip(logs, names, strict=True):
         try:
