@@ -41,9 +41,9 @@ class Table:
     >>> import rose2_logs as rl
     >>> run = rl.analyze("sample_logs/office.mcap", max_snapshots=3)
     >>> run.snapshots
-    <Table snapshots: 3 rows, 34 columns>
+    <Table snapshots: 3 rows, 35 columns>
     >>> run.rooms.arrow.column_names[:4]
-    ['snapshot', 'log_time_ns', 'track', 'room']
+    ['snapshot', 'log_time_ns', 'part', 'track']
     """
 
     def __init__(self, name: str, arrow: pa.Table) -> None:
