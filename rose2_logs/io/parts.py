@@ -28,6 +28,8 @@ LOOKED_AT = 64
 LEAST_RETURNS = 2
 """Times that the maps come back to a publisher, or to a grid, that they had left, from which on they are of
 several publishers."""
+LEAST_TURNS = 3
+"""The same of buildings on one grid: a map that is begun anew, and grows again, may look like two turns."""
 ANOTHER_SHARE = 0.1
 """Maps of two publishers differ by more than this share of their free area, most times. A mapping node that
 crops its map to what is known goes back and forth between two grids, too, but not between two areas."""
@@ -413,10 +415,10 @@ def _buildings_in_turn(places: Sequence[int], maps: _Maps) -> list[list[int]]:
         found = maps.facts(place)
         if found is None or (grown and found.free_m2 < LEAST_AREA_M2):
             continue
-        kept = [(maps.walls_kept(each[-1], place), each[-1]) for each in grown]
-        building = max(range(len(grown)), key=lambda each: kept[each], default=0)
-        if not grown or kept[building][0] < TURN_WALLS_SHARE:
-            building = len(grown)
+        recent = sorted(range(len(grown)), key=lambda each: -grown[each][-1])
+        of = (each for each in recent if maps.walls_kept(grown[each][-1], place) >= TURN_WALLS_SHARE)
+        building = next(of, len(grown))
+        if building == len(grown):
             grown.append([])
             returns.append(0)
         elif building != latest:
@@ -424,7 +426,7 @@ def _buildings_in_turn(places: Sequence[int], maps: _Maps) -> list[list[int]]:
         grown[building].append(place)
         latest = building
     in_turn = [places for places, times in zip(grown, returns, strict=True) if times]
-    return grown if len(in_turn) > 1 and sum(returns) >= max(LEAST_RETURNS, len(grown) - 1) else []
+    return grown if len(in_turn) > 1 and sum(returns) >= max(LEAST_TURNS, len(grown) - 1) else []
 
 
 def _begins(spread: Sequence[int], maps: _Maps) -> list[int]:
