@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from rose2_logs.config.parameters import WallParameters
 from rose2_logs.model.occupancy import BoolArray, FloatArray
 
-SORTED_AT_ONCE = 2**20
-"""Cells times directions that are sorted at once, and kept if that is all of them: 50 MB."""
+SORTED_AT_ONCE = 2**21
+"""Cells times directions that are sorted at once, and kept if that is all of them: 100 MB."""
 
 
 @dataclass(frozen=True, eq=False)
