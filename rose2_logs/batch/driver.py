@@ -144,7 +144,7 @@ def run_batch(arguments: Sequence[str], out: Path, options: BatchOptions, listen
     # A path holds one of the two slashes of a URL.
     if url := re.match(r"([a-z][a-z0-9+.-]+):/+(.+)", str(out)):
         if url[1] in ("http", "https", "file"):
-            raise ParameterError(f"{out}: results go to a folder or to an object store")
+            raise ParameterError(f"{url[1]}://{url[2]}: results go to a folder or to an object store")
         with tempfile.TemporaryDirectory(prefix="rose2_logs_") as scratch:
             place = f"{url[1]}://{url[2].rstrip('/')}"
             return _run_batch(arguments, Path(scratch), place, options, listener)

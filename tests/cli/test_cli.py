@@ -163,7 +163,10 @@ def test_time_options_are_seconds_into_the_log(cli, maps: Path, tmp_path: Path):
         (["analyze", "x.bag", "-o", "out", "--method", "magic"], "--method 'magic': it must be one of rose2"),
         (["analyze", "a/x.bag", "b/x.mcap", "-o", "out"], "several logs are named x"),
         (["batch", "nowhere*.mcap", "-o", "out"], "nowhere*.mcap: no log there"),
-        (["batch", "x.bag", "-o", "s3://bucket/out"], "not to a URL"),
+        (
+            ["batch", "x.bag", "-o", "http://bucket/out"],
+            "http://bucket/out: results go to a folder or to an object store",
+        ),
         (
             ["batch", "x.bag", "-o", "out", "--scheduler", "a:1", "--workers", "2"],
             "--workers 2 is for this machine",

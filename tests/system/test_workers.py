@@ -269,11 +269,11 @@ with workers.Workers(math.factorial, 2) as pool:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="sockets with names are used on Linux only")
-def test_sockets_lie_in_a_private_folder_where_their_names_would_be_too_long(tmp_path: Path):
+def test_sockets_lie_in_a_private_folder_where_their_names_would_be_too_long():
     """It is used then only, and is gone afterwards."""
     with TemporaryDirectory() as short:
         for length, folders in ((75 - len(short) - 1, 0), (76 - len(short) - 1, 1)):
-            temporary, sockets = Path(short) / ("x" * length), tmp_path / str(folders)
+            temporary, sockets = Path(short) / ("x" * length), Path(short) / str(folders)
             temporary.mkdir()
             sockets.mkdir()
             done = subprocess.run(

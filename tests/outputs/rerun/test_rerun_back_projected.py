@@ -115,11 +115,13 @@ def test_there_is_a_tab_for_them(result, tmp_path: Path):
 def names_of_views(recording: Path) -> set[str]:
     reader = RrdReader(str(recording))
     found: set[str] = set()
-    for chunk in reader.stream(store=reader.blueprints()[-1]):
-        batch = chunk.to_record_batch()
-        for name in batch.schema.names:
-            if name.endswith("display_name"):
-                found |= {each[0] for each in batch.column(name).to_pylist() if each}
+    # The layout at the end knows of more than the one before the first map.
+    for layout in reader.blueprints():
+        for chunk in reader.stream(store=layout):
+            batch = chunk.to_record_batch()
+            for name in batch.schema.names:
+                if name.endswith("display_name"):
+                    found |= {each[0] for each in batch.column(name).to_pylist() if each}
     return found
 
 
