@@ -194,7 +194,7 @@ def file_system(url: str) -> tuple[Any, str]:
         from fsspec.core import url_to_fs
     except ImportError as error:
         raise LogError(f"{shown}: logs behind URLs need fsspec: {EXTRA}") from error
-    # What a worker that histories for long has seen before must not be taken for how a log is now.
+    # What a worker that runs for long has seen before must not be taken for how a log is now.
     options: dict[str, Any] = {"skip_instance_cache": True}
     try:
         if _is_web(url):

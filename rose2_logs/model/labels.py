@@ -85,9 +85,9 @@ class Pieces:
     number : (N,) int32
         Piece 1.. of each.
     count : int
-        Highest number, and 1.
+        One more than the highest number.
     sides : (count, 2) int
-        Width and height of each piece's box, with the margin that it was grown by; 0 for what is none.
+        Width and height in cells of each piece's box, with the margin that it was grown by; 0 for number 0.
     """
 
     row: NDArray[np.intp]
@@ -113,7 +113,8 @@ class Pieces:
             np.minimum.at(low, number, place)
             np.maximum.at(high, number, place)
             sides[:, axis] = np.minimum(high + margin, size - 1) - np.maximum(low - margin, 0) + 1
-        return cls(row, column, number, count, np.maximum(sides, 0))
+        sides[0] = 0
+        return cls(row, column, number, count, sides)
 
     def cells(self, chosen: BoolArray, shape: tuple[int, ...]) -> BoolArray:
         """Mask of the pieces of a choice (count,)."""
@@ -158,7 +159,7 @@ def contacts(labels: NDArray[np.integer]) -> Contacts:
     width = labels.shape[1]
     flat = labels.ravel()
     within_rows = np.flatnonzero(flat[:-1] != flat[1:])
-    # Not from the end of a row to the begin of the next.
+    # Not from the end of a row to the beginning of the next.
     within_rows = within_rows[(within_rows + 1) % width != 0]
     within_columns = np.flatnonzero(flat[:-width] != flat[width:])
     first = np.concatenate([within_rows, within_columns])

@@ -22,7 +22,7 @@ def guess_kind(shape: BaseGeometry, parameters: KindParameters) -> str:
     Returns
     -------
     str
-        One of `KINDS`; empty for an empty shape.
+        One of `KINDS`; empty for a shape without area.
 
     Examples
     --------
@@ -30,7 +30,7 @@ def guess_kind(shape: BaseGeometry, parameters: KindParameters) -> str:
     >>> guess_kind(shapely.box(0, 0, 20, 2), KindParameters())
     'corridor'
     """
-    if shape.is_empty:
+    if shape.area == 0:
         return ""
     if not _is_compact(shape, parameters.corridor_min_elongation) and _is_corridor(shape, parameters):
         return "corridor"

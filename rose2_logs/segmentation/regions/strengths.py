@@ -102,7 +102,13 @@ class _LeafMasks:
 
     @classmethod
     def of(cls, trees: BoostedTrees) -> _LeafMasks:
-        """Number the leaves of trees and note what each node rules out."""
+        """Number the leaves of trees and note what each node rules out.
+
+        Raises
+        ------
+        ValueError
+            If a tree has more leaves than `LEAVES_MAX`.
+        """
         count, nodes = trees.feature.shape
         most = int((trees.left != np.arange(nodes)).sum(1).max())
         feature = np.zeros((most, count), np.intp)
@@ -111,6 +117,8 @@ class _LeafMasks:
         value = np.zeros((count, LEAVES_MAX))
         for tree in range(count):
             leaves, ruled_out = _numbered_leaves(trees.left[tree].tolist(), trees.right[tree].tolist())
+            if len(leaves) > LEAVES_MAX:
+                raise ValueError(f"a tree has {len(leaves)} leaves; {LEAVES_MAX} is the most")
             asked = list(ruled_out)
             feature[: len(asked), tree] = trees.feature[tree, asked]
             threshold[: len(asked), tree] = trees.threshold[tree, asked]

@@ -177,7 +177,7 @@ class WallCells:
 
     def sorted_parts(self) -> Iterator[tuple[slice, SortedCells]]:
         """Some of the directions after the other, with the cells sorted along them."""
-        if len(self.index) == 0:
+        if len(self.index) == 0 or len(self.directions_rad) == 0:
             return
         at_once = max(1, SORTED_AT_ONCE // len(self.index))
         if at_once >= len(self.directions_rad):

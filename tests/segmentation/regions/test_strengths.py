@@ -5,7 +5,13 @@ import pytest
 
 from rose2_logs.segmentation.regions import fitted
 from rose2_logs.segmentation.regions.features import FEATURES, NO_ANSWER, REGION_FEATURES
-from rose2_logs.segmentation.regions.strengths import DIFFERENT, BoostedTrees, FittedStrength, read_trees
+from rose2_logs.segmentation.regions.strengths import (
+    DIFFERENT,
+    LEAVES_MAX,
+    BoostedTrees,
+    FittedStrength,
+    read_trees,
+)
 
 NAMES = ("width", "height")
 
@@ -31,6 +37,23 @@ def test_one_leaf_answers_the_same_to_everything():
     trees = BoostedTrees.constant(-2.0)
     assert trees(np.zeros((3, 4))).tolist() == [-2, -2, -2]
     assert trees(np.zeros((0, 4))).shape == (0,)
+
+
+def chain(leaves):
+    """One tree that sends k < x <= k + 1 to a leaf of value k + 1, up to the last leaf."""
+    inner = np.arange(leaves - 1)
+    own = np.arange(2 * leaves - 1)
+    left, right, threshold = own.copy(), own.copy(), np.full(len(own), np.inf)
+    left[inner], right[inner], threshold[inner] = leaves - 1 + inner, np.append(inner[1:], own[-1]), inner
+    value = np.where(own < leaves - 1, 0.0, own - (leaves - 1))
+    return BoostedTrees(np.zeros((1, len(own)), int), threshold[None], left[None], right[None], value[None], 0)
+
+
+def test_trees_have_as_many_leaves_as_there_are_bits():
+    asked = np.arange(20.0)[:, None]
+    assert chain(LEAVES_MAX)(asked).tolist() == np.minimum(asked[:, 0], LEAVES_MAX - 1).tolist()
+    with pytest.raises(ValueError, match="17 leaves; 16 is the most"):
+        chain(LEAVES_MAX + 1)(asked)
 
 
 def test_trees_of_other_features_are_refused(tmp_path):

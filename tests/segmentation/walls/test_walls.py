@@ -110,6 +110,12 @@ def test_segments_of_a_drawn_wall_cover_it():
     assert len(segments_of(np.zeros((10, 10), bool))[0].offset) == 0
 
 
+def test_along_no_direction_there_are_no_segments():
+    segments, members = segments_of(drawn((slice(40, 42), slice(20, 180))), directions=np.zeros(0))
+    assert len(segments.offset) == 0
+    assert not members.any()
+
+
 def test_a_thick_wall_has_no_segments_across_it():
     segments, _ = segments_of(drawn((slice(40, 50), slice(20, 180))))
     assert (segments.direction == 0).all()
