@@ -1,4 +1,4 @@
-"""Results in an object store: workers upload those of each log, what proves them whole comes last."""
+"""Results in an object store: workers upload those of each log, its record last, which proves them whole."""
 
 from __future__ import annotations
 
@@ -114,7 +114,8 @@ class Store:
         wanted = {f"{PARTITION}={name}" for name in names}
         with self._asking():
             for path in self._files.find(f"{self._path}/{TABLES_FOLDER}"):
-                if path.split("/")[-2] not in wanted:
+                partition = path.split("/")[-2]
+                if partition.startswith(f"{PARTITION}=") and partition not in wanted:
                     self._files.rm_file(path)
 
     def _asking(self) -> AbstractContextManager[None]:

@@ -230,8 +230,10 @@ def find_parts(
         of_each = [[place for place in all_maps if grids[place] == grid] for grid in grids_in_turn]
         parts = [_part(times, places, maps.facts) for places in of_each]
         return Parts(tuple(parts), "maps of several grids come in turn, as of several publishers")
-    if publishers is None and len(_buildings_in_turn(first, maps)) > 1:
-        parts = [_part(times, places, maps.facts) for places in _buildings_in_turn(all_maps, maps)]
+    # Where the first maps come in turn, those of the whole log may not.
+    begins_in_turn = publishers is None and bool(_buildings_in_turn(first, maps))
+    if begins_in_turn and (of_each := _buildings_in_turn(all_maps, maps)):
+        parts = [_part(times, places, maps.facts) for places in of_each]
         return Parts(tuple(parts), "maps of several buildings come in turn, as of several publishers")
     spread = _spread(range(len(times)))
     begins = [0, *_begins(spread, maps), len(times)]
@@ -411,7 +413,10 @@ def _buildings_in_turn(places: Sequence[int], maps: _Maps) -> list[list[int]]:
     grown: list[list[int]] = []
     returns: list[int] = []
     latest = 0
-    for place in places:
+    for left, place in zip(range(len(places), 0, -1), places, strict=True):
+        if sum(returns) + left < len(grown) - 1:
+            # Too many buildings, whatever the maps that are left show: each is looked for in all of these.
+            return []
         found = maps.facts(place)
         if found is None or (grown and found.free_m2 < LEAST_AREA_M2):
             continue

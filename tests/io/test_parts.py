@@ -11,6 +11,7 @@ import rose2_logs as rl
 from rose2_logs.config.reading import ReadingParameters
 from rose2_logs.errors import LogError, NoMapTopicError, ParameterError
 from rose2_logs.io import open_log
+from rose2_logs.io.parts import LOOKED_AT
 from rose2_logs.system.warnings import StrictError, collect_warnings
 
 
@@ -221,6 +222,22 @@ def test_publishers_with_one_grid_are_told_apart_by_their_buildings(count, tmp_p
     assert len(free) == len(GROWING)
     assert free == sorted(free)
     assert len(read(path, part=2)[0]) == 1
+
+
+def test_buildings_that_come_in_turn_at_the_beginning_only_are_of_one_run(tmp_path):
+    """A window that goes back and forth between two places, and on to many others later in a long log."""
+
+    def window(place):
+        cells = np.full((100, 800), -1, np.int8)
+        columns = slice(100 * place + 5, 100 * place + 95)
+        cells[5:95, columns] = 100
+        cells[7:93, columns.start + 2 : columns.stop - 2] = 0
+        return cells
+
+    places = [0, 1, 0, 1, 0, *[1] * LOOKED_AT, *range(2, 8)]
+    _, parts, kinds = read(log_of(tmp_path / "run.mcap", [window(place) for place in places]))
+    assert "the map is begun anew" in kinds["parts"].first[0]["message"]
+    assert parts["analyzed"] == list(range(1, parts["count"] + 1))
 
 
 def test_bad_maps_between_others_are_of_no_publisher(tmp_path):

@@ -14,6 +14,7 @@ from rose2_logs.cli.exit_codes import EXIT_KNOWN
 from rose2_logs.cli.flags import with_flags
 from rose2_logs.cli.messages import error, style, warning
 from rose2_logs.cli.printing import print_line, print_table, progress_bar, shown
+from rose2_logs.system.text import counted
 
 if TYPE_CHECKING:
     from rich.progress import TaskID
@@ -32,7 +33,7 @@ EXAMPLES = {"batch": EXAMPLE}
 MOST_BARS = 10
 """At most this many logs in progress have their own bar; a cluster may work on hundreds."""
 MOST_ROWS = 200
-"""Of a batch of more logs only those that failed are listed at the end, and no more than so many of them."""
+"""If a batch has more logs, only those that failed are listed at the end, and at most this many of them."""
 COLORS = {"done": "green", "up to date": "green", "failed": "bold red"}
 
 
@@ -139,7 +140,6 @@ def print_batch(result: BatchResult) -> None:
     from rich.table import Table
 
     listed = result.states if len(result.states) <= MOST_ROWS else result.failed[:MOST_ROWS]
-
     table = Table(box=None, pad_edge=False)
     table.add_column("log", overflow="fold")
     table.add_column("status", no_wrap=True)
@@ -157,7 +157,7 @@ def print_batch(result: BatchResult) -> None:
     if listed:
         print_table(table)
     if others := len(result.states) - len(listed):
-        print_line(f"{others} logs that are not listed here stand in the summary")
+        print_line(f"{counted(others, 'log')} not listed here: see the summary")
     counts = {status: sum(state.status == status for state in result.states) for status in COLORS}
     print_line(", ".join(f"{count} {status}" for status, count in counts.items() if count))
     print_line(f"results in [bold]{shown(result.out)}[/]")

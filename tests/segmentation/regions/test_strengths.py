@@ -46,7 +46,9 @@ def chain(leaves):
     left, right, threshold = own.copy(), own.copy(), np.full(len(own), np.inf)
     left[inner], right[inner], threshold[inner] = leaves - 1 + inner, np.append(inner[1:], own[-1]), inner
     value = np.where(own < leaves - 1, 0.0, own - (leaves - 1))
-    return BoostedTrees(np.zeros((1, len(own)), int), threshold[None], left[None], right[None], value[None], 0)
+    return BoostedTrees(
+        np.zeros((1, len(own)), int), threshold[None], left[None], right[None], value[None], 0
+    )
 
 
 def test_trees_have_as_many_leaves_as_there_are_bits():
