@@ -110,7 +110,7 @@ class Store:
             self._files.put_file(str(file), f"{self._path}/{target}")
 
     def withdraw_tables(self, names: Iterable[str]) -> None:
-        """Remove from the data set what belongs to none of the finished logs."""
+        """Remove from the data set the tables of logs other than the finished ones, and nothing else."""
         wanted = {f"{PARTITION}={name}" for name in names}
         with self._asking():
             for path in self._files.find(f"{self._path}/{TABLES_FOLDER}"):

@@ -179,13 +179,14 @@ def test_workers_of_a_cluster_need_no_common_folder(bucket, tmp_path):
 
 
 def test_results_of_a_log_that_changed_replace_the_earlier_ones(bucket, monkeypatch):
-    """Also in the data set; what the new ones lack is removed, and so is what belongs to no log."""
+    """Also in the data set; what the new ones lack is removed, and so are tables of logs that are gone."""
     files, name, _ = bucket
     monkeypatch.setattr(driver, "LocalWorkers", WorkersHere)
     url, out = f"s3://{name}/runs/one/run", f"s3://{name}/results"
     full = RunOptions(recording=False, annotated_log=False, back_project=True)
     driver.run_batch([url], out, BatchOptions(full), Heard())
     files.pipe(f"{name}/results/tables/rooms/log=gone/rooms.parquet", b"")
+    files.pipe(f"{name}/results/tables/rooms.parquet", b"of the user")
     files.rm_file(f"{name}/runs/one/run/map0.yaml")
     kept = files.cat(f"{name}/results/tables/maps/log=run/maps.parquet")
     assert driver.run_batch([url], out, BatchOptions(QUIET), Heard()).failed
@@ -195,6 +196,7 @@ def test_results_of_a_log_that_changed_replace_the_earlier_ones(bucket, monkeypa
     files.invalidate_cache()
     assert files.cat(f"{name}/results/tables/maps/log=run/maps.parquet") != kept
     assert not [path for path in files.find(f"{name}/results") if "back_projected" in path or "gone" in path]
+    assert files.cat(f"{name}/results/tables/rooms.parquet") == b"of the user"
 
 
 @pytest.mark.parametrize("what", ["runs", "runs/*.mcap", "runs/a.mcap"])
