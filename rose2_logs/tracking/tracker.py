@@ -65,7 +65,7 @@ class RoomTracker:
     continue a track, also a lost one, if it overlaps one of them by `match_min_iou`, or if it or the newest
     one holds `part_min_share` of the other, as when a room seen through its door is entered. Among all these
     pairs those with the greatest sum of squared overlap are taken; what is left gets a new number. Numbers
-    are 1, 2, ... in the order of appearance and belong to one room for ever.
+    are 1, 2, ... in the order of appearance and belong to one room forever.
 
     Memory: `shapes_kept` packed shapes for each track of the last map and for at most `lost_kept` lost ones,
     and some thousand points of the last map's walls.

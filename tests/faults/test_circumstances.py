@@ -87,7 +87,7 @@ def test_results_are_whole_all_the_same(log: Path, tmp_path: Path, shell: str, e
 def test_rerun_is_not_started_where_it_would_end_the_process(
     log: Path, tmp_path: Path, office_results: Path, limit: str, told: str
 ):
-    """Or wait for ever; one line says what it needs, and nothing stays of the results."""
+    """Or wait forever; one line says what it needs, and nothing stays of the results."""
     done = run(f'{limit}; exec "$@"', "analyze", log, "-o", tmp_path / "out", "--no-mcap")
     assert (done.returncode, len(errors(done.stderr))) == (2, 1), done.stderr
     assert told in done.stderr

@@ -1,4 +1,4 @@
-"""What Rerun's writer of files needs around it: where it cannot write, it waits for ever or ends Python."""
+"""What Rerun's writer of files needs around it: where it cannot write, it waits forever or ends Python."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def _allowed(name: str) -> int | None:
 def abandon(recording: rr.RecordingStream) -> None:
     """Leave a recording whose file cannot be written.
 
-    To close or delete it, or the usual end of the process, would wait for the writer for ever.
+    To close or delete it, or the usual end of the process, would wait for the writer forever.
     """
     ctypes.pythonapi.Py_IncRef(ctypes.py_object(recording))
     rr.unregister_shutdown()
