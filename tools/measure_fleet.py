@@ -52,8 +52,6 @@ LINKS = 10_000
 """File systems allow a file some ten thousand names; then another copy is linked to."""
 POINTS = (0.01, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.75, 1.0)
 """Shares of the logs at which figures are told."""
-
-
 PROCESSES = 4
 """Of the cluster, and commands side by side."""
 WITHOUT_PROFILER = {"DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED": "false"}
@@ -238,7 +236,7 @@ def many(count: int, place: Path) -> None:
         log.parent.mkdir(parents=True, exist_ok=True)
         log.write_bytes(b"\x89MCAP0\r\n")
     if not results.exists():
-        rl.analyze(SAMPLE, results, max_snapshots=2)
+        rl.analyze(SAMPLE, results, max_snapshots=MAPS)
     for step in ("first", "again"):
         subprocess.run([sys.executable, __file__, step, "-o", str(place), "--logs", str(count)], check=True)
     kinds = {
