@@ -35,6 +35,8 @@ from rose2_logs.tracking.tracked_snapshot import RoomEvent, TrackedSnapshot, map
 logger = logging.getLogger(__name__)
 
 FLUSH_TIMEOUT_S = 60.0
+ABANDON_TIMEOUT_S = 10.0
+"""Longest wait for what is to be removed anyway."""
 COUNTS = {
     "/run/rooms": ("rooms", (190, 130, 250)),
     "/run/variation_bits": ("variation of information, bits", (250, 100, 100)),
@@ -186,7 +188,13 @@ class RerunRecording(Sink):
         if self._viewer is not None:
             rerun_viewer.end(self._viewer)
         if self._recording is not None and not self._is_lost:
-            self._recording.disconnect()
+            try:
+                if self._part is not None:
+                    # What waits is not waited for longer: the disk may be full, which only others have told.
+                    self._recording.flush(timeout_sec=ABANDON_TIMEOUT_S)
+                self._recording.disconnect()
+            except RuntimeError:
+                abandon(self._recording)
         if self._part is not None:
             self._part.unlink(missing_ok=True)
 
