@@ -22,6 +22,15 @@ def known_window(known: BoolArray) -> tuple[slice, slice]:
     return slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)
 
 
+def row_ends(mask: BoolArray) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
+    """Rows (N,) that hold some of a mask (H, W), and the first and last column of it in each.
+
+    Whatever is convex around the mask is so around these cells.
+    """
+    rows = np.flatnonzero(mask.any(1))
+    return rows, mask[rows].argmax(1), mask.shape[1] - 1 - mask[rows, ::-1].argmax(1)
+
+
 def cells_where(values: NDArray[Scalar], which: Callable[[NDArray[Scalar]], BoolArray]) -> NDArray[np.intp]:
     """Index of the chosen cells into a flattened image, in reading order, without a mask of a large image.
 

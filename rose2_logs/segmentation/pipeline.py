@@ -160,8 +160,10 @@ def _analyze_by_rose2(
     by_borders = parameters.floor_plan.grouping == "fitted"
     tree = None
     if by_borders:
-        tree = _grow_tree(explored, scored, count_walls, built.others, strongest, parameters, watch)
-        del scored, count_walls, clean  # the rest needs their memory
+        generous = generous_walls(scored, count_walls, parameters)
+        del count_walls, clean  # the rest needs their memory
+        tree = _grow_tree(explored, scored, generous, strongest, parameters, watch)
+        del scored, generous
         found = tree.rooms(parameters.regions.detail)
     else:
         del count_walls, clean  # the rest needs their memory
@@ -256,15 +258,13 @@ class RoomTree:
 def _grow_tree(
     explored: ExploredPart,
     scored: StructureResult,
-    count_walls: WallCounter,
-    others: WallCells,
+    generous: WallResult,
     strongest_rad: float,
     parameters: Parameters,
     watch: _StopWatch,
 ) -> RoomTree:
     """Cut the floor into atoms, by faces and by basins of the clearance, and judge their borders."""
     free, occupied, cell_m = explored.free, explored.occupied, explored.resolution_m
-    generous = generous_walls(scored, count_walls, parameters, others)
     plan = generous_floor_plan(generous, free, strongest_rad, cell_m, parameters)
     watch.lap("floor_plan")
     atoms = find_atoms(

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from shapely.affinity import rotate
 
 from rose2_logs.config.parameters import FloorPlanParameters
+from rose2_logs.model.labels import row_ends
 from rose2_logs.model.occupancy import BoolArray, FloatArray
 from rose2_logs.segmentation.floor_plan.edge_weights import EdgeEvidence, edge_evidence
 from rose2_logs.segmentation.floor_plan.faces import (
@@ -112,12 +113,10 @@ def frame_along(
     shapely Polygon
         Meters, grid frame.
     """
-    rows = np.flatnonzero(known.any(1))
+    rows, first, last = row_ends(known)
     if len(rows) == 0:
         return shapely.box(0, 0, known.shape[1] * resolution_m, known.shape[0] * resolution_m)
-    first = known.argmax(1)[rows]
-    last = known.shape[1] - known[:, ::-1].argmax(1)[rows]
-    corners = np.concatenate([np.column_stack([x, y]) for x in (first, last) for y in (rows, rows + 1)])
+    corners = np.concatenate([np.column_stack([x, y]) for x in (first, last + 1) for y in (rows, rows + 1)])
     turned = rotate(shapely.multipoints(corners * resolution_m), -direction_rad, (0, 0), use_radians=True)
     box = shapely.buffer(shapely.envelope(turned), margin_m, join_style="mitre")
     frame: shapely.Polygon = rotate(box, direction_rad, (0, 0), use_radians=True)

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rose2_logs.config.regions import RegionParameters
+from rose2_logs.model.labels import row_ends
 from rose2_logs.model.occupancy import BoolArray, FloatArray
 from rose2_logs.segmentation.regions.features import join_features, joinable, region_features
 from rose2_logs.segmentation.regions.graph import RegionGraph
@@ -36,9 +37,8 @@ def edge_shares(atoms: Labels, raster: PlanRaster, count: int) -> FloatArray:
     if not known.any():
         return np.zeros(count)
     # The ends of each row hold the corners of the hull.
-    rows = np.flatnonzero(known.any(1))
-    ends = known[rows].argmax(1), known.shape[1] - 1 - known[rows, ::-1].argmax(1)
-    corners = np.stack([np.concatenate(ends), np.concatenate([rows, rows])], axis=1)
+    rows, first, last = row_ends(known > 0)
+    corners = np.stack([np.concatenate([first, last]), np.concatenate([rows, rows])], axis=1)
     hull = cv2.convexHull(corners[np.lexsort(corners.T)].astype(np.int32))
     edge = cv2.polylines(np.zeros_like(known), [hull], isClosed=True, color=1) > 0
     beside = np.where(raster.wall > 0, 0, grown_labels(atoms, EDGE_REACH_CELLS))[edge]

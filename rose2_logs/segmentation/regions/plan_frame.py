@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rose2_logs.model.labels import Pieces
+from rose2_logs.model.labels import Pieces, row_ends
 from rose2_logs.model.occupancy import BoolArray, FloatArray
 
 Labels = NDArray[np.int32]
@@ -60,14 +60,13 @@ class PlanFrame:
         It lies down, and most of the floor lies towards its first row and column: so a map that is mirrored
         or turned by quarters looks the same on it.
         """
-        rows = np.flatnonzero(known.any(1))
+        # The extreme cells of each row hold the corners of the frame.
+        rows, first, last = row_ends(known)
         if len(rows) == 0:
             return cls((1, 1), cell_m, np.column_stack([np.eye(2), np.zeros(2)]))
         within_quarter = round(direction_rad % (np.pi / 2), ANGLE_DIGITS)
         cos, sin = np.cos(within_quarter), np.sin(within_quarter)
         axes = np.array([[cos, sin], [-sin, cos]])
-        # The extreme cells of each row hold the corners of the frame.
-        first, last = known[rows].argmax(1), known.shape[1] - 1 - known[rows, ::-1].argmax(1)
         column, row = np.concatenate([first, last]), np.concatenate([rows, rows])
         corners = np.stack([column + 0.5, row + 0.5]) * resolution_m
         across, along = np.ptp(axes @ corners, axis=1)

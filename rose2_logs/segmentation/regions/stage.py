@@ -26,7 +26,6 @@ from rose2_logs.segmentation.regions.strengths import FittedStrength
 from rose2_logs.segmentation.rose.clean_map import attached_cells
 from rose2_logs.segmentation.rose.stage import StructureResult
 from rose2_logs.segmentation.walls.stage import WallCounter, WallResult, find_walls
-from rose2_logs.segmentation.walls.strips import WallCells
 
 EVEN_ODDS = 0.0
 """Log odds of what is as likely one room as two."""
@@ -169,12 +168,7 @@ class RegionTree:
         return RegionsResult(labels, borders, outside_m2)
 
 
-def generous_walls(
-    scored: StructureResult,
-    count_walls: WallCounter,
-    parameters: Parameters,
-    others: WallCells | None = None,
-) -> WallResult:
+def generous_walls(scored: StructureResult, count_walls: WallCounter, parameters: Parameters) -> WallResult:
     """Walls of a clean map that keeps every wall, by one low threshold.
 
     Where faces are no rooms but what rooms are joined from, a wall too many does no harm: the threshold needs
@@ -185,14 +179,12 @@ def generous_walls(
     scored : StructureResult
     count_walls : WallCounter
     parameters : Parameters
-    others : WallCells, optional
-        See `find_walls`.
     """
     least = parameters.regions.clean_min_score
     clean = scored.supported & (scored.score >= least)
     candidates = scored.supported & (scored.score >= parameters.spectrum.attached_share * least)
     attached = attached_cells(clean, candidates)
-    return find_walls(count_walls, clean, attached, others)
+    return find_walls(count_walls, clean, attached)
 
 
 def generous_floor_plan(

@@ -37,8 +37,6 @@ class WallResult:
         Dominant directions first, then local ones.
     lines : RepresentativeLines
         The representative lines.
-    others : WallCells
-        What was left for walls off the dominant directions, and the local ones.
     walls : (H, W) bool
         Wall cells: the clean map, what is attached to it, and the walls off the dominant directions.
     """
@@ -48,16 +46,10 @@ class WallResult:
     segment_line: NDArray[np.int32]
     directions_rad: FloatArray
     lines: RepresentativeLines
-    others: WallCells
     walls: BoolArray
 
 
-def find_walls(
-    count_walls: WallCounter,
-    clean: BoolArray,
-    attached: BoolArray,
-    others: WallCells | None = None,
-) -> WallResult:
+def find_walls(count_walls: WallCounter, clean: BoolArray, attached: BoolArray) -> WallResult:
     """Segments, wall clusters and representative lines of a clean map and what is attached to it.
 
     Parameters
@@ -66,17 +58,13 @@ def find_walls(
         Knows the cells that may be walls, and the dominant directions.
     clean, attached : (H, W) bool
         The clean map, chosen from them, and with what is attached to it.
-    others : WallCells, optional
-        Those of another clean map of the same cells: if they hold all that are needed, they need no sorting.
     """
     supported, parameters = count_walls.supported, count_walls.parameters
     dominant_rad = supported.directions_rad
     # Off the dominant directions, only its length distinguishes a wall from furniture.
     length_m = parameters.local_segment_min_length_m
     rest = long_pieces(supported.cells & ~clean, supported.resolution_m, length_m, parameters)
-    if others is None or (rest & ~others.cells).any():
-        others = WallCells(rest, local_directions(dominant_rad, parameters), supported.resolution_m)
-    local, local_walls = detect_segments(others, rest, length_m, parameters)
+    local, local_walls = detect_segments(count_walls.others(rest), rest, length_m, parameters)
     segments = join_segments(count_walls.segments(clean), local)
     clusters = cluster_segments(segments, parameters)
     lines = representative_lines(clusters, segments.directions_rad, len(dominant_rad), parameters)
@@ -86,7 +74,6 @@ def find_walls(
         lines.of_cluster[clusters.of_segment],
         segments.directions_rad,
         lines,
-        others,
         attached | local_walls,
     )
 
@@ -105,6 +92,7 @@ class WallCounter:
     supported: WallCells
     parameters: WallParameters
     _found: dict[int, Segments] = field(default_factory=dict)
+    _others: list[WallCells] = field(default_factory=list)
 
     def __call__(self, clean: BoolArray) -> int:
         """Number of wall clusters along the dominant directions of a clean map (H, W)."""
@@ -120,3 +108,15 @@ class WallCounter:
             length_m = self.parameters.segment_min_length_m
             self._found[count] = detect_segments(self.supported, clean, length_m, self.parameters)[0]
         return self._found[count]
+
+    def others(self, rest: BoolArray) -> WallCells:
+        """Cells and directions in which walls off the dominant directions are looked for in a rest (H, W).
+
+        Those of another clean map, which are sorted already, if they hold the rest.
+        """
+        for others in self._others:
+            if not (rest & ~others.cells).any():
+                return others
+        directions = local_directions(self.supported.directions_rad, self.parameters)
+        self._others.append(WallCells(rest, directions, self.supported.resolution_m))
+        return self._others[-1]
