@@ -7,6 +7,7 @@ import os
 import re
 import shlex
 import shutil
+import signal
 import sqlite3
 import subprocess
 import sys
@@ -262,11 +263,12 @@ def test_a_second_run_to_a_folder_ends_and_the_first_goes_on(tmp_path: Path):
     command = ("analyze", many, "-o", out, *QUICK)
     with started(*ROSE2_LOGS, *command) as process:
         wait_for(lambda: list(out.rglob("*.part")))
+        process.send_signal(signal.SIGSTOP)  # so that it is still at work, however busy the machine is
         for options in ((), ("--overwrite",), ("--resume",)):
             done = run('exec "$@"', *command, *options)
-            if process.poll() is None:
-                assert (done.returncode, len(errors(done.stderr))) == (2, 1)
-                assert "another run is writing to this folder; wait for it, or name another" in done.stderr
+            assert (done.returncode, len(errors(done.stderr))) == (2, 1)
+            assert "another run is writing to this folder; wait for it, or name another" in done.stderr
+        process.send_signal(signal.SIGCONT)
         _, err = process.communicate(timeout=WAIT_S)
     assert (process.returncode, errors(err)) == (0, [])
     assert is_whole(out / "maps")
