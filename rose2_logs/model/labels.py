@@ -83,6 +83,34 @@ def label_sizes(labels: NDArray[np.integer], count: int) -> NDArray[np.int64]:
     return sizes
 
 
+def labels_near(
+    labels: NDArray[np.int32], cells: NDArray[np.intp], reach_cells: float
+) -> NDArray[np.int32]:
+    """Label (N,) nearest to each of some cells of an image, 0 where none is within reach.
+
+    Parameters
+    ----------
+    labels : (H, W) int32
+        0 for none.
+    cells : (N,) int
+        Index into the flattened image.
+    reach_cells : float
+        Distance in cells.
+    """
+    import cv2
+
+    if not labels.any():
+        return np.zeros(len(cells), np.int32)
+    distance, nearest = cv2.distanceTransformWithLabels(
+        (labels == 0).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
+    )
+    # OpenCV numbers the cells that have a label in reading order, from 1 on.
+    label = np.concatenate([np.zeros(1, np.int32), labels[labels > 0]])
+    near = label.take(nearest.take(cells))
+    near[distance.take(cells) > reach_cells] = 0
+    return near
+
+
 @dataclass(frozen=True, eq=False)
 class Pieces:
     """What hangs together in a mask, with diagonals.

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from rose2_logs.model.labels import contacts, straight_runs
+from rose2_logs.model.labels import contacts, labels_near, straight_runs
 
 
 @pytest.mark.parametrize("step", [(0, 1), (1, 0), (1, 1), (1, -1)])
@@ -31,6 +31,18 @@ def test_runs_hold_every_cell_once_and_cannot_be_longer(step):
 def test_no_cells_make_no_runs():
     first, last = straight_runs(np.zeros(0, int), np.zeros(0, int), (1, 1))
     assert first.shape == last.shape == (0, 2)
+
+
+def test_the_nearest_label_is_found_within_reach():
+    line = np.array([[5, 0, 0, 0, 0, 2, 0]], np.int32)
+    assert labels_near(line, np.array([6, 1, 2, 3, 0]), 1.5).tolist() == [2, 5, 0, 0, 5]
+    assert labels_near(np.zeros((2, 3), np.int32), np.arange(6), 9.0).tolist() == [0] * 6
+
+
+@given(arrays.arrays(np.int32, (9, 11), elements=st.integers(0, 3)))
+def test_a_cell_with_a_label_is_its_own_nearest(labels):
+    """Any labels, also without a cell between them: OpenCV's numbers of cells are put to the right ones."""
+    assert np.array_equal(labels_near(labels, np.arange(labels.size), 0.0), labels.ravel())
 
 
 def test_contacts_are_counted_by_sides_of_cells():

@@ -7,12 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rose2_logs.config.regions import RegionParameters
-from rose2_logs.model.labels import row_ends
+from rose2_logs.model.labels import labels_near, row_ends
 from rose2_logs.model.occupancy import BoolArray, FloatArray
 from rose2_logs.segmentation.regions.features import join_features, joinable, region_features
 from rose2_logs.segmentation.regions.graph import RegionGraph
 from rose2_logs.segmentation.regions.joining import Strength
-from rose2_logs.segmentation.regions.plan_frame import Labels, grown_labels
+from rose2_logs.segmentation.regions.plan_frame import Labels
 from rose2_logs.segmentation.regions.plan_raster import PlanRaster
 
 EDGE_REACH_CELLS = 1.5
@@ -41,7 +41,8 @@ def edge_shares(atoms: Labels, raster: PlanRaster, count: int) -> FloatArray:
     corners = np.stack([np.concatenate([first, last]), np.concatenate([rows, rows])], axis=1)
     hull = cv2.convexHull(corners[np.lexsort(corners.T)].astype(np.int32))
     edge = cv2.polylines(np.zeros_like(known), [hull], isClosed=True, color=1) > 0
-    beside = np.where(raster.wall > 0, 0, grown_labels(atoms, EDGE_REACH_CELLS))[edge]
+    cells = np.flatnonzero(edge)
+    beside = np.where(raster.wall.take(cells) > 0, 0, labels_near(atoms, cells, EDGE_REACH_CELLS))
     return np.bincount(beside, minlength=count + 1)[1:] / len(beside)
 
 

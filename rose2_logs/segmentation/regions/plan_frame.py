@@ -6,11 +6,10 @@ import functools
 from dataclasses import dataclass
 from typing import TypeVar
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rose2_logs.model.labels import Pieces, row_ends
+from rose2_logs.model.labels import Pieces, labels_near, row_ends
 from rose2_logs.model.occupancy import BoolArray, FloatArray
 
 Labels = NDArray[np.int32]
@@ -143,14 +142,7 @@ def _looked_up(image: NDArray[Number], to_image: FloatArray, shape: tuple[int, i
 
 def grown_labels(labels: Labels, reach_cells: float) -> Labels:
     """Labels also on the cells without one, from the nearest that has one, up to a distance."""
-    if not labels.any():
-        return labels
-    distance, nearest = cv2.distanceTransformWithLabels(
-        (labels == 0).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
-    )
-    of_nearest = np.zeros(int(nearest.max()) + 1, np.int32)
-    of_nearest[nearest[labels > 0]] = labels[labels > 0]
-    return np.where(distance <= reach_cells, of_nearest[nearest], 0).astype(np.int32)
+    return labels_near(labels, np.arange(labels.size), reach_cells).reshape(labels.shape)
 
 
 def without_specks(occupied: BoolArray, shortest_cells: float) -> BoolArray:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rose2_logs.config.parameters import Parameters
 from rose2_logs.config.regions import DETAIL_MOST, RegionParameters
-from rose2_logs.model.labels import label_sizes
+from rose2_logs.model.labels import label_sizes, labels_near
 from rose2_logs.model.occupancy import BoolArray, FloatArray
 from rose2_logs.segmentation.floor_plan.stage import FloorPlanResult, cut_by_lines
 from rose2_logs.segmentation.regions import fitted
@@ -20,7 +20,7 @@ from rose2_logs.segmentation.regions.graph import STRONG_SCORE, RegionGraph, bui
 from rose2_logs.segmentation.regions.joining import Joins, Strength, join_regions
 from rose2_logs.segmentation.regions.outside import edge_shares, leftovers_joined, outside_of, room_numbers
 from rose2_logs.segmentation.regions.own_rooms import small_region_joins
-from rose2_logs.segmentation.regions.plan_frame import Labels, PlanFrame, grown_labels, without_specks
+from rose2_logs.segmentation.regions.plan_frame import Labels, PlanFrame, without_specks
 from rose2_logs.segmentation.regions.plan_raster import PlanRaster
 from rose2_logs.segmentation.regions.strengths import FittedStrength
 from rose2_logs.segmentation.rose.clean_map import attached_cells
@@ -246,9 +246,8 @@ def room_labels(
     reach_m : float
         Free cells of pieces that are too small for an atom belong to the room this near.
     """
-    labels = np.concatenate([[0], room_of_atom])[atoms].astype(np.int32)
-    loose = free & (atoms == 0)
-    if not loose.any() or not labels.any():
-        return labels
-    np.copyto(labels, grown_labels(labels, reach_m / resolution_m), where=loose)
+    labels = np.concatenate([[0], room_of_atom]).astype(np.int32).take(atoms)
+    loose = np.flatnonzero(free & (atoms == 0))
+    if len(loose):
+        np.put(labels, loose, labels_near(labels, loose, reach_m / resolution_m))
     return labels

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from rose2_logs.config.parameters import FloorPlanParameters
-from rose2_logs.model.labels import distinct_labels, label_sizes
+from rose2_logs.model.labels import distinct_labels, labels_near
 from rose2_logs.model.occupancy import BoolArray
 from rose2_logs.model.outlines import room_outlines
 from rose2_logs.segmentation.floor_plan.stage import FloorPlanResult
@@ -45,29 +45,41 @@ def rooms_of_faces(labels: NDArray[np.int32], plan: FloorPlanResult) -> NDArray[
     return room_of_face
 
 
-def most_seen_rooms(
-    labels: NDArray[np.int32], faces: NDArray[np.int32], face_count: int
-) -> NDArray[np.int32]:
-    """Room (F,) that holds most of the labeled cells of each face, 0 for none.
+def seen_cells(
+    labels: NDArray[np.int32], free: BoolArray, face_of_cell: NDArray[np.int32], face_count: int
+) -> NDArray[np.int64]:
+    """Count the cells of each face and room.
 
     Parameters
     ----------
     labels : (H, W) int32
-        Rooms 1.. of the free cells.
-    faces : (H, W) int32
+        Rooms 1..R of the free cells, 0 for none.
+    free : (H, W) bool
+        Free cells.
+    face_of_cell : (H, W) int32
         Face 1..F of each cell, 0 for none.
     face_count : int
         F.
+
+    Returns
+    -------
+    cells : (F + 1, R + 2) int64
+        Of each face, face 0 being what is in none: cells that are not free, those of each room, and free ones
+        of no room.
     """
-    rooms = int(labels.max(initial=0)) + 1
-    inside = (labels > 0) & (faces > 0)
-    key = (faces[inside].astype(np.int64) - 1) * rooms + labels[inside]
-    pair, cells = np.unique(key, return_counts=True)
-    face, room = np.divmod(pair, rooms)
-    order = np.lexsort((-room, cells))
-    of_face = np.zeros(face_count, np.int32)
-    of_face[face[order]] = room[order]
-    return of_face
+    kinds = int(labels.max(initial=0)) + 2
+    key = face_of_cell.astype(np.int64)
+    key *= kinds
+    key += labels
+    key[free & (labels == 0)] += kinds - 1
+    return np.bincount(key.ravel(), minlength=(face_count + 1) * kinds).reshape(-1, kinds)
+
+
+def most_seen_rooms(cells: NDArray[np.int64]) -> NDArray[np.int32]:
+    """Room (F,) that holds most of the labeled cells of each face, 0 for none, from `seen_cells`."""
+    of_rooms = cells[1:, :-1].copy()
+    of_rooms[:, 0] = 0
+    return of_rooms.argmax(1).astype(np.int32)
 
 
 def room_shapes(
@@ -75,6 +87,7 @@ def room_shapes(
     free: BoolArray,
     occupied: BoolArray,
     face_of_cell: NDArray[np.int32],
+    cells_of_face: NDArray[np.int64],
     room_of_face: NDArray[np.int32],
     resolution_m: float,
     parameters: FloorPlanParameters,
@@ -89,6 +102,8 @@ def room_shapes(
         Free and occupied cells.
     face_of_cell : (H, W) int32
         1 + index of the face that holds each cell, 0 for none.
+    cells_of_face : (F + 1, R + 2) int64
+        Their cells, see `seen_cells`.
     room_of_face : (F,) int32
         Room of each face, 0 for none; of a face that rooms share, the one that has most of it.
     resolution_m : float
@@ -100,7 +115,9 @@ def room_shapes(
     shapes : list of shapely geometries
         Grid frame, meters. They do not overlap, but for what straightening their outlines moves.
     """
-    cells = predicted_cells(labels, free, occupied, face_of_cell, room_of_face, resolution_m, parameters)
+    cells = predicted_cells(
+        labels, free, occupied, face_of_cell, cells_of_face, room_of_face, resolution_m, parameters
+    )
     outlines = room_outlines(cells, resolution_m)
     return list(shapely.coverage_simplify(outlines, parameters.shape_simplify_m)) if outlines else []
 
@@ -110,6 +127,7 @@ def predicted_cells(
     free: BoolArray,
     occupied: BoolArray,
     face_of_cell: NDArray[np.int32],
+    cells_of_face: NDArray[np.int64],
     room_of_face: NDArray[np.int32],
     resolution_m: float,
     parameters: FloorPlanParameters,
@@ -120,13 +138,14 @@ def predicted_cells(
     pocket; it is the room's if it is open to what was seen of the room rather than walled off, or small. Of
     the walls around, the room takes the side that is its own.
     """
-    claim = _claims(labels, free, face_of_cell, room_of_face, resolution_m, parameters)
+    claim = _claims(labels, free, face_of_cell, cells_of_face, room_of_face, resolution_m, parameters)
     gap = round(parameters.shape_gap_m / resolution_m / 2)
     wall = _dilated(occupied, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * gap + 1, 2 * gap + 1)))
     wall &= labels == 0
     pocket = _parts(claim, (claim > 0) & ~wall)
     is_room = _open_pockets(labels, claim, pocket, wall, resolution_m, parameters)
-    cells = np.where(labels > 0, labels, np.where(is_room[pocket], claim, 0))
+    cells = labels.copy()
+    np.copyto(cells, claim, where=is_room.take(pocket))
     reach = gap + max(1, round(parameters.shape_wall_m / resolution_m))
     beside = _dilated(cells > 0, np.ones((2 * reach + 1, 2 * reach + 1), np.uint8))
     beside &= (claim > 0) & (pocket == 0)
@@ -134,7 +153,8 @@ def predicted_cells(
     part = _parts(cells, cells > 0)
     was_seen = np.zeros(part.max() + 1, bool)
     was_seen[part[labels > 0]] = True
-    cells[~was_seen[part] & (labels == 0)] = 0
+    predicted = np.flatnonzero((cells > 0) & (labels == 0))
+    np.put(cells, predicted[~was_seen.take(part.take(predicted))], 0)
     _fill_small_holes(cells, resolution_m, parameters.shape_fill_max_m2)
     return cells
 
@@ -143,6 +163,7 @@ def _claims(
     labels: NDArray[np.int32],
     free: BoolArray,
     face_of_cell: NDArray[np.int32],
+    cells_of_face: NDArray[np.int64],
     room_of_face: NDArray[np.int32],
     resolution_m: float,
     parameters: FloorPlanParameters,
@@ -151,30 +172,19 @@ def _claims(
 
     The room that was seen nearest, if it has a part of the face, else the room of the face.
     """
-    claim = np.zeros_like(labels)
-    is_seen = labels > 0
-    seen = np.flatnonzero(is_seen)
-    if len(seen) == 0:
-        return claim
-    rooms, faces = int(labels.max()) + 1, len(room_of_face) + 1
-    room, face = labels.ravel()[seen], face_of_cell.ravel()
-    common = np.bincount(face[seen].astype(np.int64) * rooms + room, minlength=faces * rooms)
-    common = common.reshape(faces, rooms)
-    has_part = common >= np.maximum(parameters.shape_share_of_face * common.sum(1, keepdims=True), 1)
-    known = np.bincount(face_of_cell[free], minlength=faces)
-    is_known = known >= parameters.shape_min_seen * np.maximum(label_sizes(face_of_cell, faces - 1), 1)
+    known = cells_of_face[:, 1:].sum(1)
+    is_known = known >= parameters.shape_min_seen * np.maximum(cells_of_face.sum(1), 1)
     is_known[0] = False
-    has_part &= is_known[:, None]
+    in_rooms = cells_of_face[:, 1:-1]
+    least = np.maximum(parameters.shape_share_of_face * in_rooms.sum(1, keepdims=True), 1)
+    has_part = (in_rooms >= least) & is_known[:, None]
     room_of = np.where(is_known, np.concatenate([np.zeros(1, np.int32), room_of_face]), 0)
-    away, nearest = cv2.distanceTransformWithLabels(
-        (~is_seen).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
-    )
-    nearest = nearest.ravel()
-    room_of_seen = np.zeros(len(seen) + 1, np.int32)
-    room_of_seen[nearest[seen]] = room
-    unseen = np.flatnonzero((away <= parameters.shape_reach_m / resolution_m) & ~(is_seen | free))
-    face, room = face[unseen], room_of_seen[nearest[unseen]]
-    claim.ravel()[unseen] = np.where(has_part[face, room], room, room_of[face])
+    unseen = np.flatnonzero(~free)
+    room = labels_near(labels, unseen, parameters.shape_reach_m / resolution_m)
+    unseen, room = unseen[room > 0], room[room > 0]
+    face = face_of_cell.take(unseen)
+    claim = np.zeros_like(labels)
+    np.put(claim, unseen, np.where(has_part[face, room - 1], room, room_of.take(face)))
     return claim
 
 
@@ -191,7 +201,8 @@ def _open_pockets(
     number, room = pocket[inside], claim[inside]
     count = int(number.max(initial=0)) + 1
     is_wall = int(labels.max(initial=0)) + 1
-    beside = _beside(np.where(wall, np.int32(is_wall), labels), inside)
+    around = np.pad(np.where(wall, np.int32(is_wall), labels), 1)
+    beside = _beside(around, np.flatnonzero(np.pad(inside, 1)))
     opening = np.bincount(number, (beside == room).sum(0), count)
     walled = np.bincount(number, (beside == is_wall).sum(0), count)
     small = np.bincount(number, minlength=count) * resolution_m**2 <= parameters.shape_fill_max_m2
@@ -203,24 +214,24 @@ def _open_pockets(
 def _fill_small_holes(cells: NDArray[np.int32], resolution_m: float, largest_m2: float) -> None:
     """Give holes up to some size to the one room that surrounds them, in place."""
     empty = np.pad(cells == 0, 1, constant_values=True).astype(np.uint8)
-    count, padded = cv2.connectedComponents(empty, connectivity=4)
-    hole = padded[1:-1, 1:-1].astype(np.int32, copy=False)
-    small = label_sizes(hole, count - 1) * resolution_m**2 <= largest_m2
-    small[:2] = False  # the rooms themselves, and what is outside of them
-    inside = small[hole]
-    number, beside = hole[inside], _beside(cells, inside)
+    count, hole = cv2.connectedComponents(empty, connectivity=4)
+    inside = np.flatnonzero(hole > 1)  # not the rooms themselves, nor what is outside of them
+    number = hole.take(inside)
+    small = np.bincount(number, minlength=count) * resolution_m**2 <= largest_m2
+    inside, number = inside[small[number]], number[small[number]]
+    filled = np.pad(cells, 1)
+    beside = _beside(filled, inside)
     highest, lowest = np.zeros(count, np.int32), np.full(count, np.iinfo(np.int32).max, np.int32)
     np.maximum.at(highest, number, beside.max(0, initial=0))
     np.minimum.at(lowest, number, np.where(beside > 0, beside, lowest[0]).min(0, initial=lowest[0]))
-    cells[inside] = np.where(lowest == highest, highest, 0)[number]
+    np.put(filled, inside, np.where(lowest == highest, highest, 0)[number])
+    cells[...] = filled[1:-1, 1:-1]
 
 
-def _beside(image: NDArray[np.int32], mask: BoolArray) -> NDArray[np.int32]:
-    """Values (4, N) of an image beside each cell of a mask, in reading order; 0 beyond its edges."""
-    width = image.shape[1] + 2
-    around = np.pad(image, 1).ravel()
-    at = np.flatnonzero(np.pad(mask, 1))
-    return np.stack([around[at + step] for step in (-width, -1, 1, width)])
+def _beside(padded: NDArray[np.int32], inside: NDArray[np.intp]) -> NDArray[np.int32]:
+    """Values (4, N) beside each of some cells, numbered in reading order, of an image that has a margin."""
+    width = padded.shape[1]
+    return np.stack([padded.take(inside + step) for step in (-width, -1, 1, width)])
 
 
 def _parts(values: NDArray[np.int32], mask: BoolArray) -> NDArray[np.int32]:

@@ -15,7 +15,7 @@ from rose2_logs.segmentation.floor_plan.stage import FloorPlanResult
 from rose2_logs.segmentation.regions.stage import RegionsResult
 from rose2_logs.segmentation.rooms.borders import adopt_left_out, settle_borders
 from rose2_logs.segmentation.rooms.pieces import rooms_in_one_piece
-from rose2_logs.segmentation.rooms.shapes import most_seen_rooms, room_shapes, rooms_of_faces
+from rose2_logs.segmentation.rooms.shapes import most_seen_rooms, room_shapes, rooms_of_faces, seen_cells
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +65,10 @@ def make_rooms(
     settled = renumber_in_place(settled, number)
     # Faces belong to the rooms whose labels they had before borders settled.
     room_of_face = rooms_of_faces(renumber_in_place(whole, number), plan)
-    shapes = room_shapes(settled, free, occupied, plan.face_of_cell, room_of_face, resolution_m, parameters)
+    cells_of_face = seen_cells(settled, free, plan.face_of_cell, len(room_of_face))
+    shapes = room_shapes(
+        settled, free, occupied, plan.face_of_cell, cells_of_face, room_of_face, resolution_m, parameters
+    )
     return RoomsResult(settled, shapes, room_of_face)
 
 
@@ -104,9 +107,11 @@ def finish_rooms(
     )
     number = number_rooms(pieces, len(room_of_piece) - 1, of_regions.room_min_area_m2, resolution_m)
     labels = renumber_in_place(pieces, number)
-    room_of_face = most_seen_rooms(labels, plan.face_of_cell, len(plan.graph.polygons))
+    faces = plan.face_of_cell
+    cells_of_face = seen_cells(labels, free, faces, len(plan.graph.polygons))
+    room_of_face = most_seen_rooms(cells_of_face)
     shapes = room_shapes(
-        labels, free, occupied, plan.face_of_cell, room_of_face, resolution_m, parameters.floor_plan
+        labels, free, occupied, faces, cells_of_face, room_of_face, resolution_m, parameters.floor_plan
     )
     found_as = np.zeros(int(number.max(initial=0)) + 1, np.int32)
     found_as[number] = np.where(number > 0, room_of_piece, 0)

@@ -9,7 +9,7 @@ import shapely
 from shapely.affinity import rotate
 
 from rose2_logs.config.parameters import FloorPlanParameters
-from rose2_logs.segmentation.rooms.shapes import room_shapes
+from rose2_logs.segmentation.rooms.shapes import room_shapes, seen_cells
 
 PARAMETERS = FloorPlanParameters()
 CELL_M = 0.05
@@ -55,7 +55,10 @@ class Drawing:
         parameters = dataclasses.replace(PARAMETERS, **changes)
         rooms = np.array(self.room_of_face, np.int32)
         free = self.labels > 0
-        return room_shapes(self.labels, free, self.occupied, self.face_of_cell, rooms, CELL_M, parameters)
+        cells = seen_cells(self.labels, free, self.face_of_cell, len(rooms))
+        return room_shapes(
+            self.labels, free, self.occupied, self.face_of_cell, cells, rooms, CELL_M, parameters
+        )
 
     @staticmethod
     def _cells(box_m: tuple[float, ...]) -> tuple[slice, slice]:
@@ -169,9 +172,9 @@ def test_every_room_has_a_valid_shape_that_holds_its_cells(seed: int):
     labels[rng.random(labels.shape) < 0.02] = 0
     faces = np.arange(9, dtype=np.int32).reshape(3, 3).repeat(20, 0).repeat(20, 1)
     occupied = (labels == 0) & (rng.random(labels.shape) < 0.3)
-    shapes = room_shapes(
-        labels, labels > 0, occupied, faces, rng.integers(0, 7, 8).astype(np.int32), CELL_M, PARAMETERS
-    )
+    free, room_of_face = labels > 0, rng.integers(0, 7, 8).astype(np.int32)
+    cells = seen_cells(labels, free, faces, len(room_of_face))
+    shapes = room_shapes(labels, free, occupied, faces, cells, room_of_face, CELL_M, PARAMETERS)
     for room, shape in enumerate(shapes, start=1):
         row, column = np.nonzero(labels == room)
         held = shapely.contains_xy(shape, (column + 0.5) * CELL_M, (row + 0.5) * CELL_M)
