@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +12,7 @@ from shapely.geometry.base import BaseGeometry
 
 from rose2_logs.config.tracking import QualityParameters
 from rose2_logs.model.explored import ExploredPart
-from rose2_logs.model.labels import contacts, known_window
+from rose2_logs.model.labels import contacts
 from rose2_logs.model.occupancy import UNKNOWN, BoolArray, FloatArray, OccupancySnapshot
 from rose2_logs.model.rooms import RoomMap
 
@@ -19,6 +21,8 @@ UNSURE_SIGN = "?"
 UNSURE_BELOW = 0.7
 """Rooms with less wall support are marked as unsure; doorways alone take a room to about 0.9. A matter of
 display: no stored result depends on it."""
+DISK_MAX_CELLS = 8
+"""Up to this radius, growing a mask by a disk is faster than measuring all distances: several times at 4."""
 
 
 def is_unsure(wall_support: float | None) -> bool:
@@ -64,56 +68,67 @@ def room_quality(
         The rooms found in it, on its grid.
     parameters : QualityParameters
     """
-    return RoomQuality(_wall_shares(explored, rooms, parameters), _frontiers(snapshot, rooms))
+    return RoomQuality(_wall_shares(explored, rooms, parameters), _frontiers(snapshot, explored, rooms))
 
 
 def _wall_shares(explored: ExploredPart, rooms: RoomMap, parameters: QualityParameters) -> FloatArray:
     near = _within(explored.occupied, parameters.wall_reach_m / explored.resolution_m)
     grid = explored.geometry.part(explored.window, explored.factor)
-    shares = np.full(len(rooms), np.nan)
-    for number, polygon in enumerate(rooms.polygons):
-        points = _points_along(polygon, parameters.outline_step_m)
-        if len(points) == 0:
-            continue
-        row, column = np.moveaxis(grid.world_to_cell(points), -1, 0)
-        inside = (row >= 0) & (row < near.shape[0]) & (column >= 0) & (column < near.shape[1])
-        shares[number] = np.count_nonzero(near[row[inside], column[inside]]) / len(points)
-    return shares
+    outlines = _points_along(rooms.polygons, parameters.outline_step_m)
+    # Outline by outline: the last digits of a product depend on how many points it has.
+    row, column = np.concatenate([np.zeros((0, 2), np.intp), *map(grid.world_to_cell, outlines)]).T
+    room = np.repeat(np.arange(len(rooms)), [len(points) for points in outlines])
+    inside = (row >= 0) & (row < near.shape[0]) & (column >= 0) & (column < near.shape[1])
+    supported = np.bincount(room[inside], near[row[inside], column[inside]], minlength=len(rooms))
+    count = np.bincount(room, minlength=len(rooms))
+    return np.divide(supported, count, out=np.full(len(rooms), np.nan), where=count > 0)
 
 
-def _points_along(polygon: BaseGeometry, step_m: float) -> FloatArray:
-    """Points (N, 2) every so many meters along the rings of a shape, one ring after the other.
+def _points_along(polygons: Sequence[BaseGeometry], step_m: float) -> list[FloatArray]:
+    """Points (N, 2) every so many meters along the rings of each shape, one ring after the other.
 
     As shapely interpolates along its boundary, which looks for each point from the beginning.
     """
-    corners, ring = shapely.get_coordinates(shapely.get_rings(shapely.get_parts(polygon)), return_index=True)
-    if len(corners) == 0:
-        return np.zeros((0, 2))
-    sides = corners[1:] - corners[:-1]
-    lengths = np.where(ring[1:] == ring[:-1], np.hypot(*sides.T), 0.0)
-    ends = np.cumsum(lengths)
-    distances = np.arange(0.0, ends[-1], step_m)
-    distances = distances[distances < ends[-1]]
-    side = np.searchsorted(ends, distances, "right")
-    share = (distances - (ends - lengths)[side]) / lengths[side]
-    points: FloatArray = corners[side] + share[:, None] * sides[side]
-    return points
+    parts, shape_of_part = shapely.get_parts(np.array(polygons, object), return_index=True)
+    rings, part_of_ring = shapely.get_rings(parts, return_index=True)
+    corners, ring = shapely.get_coordinates(rings, return_index=True)
+    begins = np.searchsorted(shape_of_part[part_of_ring[ring]], np.arange(len(polygons) + 1))
+    steps = corners[1:] - corners[:-1]
+    lengths = np.where(ring[1:] == ring[:-1], np.hypot(*steps.T), 0.0)
+    sides, shares = [np.zeros(0, np.intp)], [np.zeros(0)]
+    for begin, end in itertools.pairwise(begins):
+        of_shape = lengths[begin : max(end - 1, begin)]
+        ends = np.cumsum(of_shape)
+        whole = ends[-1] if len(ends) else 0.0
+        distances = np.arange(0.0, whole, step_m)
+        distances = distances[distances < whole]
+        side = np.searchsorted(ends, distances, "right")
+        sides.append(begin + side)
+        shares.append((distances - (ends - of_shape)[side]) / of_shape[side])
+    side = np.concatenate(sides)
+    points = corners[side] + np.concatenate(shares)[:, None] * steps[side]
+    return np.split(points, np.cumsum([len(share) for share in shares[1:]])[:-1])
 
 
 def _within(mask: BoolArray, reach_cells: float) -> BoolArray:
     """Cells no further from one of a mask (H, W) than a number of cells."""
     import cv2
 
-    distance = cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
-    return np.asarray(distance <= reach_cells)
+    def is_near(mask: BoolArray) -> BoolArray:
+        return cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5) <= reach_cells
+
+    if reach_cells > DISK_MAX_CELLS:
+        return is_near(mask)
+    middle = int(reach_cells) + 1
+    disk = is_near(np.pad([[True]], middle))
+    return cv2.dilate(mask.astype(np.uint8), disk.astype(np.uint8)) > 0
 
 
-def _frontiers(snapshot: OccupancySnapshot, rooms: RoomMap) -> FloatArray:
+def _frontiers(snapshot: OccupancySnapshot, explored: ExploredPart, rooms: RoomMap) -> FloatArray:
     """Length (R,) in meters of the sides that cells of each room share with unknown ones."""
-    known = known_window(rooms.labels > 0)
+    known = explored.window
     window = tuple(slice(max(part.start - 1, 0), part.stop + 1) for part in known)
-    labels, unknown = rooms.labels[window], snapshot.cells[window] == UNKNOWN
-    marked = np.where(unknown, UNKNOWN, labels)
+    marked = np.where(snapshot.cells[window] == UNKNOWN, np.int32(UNKNOWN), rooms.labels[window])
     # A map may be cropped to its known cells, or grow only when something is seen.
     margins = [
         (int(part.start == 0), int(part.stop == size))
