@@ -75,12 +75,14 @@ class AnsweringNetwork:
         inputs = network_input(shares_of(np.pad(raster.wall, pad)), shares_of(np.pad(raster.free, pad)))
         out = self._forward(inputs)
         if views > 1:
-            out = (out + turned_by_half(self._forward(inputs[:, ::-1, ::-1]))) / np.float32(2)
+            out += turned_by_half(self._forward(inputs[:, ::-1, ::-1]))
+            out /= 2
+        # Steps are made in place: images of all answers are large.
         out = out[:, top : top + height, left : left + width]
-        rounded: NDArray[np.float32] = np.rint(out * ANSWER_STEPS).astype(np.float32) / np.float32(
-            ANSWER_STEPS
-        )
-        return rounded
+        out *= ANSWER_STEPS
+        np.rint(out, out=out)
+        out /= ANSWER_STEPS
+        return out
 
     def _forward(self, inputs: FloatImage) -> FloatImage:
         channels, rows, columns = inputs.shape
@@ -88,9 +90,14 @@ class AnsweringNetwork:
         self._network.setInput(
             blocks.transpose(0, 2, 4, 1, 3).reshape(1, -1, rows // BLOCK, columns // BLOCK)
         )
-        odds = np.exp(np.clip(self._network.forward(), -LOG_ODDS_MAX, LOG_ODDS_MAX))
-        answers = (odds / (odds + 1)).reshape(OUTPUTS, BLOCK, BLOCK, rows // BLOCK, columns // BLOCK)
-        out: FloatImage = answers.transpose(0, 3, 1, 4, 2).reshape(OUTPUTS, rows, columns)
+        odds = np.clip(self._network.forward(), -LOG_ODDS_MAX, LOG_ODDS_MAX)
+        np.exp(odds, out=odds)
+        odds /= odds + 1
+        answers = odds.reshape(OUTPUTS, BLOCK, BLOCK, rows // BLOCK, columns // BLOCK)
+        out = np.empty((OUTPUTS, rows, columns), np.float32)
+        # A copy of the whole with its axes in another order would take five times as long.
+        for down, right in product(range(BLOCK), repeat=2):
+            out[:, down::BLOCK, right::BLOCK] = answers[:, down, right]
         return out
 
 
