@@ -65,6 +65,16 @@ def distinct_labels(labels: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDA
     return values.astype(np.int64), starts[index]
 
 
+def numbered(values: NDArray[np.integer]) -> tuple[NDArray[np.integer], NDArray[np.intp]]:
+    """Find the distinct values (K,) of some (N,), ascending, and the position (N,) of each there.
+
+    The same as ``numpy.unique`` with ``return_inverse``, but it sorts the runs of equal values only.
+    """
+    starts = np.flatnonzero(np.append(len(values) > 0, values[1:] != values[:-1]))
+    distinct, index = np.unique(values[starts], return_inverse=True)
+    return distinct, np.repeat(index, np.diff(starts, append=len(values)))
+
+
 def renumber_in_place(labels: NDArray[np.int32], number: NDArray[np.int32]) -> NDArray[np.int32]:
     """Return ``number[labels]``, the image with new numbers, written over the old ones to save memory."""
     for rows in np.array_split(labels, max(1, labels.size // COUNTED_AT_ONCE)):

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from rose2_logs.model.labels import contacts, labels_near, straight_runs
+from rose2_logs.model.labels import contacts, labels_near, numbered, straight_runs
 
 
 @pytest.mark.parametrize("step", [(0, 1), (1, 0), (1, 1), (1, -1)])
@@ -43,6 +43,13 @@ def test_the_nearest_label_is_found_within_reach():
 def test_a_cell_with_a_label_is_its_own_nearest(labels):
     """Any labels, also without a cell between them: OpenCV's numbers of cells are put to the right ones."""
     assert np.array_equal(labels_near(labels, np.arange(labels.size), 0.0), labels.ravel())
+
+
+@given(arrays.arrays(np.int64, st.integers(0, 30), elements=st.integers(-3, 3)))
+def test_distinct_values_are_numbered_as_numpy_does(values):
+    distinct, index = np.unique(values, return_inverse=True)
+    assert np.array_equal(numbered(values)[0], distinct)
+    assert np.array_equal(numbered(values)[1], index)
 
 
 def test_contacts_are_counted_by_sides_of_cells():

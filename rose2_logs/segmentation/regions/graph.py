@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from itertools import chain
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rose2_logs.model.labels import contacts
+from rose2_logs.model.labels import contacts, numbered
 from rose2_logs.model.occupancy import BoolArray, FloatArray
 from rose2_logs.segmentation.regions.plan_frame import Labels, grown_labels, without_specks
 from rose2_logs.segmentation.regions.plan_raster import OFFSETS, PlanRaster
@@ -159,17 +158,22 @@ def build_graph(
     if answers is not None:
         node_sums[:, 4] = np.bincount(node, answers[-1].take(at), minlength=count) * cell_m**2
     node_maxima = np.full((count, len(NODE_MAXIMA)), -np.inf)
-    x, y = (column + 0.5) * cell_m, (row + 0.5) * cell_m
+    _fill_maxima(node_maxima[:, :2], node, (clear.take(at), clear_strong.take(at)))
+    # What reaches farthest has no cell of its atom on its left, or none on its right.
+    is_end = np.ones(atoms.shape, bool)
+    is_end[:, 1:-1] = (atoms[:, 1:-1] != atoms[:, :-2]) | (atoms[:, 1:-1] != atoms[:, 2:])
+    outer = is_end.take(at)
+    x, y = (column[outer] + 0.5) * cell_m, (row[outer] + 0.5) * cell_m
     half = cell_m / 2
     reaches = ((1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, -1), (1, -1), (-1, 1))
     extents = (a * x + b * y + half * (abs(a) + abs(b)) for a, b in reaches)
-    _fill_maxima(node_maxima, node, chain((c.take(at) for c in (clear, clear_strong)), extents))
+    _fill_maxima(node_maxima[:, 2:], node[outer], extents)
     # An atom that no center of a plan cell meets.
     missed = np.isinf(node_maxima[:, 0])
     node_maxima[missed] = 0
     node_sums[missed, 0] = cell_m**2
     keys, sums, maxima = _border_records(atoms, wall, clear, clear_strong, faces, answers, cell_m, count)
-    key, index = np.unique(keys, return_inverse=True)
+    key, index = numbered(keys)
     border_maxima = np.full((len(key), len(BORDER_MAXIMA)), -np.inf)
     touching = np.isfinite(maxima[:, 0])
     _fill_maxima(border_maxima, index[touching], maxima[touching].T)
@@ -218,9 +222,10 @@ def _border_records(
         narrow = np.minimum(clear.take(one), clear.take(other))
         record[:, 4] = open_contact * narrow * cell_m
         record[:, 5] = (open_contact & (faces.take(one) != faces.take(other))) * cell_m
+        near = cv2.dilate(wall.astype(np.uint8), np.ones((1, 3) if upright else (3, 1), np.uint8))
         for k, length in enumerate(LINE_WINDOWS_M):
-            along = _wall_along(wall, upright, length, cell_m)
-            record[:, 6 + k] = open_contact * np.maximum(along.take(one), along.take(other)) * cell_m
+            along = _share_along(near, upright, length / cell_m, one, other)
+            record[:, 6 + k] = open_contact * along * cell_m
         extreme = np.full((len(one), len(BORDER_MAXIMA)), -np.inf)
         x, y = (column + column2 + 1) / 2 * cell_m, (row + row2 + 1) / 2 * cell_m
         half_x, half_y = (0.0, cell_m / 2) if upright else (cell_m / 2, 0.0)
@@ -235,7 +240,7 @@ def _border_records(
             a = atoms[down:, right:]
             b = atoms[: max(atoms.shape[0] - down, 0), : max(atoms.shape[1] - right, 0)]
             asked = (a != b) & (a > 0) & (b > 0)
-            key, index = np.unique(_pair_key(a[asked], b[asked], count), return_inverse=True)
+            key, index = numbered(_pair_key(a[asked], b[asked], count))
             record = np.zeros((len(key), len(BORDER_SUMS)))
             record[:, 9 + k // 2] = np.bincount(index, answers[k][down:, right:][asked], minlength=len(key))
             record[:, 12 + k // 2] = np.bincount(index, minlength=len(key))
@@ -251,14 +256,18 @@ def _pair_key(a: NDArray[np.integer], b: NDArray[np.integer], count: int) -> NDA
     return key
 
 
-def _wall_along(wall: BoolArray, upright: bool, length_m: float, cell_m: float) -> NDArray[np.float32]:
-    """Share of a window along a line through each cell in which there is wall, a cell beside it counted."""
-    size = 2 * round(length_m / cell_m / 2) + 1
-    across = np.ones((1, 3), np.uint8) if upright else np.ones((3, 1), np.uint8)
-    near = cv2.dilate(wall.astype(np.uint8), across)
+def _share_along(
+    mask: NDArray[np.uint8],
+    upright: bool,
+    length_cells: float,
+    one: NDArray[np.intp],
+    other: NDArray[np.intp],
+) -> NDArray[np.float32]:
+    """Share of a mask in a window along a line through one cell or the other, whichever (N,) is greater."""
+    size = 2 * round(length_cells / 2) + 1
     window = (1, size) if upright else (size, 1)
-    cells = cv2.boxFilter(near, cv2.CV_32S, window, normalize=False, borderType=cv2.BORDER_CONSTANT)
-    return (cells / np.float32(size)).astype(np.float32)
+    cells = cv2.boxFilter(mask, cv2.CV_32S, window, normalize=False, borderType=cv2.BORDER_CONSTANT)
+    return (np.maximum(cells.take(one), cells.take(other)) / np.float32(size)).astype(np.float32)
 
 
 def _clearance(blocked: BoolArray, cell_m: float) -> NDArray[np.float32]:
