@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from rose2_logs.model.labels import label_sizes
 from rose2_logs.model.occupancy import BoolArray
 
 
@@ -54,11 +53,9 @@ def rooms_in_one_piece(
         number, components = cv2.connectedComponents(grown, connectivity=4)
         if number <= 2:
             continue
-        piece: NDArray[np.int32] = np.where(inside, components, 0).astype(np.int32)
-        cells = label_sizes(piece, number - 1)
-        cells[0] = 0
+        cells = np.bincount(components[inside], minlength=number)
         large = np.flatnonzero(cells * resolution_m**2 >= piece_min_m2)
         for other in large[large != cells.argmax()].tolist():
-            pieces[box][piece == other] = len(rooms)
+            pieces[box][inside & (components == other)] = len(rooms)
             rooms.append(room)
     return pieces, np.array(rooms, np.int32)
