@@ -17,7 +17,7 @@ DIFFERENT, OUTSIDE = FEATURES.index("different"), REGION_FEATURES.index("outside
 UNASKED_ANSWER = -0.5
 """What the answer counts for regions that touch nowhere: they are in different rooms."""
 
-ROWS_AT_ONCE = 32
+ROWS_AT_ONCE = 64
 """Rows whose answers to all nodes are held at once, in a CPU's cache."""
 LEAVES_MAX = 16
 """Most leaves of a tree: one bit each."""
@@ -77,7 +77,7 @@ class BoostedTrees:
 
 @dataclass(frozen=True, eq=False)
 class _LeafMasks:
-    """Trees in the form in which all nodes are asked at once.
+    """Trees in the form in which all nodes are asked at once, and what several nodes ask once.
 
     The leaves of a tree are numbered from left to right. A node that sends a row to its right rules out the
     leaves on its left, and of the leaves that no node rules out, the row's is the first (Lucchese et al.,
@@ -85,8 +85,10 @@ class _LeafMasks:
 
     Attributes
     ----------
-    feature, threshold : (I T,) int, float
-        Of the inner nodes, the first of all trees, then the second of all trees, and so on.
+    feature, threshold : (Q,) int, float
+        What is asked.
+    question : (I T,) int
+        What each inner node asks, the first of all trees, then the second of all trees, and so on.
     kept : (I T,) uint16
         Bits of the leaves that remain where a row goes right.
     value : (T LEAVES_MAX,) float
@@ -96,6 +98,7 @@ class _LeafMasks:
 
     feature: NDArray[np.intp]
     threshold: FloatArray
+    question: NDArray[np.intp]
     kept: NDArray[np.uint16]
     value: FloatArray
     trees: int
@@ -124,15 +127,19 @@ class _LeafMasks:
             threshold[: len(asked), tree] = trees.threshold[tree, asked]
             kept[: len(asked), tree] = [ALL_LEAVES & ~bits for bits in ruled_out.values()]
             value[tree, : len(leaves)] = trees.value[tree, leaves]
-        return cls(feature.ravel(), threshold.ravel(), kept.ravel(), value.ravel(), count)
+        questions, question = np.unique(
+            np.column_stack([feature.ravel(), threshold.ravel()]), axis=0, return_inverse=True
+        )
+        of_question = questions[:, 0].astype(np.intp), questions[:, 1].copy()
+        return cls(*of_question, question.ravel(), kept.ravel(), value.ravel(), count)
 
     def __call__(self, features: FloatArray) -> FloatArray:
         """Value (N, T) of the leaf of each tree that each row comes to."""
         columns = np.ascontiguousarray(features.T)
         goes_right = columns.take(self.feature, axis=0) > self.threshold[:, None]
-        left_over = goes_right.astype(np.uint16)
-        # All leaves where a row goes left.
-        left_over -= np.uint16(1)
+        all_where_left = goes_right.astype(np.uint16)
+        all_where_left -= np.uint16(1)
+        left_over = all_where_left.take(self.question, axis=0)
         left_over |= self.kept[:, None]
         remaining = np.bitwise_and.reduce(left_over.reshape(-1, self.trees, len(features)), axis=0)
         leaf = FIRST_BIT.take(remaining.T) + np.arange(self.trees) * LEAVES_MAX
