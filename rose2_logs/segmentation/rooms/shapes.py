@@ -179,7 +179,7 @@ def _claims(
     least = np.maximum(parameters.shape_share_of_face * in_rooms.sum(1, keepdims=True), 1)
     has_part = (in_rooms >= least) & is_known[:, None]
     room_of = np.where(is_known, np.concatenate([np.zeros(1, np.int32), room_of_face]), 0)
-    unseen = np.flatnonzero(~free)
+    unseen = np.flatnonzero(is_known.take(face_of_cell) & ~free)
     room = labels_near(labels, unseen, parameters.shape_reach_m / resolution_m)
     unseen, room = unseen[room > 0], room[room > 0]
     face = face_of_cell.take(unseen)
