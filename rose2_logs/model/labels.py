@@ -65,7 +65,7 @@ def distinct_labels(labels: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDA
     return values.astype(np.int64), starts[index]
 
 
-def numbered(values: NDArray[np.integer]) -> tuple[NDArray[np.integer], NDArray[np.intp]]:
+def numbered(values: NDArray[Scalar]) -> tuple[NDArray[Scalar], NDArray[np.intp]]:
     """Find the distinct values (K,) of some (N,), ascending, and the position (N,) of each there.
 
     The same as ``numpy.unique`` with ``return_inverse``, but it sorts the runs of equal values only.
@@ -93,9 +93,7 @@ def label_sizes(labels: NDArray[np.integer], count: int) -> NDArray[np.int64]:
     return sizes
 
 
-def labels_near(
-    labels: NDArray[np.int32], cells: NDArray[np.intp], reach_cells: float
-) -> NDArray[np.int32]:
+def labels_near(labels: NDArray[np.int32], cells: NDArray[np.intp], reach_cells: float) -> NDArray[np.int32]:
     """Label (N,) nearest to each of some cells of an image, 0 where none is within reach.
 
     Parameters
@@ -116,7 +114,7 @@ def labels_near(
     )
     # OpenCV numbers the cells that have a label in reading order, from 1 on.
     label = np.concatenate([np.zeros(1, np.int32), labels[labels > 0]])
-    near = label.take(nearest.take(cells))
+    near: NDArray[np.int32] = label.take(nearest.take(cells))
     near[distance.take(cells) > reach_cells] = 0
     return near
 

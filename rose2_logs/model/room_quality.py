@@ -81,7 +81,8 @@ def _wall_shares(explored: ExploredPart, rooms: RoomMap, parameters: QualityPara
     inside = (row >= 0) & (row < near.shape[0]) & (column >= 0) & (column < near.shape[1])
     supported = np.bincount(room[inside], near[row[inside], column[inside]], minlength=len(rooms))
     count = np.bincount(room, minlength=len(rooms))
-    return np.divide(supported, count, out=np.full(len(rooms), np.nan), where=count > 0)
+    shares: FloatArray = np.divide(supported, count, out=np.full(len(rooms), np.nan), where=count > 0)
+    return shares
 
 
 def _points_along(polygons: Sequence[BaseGeometry], step_m: float) -> list[FloatArray]:

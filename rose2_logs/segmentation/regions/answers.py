@@ -90,7 +90,7 @@ class AnsweringNetwork:
         self._network.setInput(
             blocks.transpose(0, 2, 4, 1, 3).reshape(1, -1, rows // BLOCK, columns // BLOCK)
         )
-        odds = np.clip(self._network.forward(), -LOG_ODDS_MAX, LOG_ODDS_MAX)
+        odds = np.clip(np.asarray(self._network.forward(), np.float32), -LOG_ODDS_MAX, LOG_ODDS_MAX)
         np.exp(odds, out=odds)
         odds /= odds + 1
         answers = odds.reshape(OUTPUTS, BLOCK, BLOCK, rows // BLOCK, columns // BLOCK)

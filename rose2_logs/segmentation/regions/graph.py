@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -257,7 +258,7 @@ def _pair_key(a: NDArray[np.integer], b: NDArray[np.integer], count: int) -> NDA
 
 
 def _share_along(
-    mask: NDArray[np.uint8],
+    mask: NDArray[Any],
     upright: bool,
     length_cells: float,
     one: NDArray[np.intp],

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -74,9 +76,9 @@ def settle_borders(labels: NDArray[np.int32], resolution_m: float, strip_m: floa
     return settled
 
 
-def _narrowest_type(highest: int) -> type[np.uint8 | np.uint16 | np.float32]:
-    """Type of an image that holds labels up to the highest and whose morphology OpenCV knows: fast if narrow."""
+def _narrowest_type(highest: int) -> np.dtype[Any]:
+    """Type that holds labels up to the highest and that OpenCV's morphology knows: narrow ones are fast."""
     for narrow in (np.uint8, np.uint16):
         if highest <= np.iinfo(narrow).max:
-            return narrow
-    return np.float32
+            return np.dtype(narrow)
+    return np.dtype(np.float32)

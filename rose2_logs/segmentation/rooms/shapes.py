@@ -79,7 +79,8 @@ def most_seen_rooms(cells: NDArray[np.int64]) -> NDArray[np.int32]:
     """Room (F,) that holds most of the labeled cells of each face, 0 for none, from `seen_cells`."""
     of_rooms = cells[1:, :-1].copy()
     of_rooms[:, 0] = 0
-    return of_rooms.argmax(1).astype(np.int32)
+    rooms: NDArray[np.int32] = of_rooms.argmax(1).astype(np.int32)
+    return rooms
 
 
 def room_shapes(
