@@ -12,8 +12,10 @@ from drawn_rooms import rows
 
 from rose2_logs.config.parameters import OccupancyParameters
 from rose2_logs.config.tracking import QualityParameters
+from rose2_logs.model import room_quality as module
 from rose2_logs.model.explored import ExploredPart
 from rose2_logs.model.occupancy import OccupancySnapshot
+from rose2_logs.model.outlines import room_outlines
 from rose2_logs.model.room_quality import RoomQuality, room_quality
 from rose2_logs.model.rooms import RoomMap
 
@@ -82,6 +84,20 @@ def test_outlines_along_walls_are_backed_and_others_are_not(turn_deg: int):
     assert found.wall_support[0] == pytest.approx((outline - 0.5) / outline, abs=0.03)
     assert found.wall_support[1] < 0.1
     assert np.isnan(found.wall_support[2])
+
+
+@pytest.mark.parametrize("reach_m", [0.0, 0.05, 0.12, 0.2, 0.39])
+def test_walls_within_reach_are_the_same_however_they_are_looked_for(reach_m: float, monkeypatch):
+    cells, labels = office(turn_rad=0.3)
+    map_ = snapshot(cells)
+    explored = ExploredPart.of(map_.cells, map_.geometry, OccupancyParameters())
+    rooms = rooms_with(map_, labels, *room_outlines(labels, map_.geometry.resolution_m))
+    parameters = QualityParameters(wall_reach_m=reach_m)
+    grown = room_quality(map_, explored, rooms, parameters).wall_support
+    monkeypatch.setattr(module, "DISK_MAX_CELLS", -1)
+    measured = room_quality(map_, explored, rooms, parameters).wall_support
+    assert np.array_equal(grown, measured)
+    assert grown.mean() > 0
 
 
 def test_an_outline_beyond_the_map_is_not_backed():

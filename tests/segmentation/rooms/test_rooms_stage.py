@@ -16,13 +16,15 @@ from rose2_logs.segmentation.walls.strips import WallCells
 PARAMETERS, TOPOLOGY = FloorPlanParameters(), TopologyParameters()
 
 
-def test_a_strip_along_the_other_side_of_a_wall_changes_room():
-    labels = np.ones((60, 60), np.int32)
-    labels[32:] = 2
-    labels[30, 10:50] = 0  # the wall, with room 1 spilling over to rows 31
+@pytest.mark.parametrize(("upper", "lower"), [(1, 2), (255, 256), (65_535, 70_000)])
+def test_a_strip_along_the_other_side_of_a_wall_changes_room(upper: int, lower: int):
+    """However many rooms there are: their numbers are held in the narrowest type."""
+    labels = np.full((60, 60), upper, np.int32)
+    labels[32:] = lower
+    labels[30, 10:50] = 0  # the wall, with the upper room spilling over to row 31
     settled = settle_borders(labels, 0.05, 0.25)
-    assert (settled[31, 15:45] == 2).all()
-    assert (settled[:29] == 1).all()
+    assert (settled[31, 15:45] == lower).all()
+    assert (settled[:29] == upper).all()
     assert ((settled > 0) == (labels > 0)).all()
 
 
