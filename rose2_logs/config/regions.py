@@ -39,10 +39,10 @@ class RegionParameters(ParameterBlock):
         0.0,
     )
     answer_views: int = number(
-        2,
+        1,
         "1",
-        "Views that the network sees: the map as it is, and turned by half; their mean gave 0.5 more on "
-        "maps left out for twice the time of the network.",
+        "Views that the network sees: the map as it is, and turned by half. The mean of both gained nothing on "
+        "maps left out, for twice the time of the network.",
         1,
         2,
     )

@@ -25,6 +25,8 @@ from rose2_logs.segmentation.walls.strips import WallCells
 FloatArray = NDArray[np.float64]
 FREE_MIN_GRAY, OCCUPIED_MAX_GRAY = 230, 89
 """What is free and occupied in simulated maps."""
+FIT_VIEWS = 2
+"""Trees are fitted on steadier answers than one view gives: 81.1 of the buildings left out rather than 80.8."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,6 +105,6 @@ def prepared_simulated(path: Path, keep: Path) -> list[PreparedMap]:
 
 
 def answered(maps: list[PreparedMap], network_of_fold: dict[int, Path]) -> list[NDArray[np.float32]]:
-    """Answers for each map, of the network that did not see its fold."""
+    """Answers for each map, of the network that did not see its fold, as the mean of `FIT_VIEWS` views."""
     networks = {path: AnsweringNetwork(path) for path in set(network_of_fold.values())}
-    return [networks[network_of_fold[one.fold]](one.atoms.raster) for one in maps]
+    return [networks[network_of_fold[one.fold]](one.atoms.raster, FIT_VIEWS) for one in maps]

@@ -44,8 +44,7 @@ class AnsweringNetwork:
     def __call__(self, raster: PlanRaster, views: int = RegionParameters.answer_views) -> NDArray[np.float32]:
         """Answers (OUTPUTS, H, W) in [0, 1] for a raster (H, W).
 
-        With two views the network sees the map as it is and turned by half: it errs in different places, and
-        the mean of both answers errs less.
+        With two views the network sees the map as it is and turned by half, and gives the mean of both.
         """
         height, width = raster.wall.shape
         if max(height, width) <= TILE_CELLS:

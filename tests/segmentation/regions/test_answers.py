@@ -45,10 +45,10 @@ def whole_steps(raster):
     return PlanRaster(np.pad(raster.wall, pad), np.pad(raster.free, pad))
 
 
-def test_a_map_turned_by_half_has_the_same_answers_turned(whole_steps):
+def test_with_two_views_a_map_turned_by_half_has_the_same_answers_turned(whole_steps):
     """Each pair of cells is told of at its lower or right cell, which is the other one when turned."""
     network, turned = fitted.answering_network(), half_turn(whole_steps)
-    back, answers = turned_by_half(network(turned)), network(whole_steps)
+    back, answers = turned_by_half(network(turned, views=2)), network(whole_steps, views=2)
     for k, (down, right) in enumerate((*OFFSETS, (0, 0))):
         np.testing.assert_allclose(back[k, down:, right:], answers[k, down:, right:], atol=2e-3)
 
@@ -57,7 +57,7 @@ def test_answers_are_the_mean_of_those_for_both_views(whole_steps):
     network = fitted.answering_network()
     one = network(whole_steps, views=1)
     other = turned_by_half(network(half_turn(whole_steps), views=1))
-    np.testing.assert_allclose(network(whole_steps), (one + other) / 2, atol=2e-3)
+    np.testing.assert_allclose(network(whole_steps, views=2), (one + other) / 2, atol=2e-3)
     assert np.abs(other - one).max() > 0.01
 
 
