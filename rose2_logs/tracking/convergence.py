@@ -133,8 +133,10 @@ def measure_convergence(
     measured = Convergence()
     likeness = dict.fromkeys(snapshot_refs, layout.likeness_of_nothing)
     for of_map in map_by_map(rows):
-        _follow_tracks(measured, of_map, histories, snapshot_refs, drifts, parameters)
-        likeness[int(of_map.snapshot[0])] = layout.likeness(of_map)
+        placed = layout.placed(of_map)
+        iou = _iou_with_last(of_map, placed, histories, drifts)
+        _follow_tracks(measured, of_map, iou, histories, snapshot_refs, parameters)
+        likeness[int(of_map.snapshot[0])] = layout.likeness(placed)
     measured.final_iou = {snapshot: like.iou for snapshot, like in likeness.items()}
     measured.final_share = {snapshot: like.share for snapshot, like in likeness.items()}
     measured.known_final_share = {snapshot: like.known_share for snapshot, like in likeness.items()}
@@ -170,9 +172,9 @@ def map_by_map(rows: Iterable[RoomRows]) -> Iterator[RoomRows]:
 def _follow_tracks(
     measured: Convergence,
     rows: RoomRows,
+    iou_with_last: FloatArray,
     histories: TrackHistories,
     snapshot_refs: Mapping[int, SnapshotRef],
-    drifts: Mapping[int, RigidMotion],
     parameters: TrackingParameters,
 ) -> None:
     """Note for each room of the next map whether its area and its shape are those of its track in the end."""
@@ -180,7 +182,7 @@ def _follow_tracks(
         rows.snapshot.tolist(),
         rows.track.tolist(),
         rows.area_m2.tolist(),
-        _iou_with_last(rows, histories, drifts).tolist(),
+        iou_with_last.tolist(),
         strict=True,
     ):
         last = histories.tracks[track].area_m2
@@ -203,6 +205,28 @@ def _since(
             break
         since = snapshot_refs[snapshot]
     return since
+
+
+@dataclass(frozen=True, eq=False)
+class _Placed:
+    """The rooms of one map where they lie in the last one.
+
+    Attributes
+    ----------
+    areas, last_areas : (R,) and (F,) float
+        Of their shapes, and of those of the last map's rooms.
+    common : (R, F) float
+        What each has in common with each room of the last map.
+    """
+
+    areas: FloatArray
+    last_areas: FloatArray
+    common: FloatArray
+
+    @property
+    def iou(self) -> FloatArray:
+        """Intersection over union (R, F) of each pair."""
+        return share_of(self.common, self.areas[:, None] + self.last_areas - self.common)
 
 
 @dataclass(frozen=True)
@@ -244,19 +268,29 @@ class _LastLayout:
         none = 0.0 if self._areas.sum() > 0 else None
         return _Likeness(none, none, None)
 
-    def likeness(self, rows: RoomRows) -> _Likeness:
-        """Compare the rooms of one map."""
-        total = float(self._areas.sum())
-        if total == 0 or self._last is None:
-            return self.likeness_of_nothing
+    def placed(self, rows: RoomRows) -> _Placed:
+        """Lay the rooms of one map over those of the last one."""
+        assert self._last is not None  # at the latest, it is this map
         drift = self._drifts[int(rows.snapshot[0])], self._drifts[self._last]
         rooms = _placed(rows.polygons, [drift] * len(rows.polygons))
+        shapely.prepare(rooms)
         room, last = self._tree.query(rooms, predicate="intersects")
+        # Many are neighbors, which is found much faster than what shapes have in common.
+        shares_area = ~shapely.touches(rooms[room], self._rooms[last])
+        room, last = room[shares_area], last[shares_area]
         common = np.zeros((len(rooms), len(self._rooms)))
         common[room, last] = shapely.area(shapely.intersection(rooms[room], self._rooms[last]))
-        iou = _best_iou(common, shapely.area(rooms), self._areas)
+        return _Placed(shapely.area(rooms), self._areas, common)
+
+    def likeness(self, placed: _Placed) -> _Likeness:
+        """Compare the rooms of one map."""
+        total = float(self._areas.sum())
+        if total == 0:
+            return self.likeness_of_nothing
+        common = placed.common
+        iou = placed.iou.max(axis=0)
         known = common.sum(axis=0)
-        known_iou = _best_iou(common, common.sum(axis=1), known)
+        known_iou = share_of(common, common.sum(axis=1)[:, None] + known - common).max(axis=0)
         known_total = float(known.sum())
         return _Likeness(
             float(iou @ self._areas) / total,
@@ -265,28 +299,24 @@ class _LastLayout:
         )
 
 
-def _best_iou(common: FloatArray, areas: FloatArray, last_areas: FloatArray) -> FloatArray:
-    """Greatest intersection over union (F,) of each last room with a room; `common` is (R, F)."""
-    best: FloatArray = share_of(common, areas[:, None] + last_areas - common).max(axis=0)
-    return best
-
-
 def _iou_with_last(
-    rows: RoomRows, histories: TrackHistories, drifts: Mapping[int, RigidMotion]
+    rows: RoomRows, placed: _Placed, histories: TrackHistories, drifts: Mapping[int, RigidMotion]
 ) -> FloatArray:
     """Intersection over union (N,) of each room with its track's last shape, both where the last one lay."""
-    ends = [histories.tracks[track] for track in rows.track.tolist()]
-    then = _placed(
-        rows.polygons,
-        [
-            (drifts[snapshot], drifts[end.last.snapshot])
-            for snapshot, end in zip(rows.snapshot.tolist(), ends, strict=True)
-        ],
-    )
-    last = _valid(np.array([end.polygon for end in ends], object))
+    column = {track: number for number, track in enumerate(histories.in_last_map)}
+    at = np.array([column.get(track, -1) for track in rows.track.tolist()], np.intp)
+    here, gone = np.flatnonzero(at >= 0), np.flatnonzero(at < 0)
+    iou = np.zeros(len(at))
+    iou[here] = placed.iou[here, at[here]]
+    ends = [histories.tracks[track] for track in rows.track[gone].tolist()]
+    pairs = [
+        (drifts[snapshot], drifts[end.last.snapshot])
+        for snapshot, end in zip(rows.snapshot[gone].tolist(), ends, strict=True)
+    ]
+    then, last = _placed(rows.polygons[gone], pairs), _valid(np.array([end.polygon for end in ends], object))
     common = shapely.area(shapely.intersection(then, last))
-    union = shapely.area(then) + shapely.area(last) - common
-    return share_of(common, union)
+    iou[gone] = share_of(common, shapely.area(then) + shapely.area(last) - common)
+    return iou
 
 
 def _placed(
