@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rose2_logs.model.occupancy import FloatArray, GridGeometry
+from rose2_logs.model.rooms import RoomMap
 from rose2_logs.tracking.matching import RegionShape, assign, cut_out_rooms
 from rose2_logs.tracking.registration import RigidMotion
 
@@ -182,7 +183,7 @@ class TruthLinker:
         """
         if motion is not None:
             self._last = {number: shape.moved(motion) for number, shape in self._last.items()}
-        shapes = cut_out_rooms(labels, geometry, int(labels.max(initial=0)))
+        shapes = cut_out_rooms(RoomMap.from_labels(labels, geometry))
         areas = np.array([0.0 if shape is None else shape.area_m2 for shape in shapes])
         before = np.array([shape.area_m2 for shape in self._last.values()])[:, None]
         common = np.zeros((len(before), len(areas)))

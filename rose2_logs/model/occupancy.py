@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import operator
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -27,7 +28,11 @@ FARTHEST_ORIGIN_M = 1e8
 
 
 def _are_numbers(*values: object) -> bool:
-    return all(isinstance(value, Real) and not isinstance(value, bool | np.bool_) for value in values)
+    # Grids are made by the hundred for each map, and `Real` takes longer to ask than all the rest.
+    return all(
+        type(value) is float or (isinstance(value, Real) and not isinstance(value, bool | np.bool_))
+        for value in values
+    )
 
 
 @dataclass(frozen=True)
@@ -85,7 +90,7 @@ class GridGeometry:
                 f"the map's resolution is {self.resolution_m:g} m; it must be positive, from "
                 f"{SMALLEST_CELL_M:g} to {LARGEST_CELL_M:g} m"
             )
-        if not np.all(np.isfinite([*self.origin_xy_m, self.yaw_rad])):
+        if not all(map(math.isfinite, (*self.origin_xy_m, self.yaw_rad))):
             raise InvalidMapError(
                 f"the map's origin {self.origin_xy_m}, yaw {self.yaw_rad} is not made of finite numbers"
             )

@@ -112,26 +112,35 @@ class RoomMap:
         return np.array([polygon.area for polygon in self.polygons], float)
 
     @cached_property
+    def windows(self) -> tuple[tuple[slice, slice] | None, ...]:
+        """Rows and columns that hold the cells of each room; None for a room without cells."""
+        from scipy.ndimage import find_objects
+
+        return tuple(find_objects(self.labels, max_label=len(self)))
+
+    @cached_property
     def label_points_m(self) -> FloatArray:
         """World point (R, 2) for the name of each room, meters: well inside its cells, so where it was seen.
 
         Of a room without cells it is a point of its polygon, NaN where that is empty.
         """
         import cv2
-        from scipy import ndimage
 
-        points = np.full((len(self), 2), np.nan)
-        for room, box in enumerate(ndimage.find_objects(self.labels, max_label=len(self)), start=1):
-            shape = self.polygons[room - 1]
-            if box is not None:
-                cells = np.pad((self.labels[box] == room).astype(np.uint8), 1)
-                depth = cv2.distanceTransform(cells, cv2.DIST_L2, cv2.DIST_MASK_3)[1:-1, 1:-1]
-                deep = np.argwhere(depth >= LABEL_DEPTH_SHARE * depth.max())
-                middle = [np.average(np.arange(len(n)) - 1, weights=n) for n in (cells.sum(1), cells.sum(0))]
-                row, column = deep[np.argmin(((deep - middle) ** 2).sum(axis=1))]
-                points[room - 1] = self.geometry.cell_centers(box[0].start + row, box[1].start + column)
-            elif not shape.is_empty:
-                points[room - 1] = shape.representative_point().coords[0]
+        cells = np.zeros((len(self), 2), np.intp)
+        for number, window in enumerate(self.windows):
+            if window is not None:
+                inside = np.equal(self.labels[window], number + 1).view(np.uint8)
+                framed = cv2.copyMakeBorder(inside, 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=0)
+                depth = cv2.distanceTransform(framed, cv2.DIST_L2, cv2.DIST_MASK_3)[1:-1, 1:-1]
+                row, column = np.nonzero(depth >= LABEL_DEPTH_SHARE * depth.max())
+                down, right = (np.arange(len(n)) @ n / n.sum() for n in (inside.sum(1), inside.sum(0)))
+                middle = np.argmin((row - down) ** 2 + (column - right) ** 2)
+                cells[number] = window[0].start + row[middle], window[1].start + column[middle]
+        points = self.geometry.cell_centers(*cells.T)
+        for number, window in enumerate(self.windows):
+            if window is None:
+                shape = self.polygons[number]
+                points[number] = np.nan if shape.is_empty else shape.representative_point().coords[0]
         return points
 
     @cached_property

@@ -9,7 +9,7 @@ import numpy as np
 
 from rose2_logs.model.occupancy import FloatArray
 from rose2_logs.model.rooms import RoomMap
-from rose2_logs.tracking.matching import RegionShape, cut_out_rooms
+from rose2_logs.tracking.matching import RegionShape
 from rose2_logs.tracking.registration import RigidMotion
 
 
@@ -41,13 +41,21 @@ class LayoutFollower:
         self._shapes: tuple[RegionShape | None, ...] = ()
         self._drift = RigidMotion.none()
 
-    def update(self, rooms: RoomMap, track_ids: Sequence[int], motion: RigidMotion | None) -> LayoutChange:
+    def update(
+        self,
+        rooms: RoomMap,
+        shapes: tuple[RegionShape | None, ...],
+        track_ids: Sequence[int],
+        motion: RigidMotion | None,
+    ) -> LayoutChange:
         """Take the next map of the run.
 
         Parameters
         ----------
         rooms : RoomMap
             Its rooms.
+        shapes : tuple of R RegionShape or None
+            The same, cut out.
         track_ids : sequence of R int
             Their tracks.
         motion : RigidMotion, optional
@@ -60,7 +68,7 @@ class LayoutFollower:
                 common[row] = there.common_area_m2(rooms.labels, rooms.geometry, len(rooms))
         same = np.array(self._tracks, np.int64)[:, None] == np.array(track_ids, np.int64)
         self._tracks = tuple(track_ids)
-        self._shapes = cut_out_rooms(rooms.labels, rooms.geometry, len(rooms))
+        self._shapes = shapes
         self._drift = self._drift if motion is None else self._drift.then(motion)
         floor = float(common.sum())
         if floor == 0:

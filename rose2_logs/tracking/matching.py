@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rose2_logs.model.occupancy import BoolArray, FloatArray, GridGeometry
+from rose2_logs.model.rooms import RoomMap
 from rose2_logs.tracking.registration import RigidMotion
 
+Pair = tuple[float, float]
 ROWS_AT_ONCE = 256
 """Rows resampled together: bounds the memory for coordinates to some megabytes for the largest maps."""
 BORDER_NUDGE = 1e-6
@@ -38,12 +42,11 @@ def resample_labels(
     """
     height, width = target.shape
     result = np.zeros(target.shape, np.int32)
-    # A center's source cell is affine in its row and column: three points give the whole map.
-    corners = target.cell_centers(np.array([0, 1, 0]), np.array([0, 0, 1]))
-    origin, by_row, by_column = source.world_to_grid(corners) / source.resolution_m
-    by_row, by_column = by_row - origin, by_column - origin
-    if np.abs(np.concatenate([by_row - (0, 1), by_column - (1, 0)])).max() < SAME_GRID_CELLS:
-        return _shifted(labels, np.floor(origin + BORDER_NUDGE).astype(int).tolist(), target.shape)
+    origin, by_row, by_column = _cells_under(source, target)
+    if (first := _first_cell(origin, by_row)) is not None:
+        here, there = _common_windows(source.shape, first, target.shape)
+        result[there] = labels[here]
+        return result
     columns = np.arange(width)
     for begin in range(0, height, ROWS_AT_ONCE):
         rows = np.arange(begin, min(begin + ROWS_AT_ONCE, height))[:, None]
@@ -54,21 +57,54 @@ def resample_labels(
     return result
 
 
-def _shifted(labels: NDArray[np.int32], first: list[int], shape: tuple[int, int]) -> NDArray[np.int32]:
-    """Part of a label array, of a given shape, from column and row `first` on; 0 outside the array."""
-    result = np.zeros(shape, np.int32)
-    low = [max(0, start) for start in first]
+def _cells_under(source: GridGeometry, target: GridGeometry) -> tuple[Pair, Pair, Pair]:
+    """Find the place, in cells of a grid, under the center of another grid's first cell, as x and y.
+
+    Returns
+    -------
+    first, by_row, by_column : (float, float)
+        The place under the first center, and the steps to the next row and the next column.
+    """
+    scale = target.resolution_m / source.resolution_m
+    turn = target.yaw_rad - source.yaw_rad
+    right, up = scale * math.cos(turn), scale * math.sin(turn)
+    cosine, sine = math.cos(source.yaw_rad), math.sin(source.yaw_rad)
+    x, y = (
+        (there - here) / source.resolution_m
+        for there, here in zip(target.origin_xy_m, source.origin_xy_m, strict=True)
+    )
+    first = cosine * x + sine * y + (right - up) / 2, cosine * y - sine * x + (right + up) / 2
+    return first, (-up, right), (right, up)
+
+
+def _first_cell(first: Pair, by_row: Pair) -> tuple[int, int] | None:
+    """Row and column under the first cell of a grid that runs along another; None where it does not."""
+    if max(abs(by_row[0]), abs(by_row[1] - 1)) >= SAME_GRID_CELLS:
+        return None
+    return math.floor(first[1] + BORDER_NUDGE), math.floor(first[0] + BORDER_NUDGE)
+
+
+def _common_windows(
+    shape: tuple[int, int], first: tuple[int, int], part: tuple[int, int]
+) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
+    """Windows of a grid and of a part of it that show the same cells.
+
+    Parameters
+    ----------
+    shape, part : (int, int)
+        Rows and columns of both.
+    first : (int, int)
+        Row and column of the part's first cell, which may lie outside, as may others.
+    """
+    low = [min(max(0, start), size) for start, size in zip(first, shape, strict=True)]
     high = [
-        min(size, start + count)
-        for size, start, count in zip(labels.shape[::-1], first, shape[::-1], strict=True)
+        max(begin, min(size, start + count))
+        for begin, size, start, count in zip(low, shape, first, part, strict=True)
     ]
-    if low[0] < high[0] and low[1] < high[1]:
-        rows, columns = (
-            slice(low[1] - first[1], high[1] - first[1]),
-            slice(low[0] - first[0], high[0] - first[0]),
-        )
-        result[rows, columns] = labels[low[1] : high[1], low[0] : high[0]]
-    return result
+    return (
+        tuple(slice(begin, end) for begin, end in zip(low, high, strict=True)),
+        tuple(slice(begin - at, end - at) for begin, end, at in zip(low, high, first, strict=True)),
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +125,7 @@ class RegionShape:
     packed: NDArray[np.uint8]
     area_m2: float
 
-    @property
+    @cached_property
     def box_m(self) -> FloatArray:
         """World box (4,) x0, y0, x1, y1 around the cut-out."""
         corners = self.geometry.corners_m()
@@ -99,7 +135,7 @@ class RegionShape:
     def mask(self) -> BoolArray:
         """The cells of the cut-out (H, W)."""
         count = self.geometry.shape[0] * self.geometry.shape[1]
-        return np.unpackbits(self.packed, count=count).reshape(self.geometry.shape).astype(bool)
+        return np.unpackbits(self.packed, count=count).reshape(self.geometry.shape).view(bool)
 
     def moved(self, motion: RigidMotion) -> RegionShape:
         """The same cells where a motion of the map brings them."""
@@ -107,34 +143,27 @@ class RegionShape:
 
     def common_area_m2(self, labels: NDArray[np.int32], geometry: GridGeometry, count: int) -> FloatArray:
         """Area (count,) in square meters that this one shares with the rooms 1..count of another map."""
-        under = resample_labels(labels, geometry, self.geometry)[self.mask]
+        origin, by_row, _ = _cells_under(geometry, self.geometry)
+        if (first := _first_cell(origin, by_row)) is not None:
+            here, there = _common_windows(geometry.shape, first, self.geometry.shape)
+            under = labels[here][self.mask[there]]
+        else:
+            under = resample_labels(labels, geometry, self.geometry)[self.mask]
         cells = np.bincount(under, minlength=count + 1)[1 : count + 1].astype(np.float64)
         return cells * self.geometry.cell_area_m2
 
 
-def cut_out_rooms(
-    labels: NDArray[np.int32], geometry: GridGeometry, count: int
-) -> tuple[RegionShape | None, ...]:
-    """Shapes of the rooms 1..count of a map, None for one without cells.
-
-    Parameters
-    ----------
-    labels : (H, W) int32
-    geometry : GridGeometry
-        Where they lie.
-    count : int
-        Number of rooms.
-    """
-    from scipy.ndimage import find_objects
-
+def cut_out_rooms(rooms: RoomMap) -> tuple[RegionShape | None, ...]:
+    """Shapes of the rooms of a map, None for one without cells."""
     shapes: list[RegionShape | None] = []
-    for number, place in enumerate(find_objects(labels, max_label=count), start=1):
-        if place is None:
+    for number, window in enumerate(rooms.windows, start=1):
+        if window is None:
             shapes.append(None)
             continue
-        mask = labels[place] == number
-        cut = geometry.part(place)
-        shapes.append(RegionShape(cut, np.packbits(mask), float(mask.sum()) * cut.cell_area_m2))
+        mask = rooms.labels[window] == number
+        cut = rooms.geometry.part(window)
+        cells = int(np.count_nonzero(mask))
+        shapes.append(RegionShape(cut, np.packbits(mask), cells * cut.cell_area_m2))
     return tuple(shapes)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,6 +77,11 @@ class RoomTracker:
         Thresholds.
     occupancy : OccupancyParameters, optional
         Which cells are walls.
+
+    Attributes
+    ----------
+    shapes : tuple of RegionShape or None
+        The rooms of the last map, cut out; None for one without cells.
     """
 
     def __init__(self, parameters: TrackingParameters, occupancy: OccupancyParameters | None = None) -> None:
@@ -83,6 +89,7 @@ class RoomTracker:
         self._occupancy = occupancy
         self._aligner = MapAligner(parameters, occupancy)
         self._tracks = _Tracks()
+        self.shapes: tuple[RegionShape | None, ...] = ()
 
     def begin_part(self) -> None:
         """Forget all rooms, as the next map does not grow from the ones before; numbers go on."""
@@ -112,7 +119,7 @@ class RoomTracker:
         """
         rooms = analysis if isinstance(analysis, RoomMap) else analysis.rooms
         events = self._move(snapshot)
-        shapes = cut_out_rooms(rooms.labels, rooms.geometry, len(rooms))
+        self.shapes = shapes = cut_out_rooms(rooms)
         overlaps = self._overlaps(rooms, shapes)
         ids = self._assign(overlaps)
         events += self._name(snapshot.index, overlaps, ids)
@@ -133,17 +140,24 @@ class RoomTracker:
         areas = np.array([0.0 if shape is None else shape.area_m2 for shape in shapes])
         boxes = np.array([np.full(4, np.nan) if shape is None else shape.box_m for shape in shapes])
         boxes = boxes.reshape(-1, 4)
+        memories = self._tracks.memory.values()
+        known = [shape for memory in memories for shape in memory.shapes]
+        ends = np.cumsum([0, *(len(memory.shapes) for memory in memories)]).tolist()
+        their_boxes = np.array([shape.box_m for shape in known]).reshape(-1, 1, 4)
+        meet = (boxes[:, :2] < their_boxes[..., 2:]) & (boxes[:, 2:] > their_boxes[..., :2])
+        common = np.zeros((len(known), len(areas)))
+        for row in np.unique(np.nonzero(meet.all(axis=2))[0]).tolist():
+            common[row] = known[row].common_area_m2(rooms.labels, rooms.geometry, len(areas))
+        sizes = np.array([shape.area_m2 for shape in known]).reshape(-1, 1)
+        smaller = np.minimum(sizes, areas)
+        # Between grids of different resolution or yaw, sampling may count a little more than there is.
+        common = np.minimum(common, smaller)
+        iou = share_of(common, sizes + areas - common)
+        is_part = (common > 0) & (common >= self._parameters.part_min_share * smaller)
+        newest = np.array(ends[1:], np.int64) - 1
         tracks = np.array(list(self._tracks.memory), np.int64)
-        newest, is_part = np.zeros((len(tracks), len(areas))), np.zeros((len(tracks), len(areas)), bool)
-        every_iou = []
-        for row, memory in enumerate(self._tracks.memory.values()):
-            common = np.array([_common(shape, rooms, boxes, areas) for shape in memory.shapes])
-            sizes = np.array([shape.area_m2 for shape in memory.shapes])[:, None]
-            every_iou.append(share_of(common, sizes + areas - common))
-            newest[row] = every_iou[-1][-1]
-            smaller = np.minimum(sizes[-1], areas)
-            is_part[row] = (common[-1] > 0) & (common[-1] >= self._parameters.part_min_share * smaller)
-        return _Overlaps(tracks, every_iou, newest, is_part)
+        of_track = [iou[begin:end] for begin, end in pairwise(ends)]
+        return _Overlaps(tracks, of_track, iou[newest], is_part[newest])
 
     def _assign(self, overlaps: _Overlaps) -> NDArray[np.int64]:
         """Track of each room, 0 for a new one."""
@@ -213,13 +227,3 @@ class RoomTracker:
             del tracks.lost[track], tracks.memory[track]
         tracks.present = tuple(sorted(now))
         return [RoomEvent("lost", index, track) for track in gone]
-
-
-def _common(shape: RegionShape, rooms: RoomMap, boxes: FloatArray, areas: FloatArray) -> FloatArray:
-    """Area (R,) in square meters that a shape shares with each room; rooms have boxes (R, 4)."""
-    box = shape.box_m
-    if not np.any(np.all((boxes[:, :2] < box[2:]) & (boxes[:, 2:] > box[:2]), axis=1)):
-        return np.zeros(len(areas))
-    common = shape.common_area_m2(rooms.labels, rooms.geometry, len(areas))
-    # Between grids of different resolution or yaw, sampling may count a little more than there is.
-    return np.minimum(common, np.minimum(shape.area_m2, areas))

@@ -14,6 +14,7 @@ from rose2_logs.config.tracking import TrackingParameters
 from rose2_logs.model.rooms import RoomMap
 from rose2_logs.tracking.convergence import Convergence, RoomRows, measure_convergence
 from rose2_logs.tracking.layout_change import LayoutFollower, variation_of_information
+from rose2_logs.tracking.matching import cut_out_rooms
 from rose2_logs.tracking.registration import RigidMotion
 from rose2_logs.tracking.track_history import SnapshotRef, TrackHistories
 from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot
@@ -28,7 +29,7 @@ def changes(*maps) -> list[tuple[float | None, float | None]]:
     found = []
     for labels, track_ids in maps:
         _, analysis = drawn(labels)
-        change = follower.update(analysis.rooms, track_ids, None)
+        change = follower.update(analysis.rooms, cut_out_rooms(analysis.rooms), track_ids, None)
         found.append((change.variation_bits, change.changed_share))
     return found
 
@@ -65,8 +66,8 @@ def test_rooms_are_compared_where_the_map_moved_to():
         moved = MOTION.grid(rooms[-1].geometry)
         rooms.append(RoomMap.from_labels(labels, moved))
     follower = LayoutFollower()
-    follower.update(rooms[0], (1, 2, 3), None)
-    found = [follower.update(later, (1, 2, 3), MOTION) for later in rooms[1:]]
+    follower.update(rooms[0], cut_out_rooms(rooms[0]), (1, 2, 3), None)
+    found = [follower.update(later, cut_out_rooms(later), (1, 2, 3), MOTION) for later in rooms[1:]]
     assert [change.changed_share for change in found] == [0.0, 0.0]
     corner = rooms[-1].geometry
     assert found[-1].drift.pose == pytest.approx((*corner.origin_xy_m, corner.yaw_rad))
