@@ -49,14 +49,17 @@ def _is_compact(shape: BaseGeometry, elongation: float) -> bool:
 
 
 def _is_corridor(shape: BaseGeometry, parameters: KindParameters) -> bool:
-    smooth = _smooth(shape, parameters)
+    filled = _filled(shape, parameters)
+    if _is_compact(filled, parameters.corridor_min_elongation):
+        return False
+    smooth = _cut_back(filled, parameters.detail_m)
     width_m = 2 * shapely.maximum_inscribed_circle(smooth, tolerance=parameters.detail_m / 10).length
     is_long = smooth.area >= parameters.corridor_min_elongation * width_m**2
     return bool(is_long and parameters.corridor_min_width_m <= width_m <= parameters.corridor_max_width_m)
 
 
-def _smooth(shape: BaseGeometry, parameters: KindParameters) -> BaseGeometry:
-    """Fill furniture, pillars and notches, and take away what juts out, up to twice a detail in width.
+def _filled(shape: BaseGeometry, parameters: KindParameters) -> BaseGeometry:
+    """Fill furniture, pillars and notches, up to twice a detail in width.
 
     Of a shape in many pieces, specks that are smaller than a detail do not count.
     """
@@ -64,14 +67,19 @@ def _smooth(shape: BaseGeometry, parameters: KindParameters) -> BaseGeometry:
     parts = shapely.get_parts(shape)
     areas = shapely.area(parts)
     large = parts[areas >= min(detail_m**2, areas.max())]
-    whole = shapely.union_all([_filled(part, parameters) for part in large])
-    filled = whole.buffer(detail_m, join_style="mitre").buffer(-detail_m, join_style="mitre")
-    smooth = filled.buffer(-detail_m, join_style="mitre").buffer(detail_m, join_style="mitre")
-    # A shape that is nowhere wider than that stays.
-    return smooth.simplify(detail_m) if smooth.area > filled.area / 2 else filled
+    for number in shapely.get_num_interior_rings(large).nonzero()[0]:
+        large[number] = _without_islands(large[number], parameters.island_max_m2)
+    grown = shapely.union_all(large).buffer(detail_m, join_style="mitre")
+    return grown.buffer(-detail_m, join_style="mitre")
 
 
-def _filled(part: shapely.Polygon, parameters: KindParameters) -> shapely.Polygon:
+def _without_islands(part: shapely.Polygon, most_m2: float) -> shapely.Polygon:
     """Fill the small holes of a polygon."""
-    holes = [hole for hole in part.interiors if shapely.Polygon(hole).area > parameters.island_max_m2]
+    holes = [hole for hole in part.interiors if shapely.Polygon(hole).area > most_m2]
     return shapely.Polygon(part.exterior, holes)
+
+
+def _cut_back(filled: BaseGeometry, detail_m: float) -> BaseGeometry:
+    """Take away what juts out, up to twice a detail in width; a shape that is nowhere wider stays."""
+    smooth = filled.buffer(-detail_m, join_style="mitre").buffer(detail_m, join_style="mitre")
+    return smooth.simplify(detail_m) if smooth.area > filled.area / 2 else filled
