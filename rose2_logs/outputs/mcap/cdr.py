@@ -6,7 +6,9 @@ than the analysis of the map.
 
 from __future__ import annotations
 
+import re
 import struct
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +17,18 @@ ENCAPSULATION = b"\0\1\0\0"
 """Start of each message: plain CDR, little endian. Fields are aligned relative to the byte after it."""
 SIZES = {code: struct.calcsize(f"<{code}") for code in "BiIfd"}
 """Size in bytes of each `struct` type that is written."""
+LARGEST = max(SIZES.values())
+
+
+@lru_cache(maxsize=None)
+def _layout(types: str, offset: int) -> struct.Struct:
+    """Lay out numbers from an offset on, each aligned to its own size."""
+    layout, end = "<", offset
+    for count, code in re.findall(r"(\d*)(\D)", types):
+        gap = -end % SIZES[code]
+        layout += f"{gap}x{count}{code}"
+        end += gap + int(count or 1) * SIZES[code]
+    return struct.Struct(layout)
 
 
 class CdrWriter:
@@ -23,10 +37,10 @@ class CdrWriter:
     def __init__(self) -> None:
         self._data = bytearray(ENCAPSULATION)
 
-    def numbers(self, code: str, *values: float) -> None:
-        """Append numbers of one `struct` type."""
-        self._align(SIZES[code])
-        self._data += struct.pack(f"<{len(values)}{code}", *values)
+    def numbers(self, types: str, *values: float) -> None:
+        """Append numbers of `struct` types, such as "3id": three integers, then a double."""
+        offset = (len(self._data) - len(ENCAPSULATION)) % LARGEST
+        self._data += _layout(types, offset).pack(*values)
 
     def written(self, fields: bytes, alignment: int) -> None:
         """Append fields that are already serialized and start at a multiple of `alignment` bytes."""
@@ -53,8 +67,7 @@ class CdrWriter:
     def time(self, nanoseconds: int) -> None:
         """Append a builtin_interfaces/Time."""
         seconds, rest = divmod(nanoseconds, 10**9)
-        self.numbers("i", seconds)
-        self.numbers("I", rest)
+        self.numbers("iI", seconds, rest)
 
     def header(self, stamp_ns: int, frame_id: str) -> None:
         """Append a std_msgs/Header."""

@@ -191,14 +191,13 @@ class MessageMaker:
         rooms, tracks = step.analysis.rooms, step.track_ids
         message = CdrWriter()
         message.header(step.snapshot.stamp_ns, step.analysis.geometry.frame_id)
-        message.numbers("d", step.coverage)
-        message.numbers("I", len(rooms), len(rooms))  # the count, and the length of the sequence
+        message.numbers("d2I", step.coverage, len(rooms), len(rooms))  # the count, the sequence's length
         points = np.nan_to_num(rooms.label_points_m).tolist()
         for track, number in sorted(zip(tracks, range(1, len(rooms) + 1), strict=True)):
             shape = rooms.polygons[number - 1]
             message.numbers("I", track)
             message.string(step.given_name(number - 1))
-            message.numbers("d", float(rooms.areas_m2[number - 1]), shape.area, *points[number - 1], 0.0)
+            message.numbers("5d", float(rooms.areas_m2[number - 1]), shape.area, *points[number - 1], 0.0)
             rings = rooms.outer_rings_m[number - 1]
             message.numbers("I", len(rings))
             for ring in rings:
@@ -307,11 +306,10 @@ class SharedFields(NamedTuple):
         after_points.string("")  # texture_resource
         after_points.header(stamp_ns, frame_id)  # texture: an empty picture
         after_points.string("")
-        after_points.numbers("I", 0, 0)  # data of the texture, uv_coordinates
+        after_points.numbers("2I", 0, 0)  # data of the texture, uv_coordinates
         after_text.string("")  # mesh_resource
         after_text.string("")  # mesh_file: its name and data
-        after_text.numbers("I", 0)
-        after_text.numbers("B", 0)  # mesh_use_embedded_materials
+        after_text.numbers("IB", 0, 0)  # and mesh_use_embedded_materials
         return cls(*(bytes(each.fields()) for each in (header, after_points, after_text)))
 
 
@@ -352,13 +350,17 @@ class Marker:
     def write(self, message: CdrWriter, shared: SharedFields, height_m: float) -> None:
         """Append the marker, at a height above the map."""
         width_m = self.width_m
+        lifetime, frame_locked = (0, 0), 0  # forever; where it was
         message.written(shared.header, 4)
         message.string(self.ns)
-        message.numbers("i", self.number, self.kind, self.action)
-        message.numbers("d", *self.position_m, height_m, *NO_TURN, width_m, width_m, width_m)
-        message.numbers("f", *self.color)
-        message.numbers("i", 0, 0)  # lifetime: forever
-        message.numbers("B", 0)  # frame_locked
+        message.numbers(
+            "3i10d4f2iB",
+            *(self.number, self.kind, self.action),
+            *(*self.position_m, height_m, *NO_TURN, width_m, width_m, width_m),
+            *self.color,
+            *lifetime,
+            frame_locked,
+        )
         message.points(self.points_m)
         message.written(shared.after_points, 4)
         message.string(self.text)
@@ -376,10 +378,9 @@ def _grid(step: TrackedSnapshot, cells: NDArray[np.int8]) -> bytearray:
     message = CdrWriter()
     message.header(stamp_ns, geometry.frame_id)
     message.time(stamp_ns)  # map_load_time
-    message.numbers("f", geometry.resolution_m)
-    message.numbers("I", geometry.shape[1], geometry.shape[0])
+    message.numbers("f2I", geometry.resolution_m, geometry.shape[1], geometry.shape[0])
     half = geometry.yaw_rad / 2
-    message.numbers("d", *geometry.origin_xy_m, 0.0, 0.0, 0.0, float(np.sin(half)), float(np.cos(half)))
+    message.numbers("7d", *geometry.origin_xy_m, 0.0, 0.0, 0.0, float(np.sin(half)), float(np.cos(half)))
     message.sequence(cells.astype(np.int8, copy=False).ravel())
     return message.message()
 
