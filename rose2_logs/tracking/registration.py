@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rose2_logs.config.parameters import OccupancyParameters
 from rose2_logs.config.tracking import TrackingParameters
@@ -90,7 +93,7 @@ class MapAligner:
     def __init__(self, tracking: TrackingParameters, occupancy: OccupancyParameters | None = None) -> None:
         self._tracking = tracking
         self._occupancy = occupancy or OccupancyParameters()
-        self._before: WallSample | None = None
+        self._before: WallFit | None = None
 
     def update(self, snapshot: OccupancySnapshot) -> RigidMotion | None:
         """Take the next map of the run.
@@ -106,37 +109,50 @@ class MapAligner:
             The motion, in the world frame, of what both maps show; None where it is less than `shift_min_m`
             on average, or the walls do not determine it.
         """
-        points = wall_points(snapshot, self._occupancy)
+        geometry = snapshot.geometry
+        row, column = _face_cells(*classify(snapshot.cells, self._occupancy))
         before, self._before = self._before, None
-        if len(points) < self._tracking.fit_min_points:
+        if len(row) < self._tracking.fit_min_points:
             return None
-        fit = WallFit(points, snapshot.geometry.resolution_m, self._tracking)
-        self._before = fit.sample()
+        points = geometry.cell_centers(row, column)
+        fit = self._before = WallFit(points, geometry.resolution_m, self._tracking)
         if before is None:
             return None
-        motion = fit.best(before)
-        moved = np.linalg.norm(motion.points(before.points) - before.points, axis=1).mean()
+        is_wall = np.zeros(geometry.shape, bool)
+        is_wall[row, column] = True
+        if fit.is_sure_of(_share_on(is_wall, geometry, before.chosen)):
+            motion = _staying(before.chosen)
+        else:
+            motion = fit.best(before.sample())
+        moved = np.linalg.norm(motion.points(before.chosen) - before.chosen, axis=1).mean()
         return motion if moved >= self._tracking.shift_min_m else None
 
 
-def wall_points(snapshot: OccupancySnapshot, parameters: OccupancyParameters) -> FloatArray:
-    """World centers (N, 2) of the occupied cells next to free ones: the faces of walls."""
-    return wall_faces(*classify(snapshot.cells, parameters), snapshot.geometry)
-
-
 def wall_faces(free: BoolArray, occupied: BoolArray, geometry: GridGeometry) -> FloatArray:
-    """Do the same for a map whose cells (H, W) are already classified."""
-    return geometry.cell_centers(*np.nonzero(occupied & _beside(free)))
+    """World centers (N, 2) of the occupied cells (H, W) next to free ones: the faces of walls."""
+    return geometry.cell_centers(*_face_cells(free, occupied))
 
 
-def _beside(mask: BoolArray) -> BoolArray:
-    """Cells that share a side with one of a mask."""
-    beside = np.zeros_like(mask)
-    beside[1:] |= mask[:-1]
-    beside[:-1] |= mask[1:]
-    beside[:, 1:] |= mask[:, :-1]
-    beside[:, :-1] |= mask[:, 1:]
-    return beside
+def _face_cells(free: BoolArray, occupied: BoolArray) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Row and column (N,) of the occupied cells that share a side with a free one."""
+    row, column = np.nonzero(occupied)
+    framed = np.pad(free, 1)
+    is_face = framed[row, column + 1] | framed[row + 2, column + 1]
+    is_face |= framed[row + 1, column] | framed[row + 1, column + 2]
+    return row[is_face], column[is_face]
+
+
+def _share_on(mask: BoolArray, geometry: GridGeometry, points: FloatArray) -> float:
+    """Share of world points (N, 2) that lie in cells of a mask (H, W)."""
+    row, column = geometry.world_to_cell(points).T
+    inside = (row >= 0) & (row < mask.shape[0]) & (column >= 0) & (column < mask.shape[1])
+    return np.count_nonzero(mask[row[inside], column[inside]]) / len(points)
+
+
+def _staying(points: FloatArray) -> RigidMotion:
+    """No motion of some points (N, 2)."""
+    center = points.mean(axis=0)
+    return RigidMotion.moving(center, center, 0.0)
 
 
 def evenly(points: FloatArray, most: int) -> FloatArray:
@@ -168,18 +184,35 @@ class WallFit:
     """
 
     def __init__(self, points: FloatArray, resolution_m: float, parameters: TrackingParameters) -> None:
-        from scipy.spatial import cKDTree
-
         self._points = points
         self._parameters = parameters
-        self._tree: cKDTree = cKDTree(points)
+        self._resolution_m = resolution_m
         least = parameters.fit_gate_min_cells * resolution_m
         gates_m = (getattr(parameters, f"fit_gate_{step}_m") for step in (1, 2, 3, 4))
         self._gates = tuple(max(gate, least) for gate in gates_m)
 
+    @cached_property
+    def _tree(self) -> cKDTree:
+        from scipy.spatial import cKDTree
+
+        return cKDTree(self._points)
+
+    @property
+    def chosen(self) -> FloatArray:
+        """Some points (N, 2) of the walls."""
+        return evenly(self._points, self._parameters.fit_points)
+
+    def is_sure_of(self, share: float) -> bool:
+        """Whether walls stay of which a share lies in wall cells here: no motion could bring many more there.
+
+        In most maps of a run that decides, without a search for the nearest walls.
+        """
+        half_diagonal_m = self._resolution_m * math.sqrt(0.5)
+        return self._gates[-1] > half_diagonal_m and share + self._parameters.fit_better_share > 1
+
     def sample(self) -> WallSample:
         """Some of the walls, to be laid over those of the next map."""
-        points = evenly(self._points, self._parameters.fit_points)
+        points = self.chosen
         _, nearest = self._tree.query(points, k=self._parameters.fit_neighbors)
         around = self._points[nearest] - self._points[nearest].mean(axis=1, keepdims=True)
         x, y = around[..., 0], around[..., 1]
@@ -191,7 +224,7 @@ class WallFit:
         """Motion of walls that brings most of them to walls; staying unless another is better."""
         points, parameters = walls.points, self._parameters
         center = points.mean(axis=0)
-        staying = RigidMotion.moving(center, center, 0.0)
+        staying = _staying(points)
         least = max(self.share(points, staying) + parameters.fit_better_share, parameters.shift_min_share)
         if least > 1:
             return staying

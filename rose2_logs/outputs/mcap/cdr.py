@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 import struct
-from functools import lru_cache
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ SIZES = {code: struct.calcsize(f"<{code}") for code in "BiIfd"}
 LARGEST = max(SIZES.values())
 
 
-@lru_cache(maxsize=None)
+@cache
 def _layout(types: str, offset: int) -> struct.Struct:
     """Lay out numbers from an offset on, each aligned to its own size."""
     layout, end = "<", offset
