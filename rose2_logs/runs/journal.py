@@ -28,7 +28,7 @@ from rose2_logs.system.workers import Workers
 Found = SnapshotAnalysis | InvalidMapError
 """What comes of one map, or why nothing does."""
 
-MAGIC = b"rose2_logs journal 2\n"
+MAGIC = b"rose2_logs journal 3\n"
 """At the beginning of the file, with the number of its layout."""
 COMPRESSION_LEVEL = 1
 """Of zstd: what is gained above it is little and takes longer."""

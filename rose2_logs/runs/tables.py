@@ -66,7 +66,7 @@ def snapshot_row(step: TrackedSnapshot, ref: SnapshotRef) -> Row:
         "clean_threshold": None if structure is None else float(structure.threshold),
         "wall_segments": 0 if walls is None else len(walls.segments_m),
         "lines": 0 if walls is None else len(walls.lines_m),
-        "faces": 0 if plan is None else len(plan.faces),
+        "faces": 0 if plan is None else len(plan.faces_wkb),
         "repeats_before": snapshot.repeats_before,
         "frame_id": geometry.frame_id,
         "resolution_m": geometry.resolution_m,

@@ -375,7 +375,7 @@ def _floor_plan(
         edges_m=explored.segments(plan.graph.edges_m),
         edge_weight=plan.evidence.weight,
         edge_faces=plan.graph.edge_faces,
-        faces=tuple(shapely.transform(plan.graph.polygons, explored.points)),
+        faces_wkb=tuple(shapely.to_wkb(shapely.transform(plan.graph.polygons, explored.points)).tolist()),
         face_inside=plan.seen >= parameters.face_min_seen,
         room_of_face=room_of_face,
     )
