@@ -140,15 +140,18 @@ def stretches_of(
     line : (K,) int
         Index of the line of each.
     """
-    counts = np.ceil(np.hypot(*(lines[:, 1] - lines[:, 0]).T) / step).astype(np.intp)
+    begin, along = lines[:, 0], lines[:, 1] - lines[:, 0]
+    counts = np.ceil(np.hypot(*along.T) / step).astype(np.intp)
     line = np.repeat(np.arange(len(lines)), counts)
     number = np.arange(len(line)) - np.repeat(np.cumsum(counts) - counts, counts)
-    begin, along = lines[line, 0], lines[line, 1] - lines[line, 0]
-    inside = is_inside(begin + ((number + 0.5) / counts[line])[:, None] * along)
+    samples = np.repeat(along, counts, axis=0)
+    samples *= ((number + 0.5) / np.repeat(counts, counts))[:, None]
+    samples += np.repeat(begin, counts, axis=0)
+    inside = is_inside(samples)
     # A stretch begins and ends where the sample before and after is outside or of another line.
     is_new = np.diff(line, prepend=-1) != 0
     first = np.flatnonzero(inside & (is_new | ~np.roll(inside, 1)))
     last = np.flatnonzero(inside & (np.roll(is_new, -1) | ~np.roll(inside, -1)))
     line = line[first]
     shares = np.stack([number[first], number[last] + 1], axis=1) / counts[line, None]
-    return begin[first, None] + shares[..., None] * along[first, None], line
+    return begin[line, None] + shares[..., None] * along[line, None], line

@@ -42,9 +42,12 @@ class ParquetTable:
     """
 
     def __init__(self, path: Path, schema: pa.Schema) -> None:
+        import pyarrow as pa
+
         self.part = part_of(path)
         self._path = path
         self._schema = schema
+        self._binary = [field.name for field in schema if pa.types.is_binary(field.type)]
         self._rows: list[Row] = []
         self._held_bytes = 0
         self._batches: list[pa.RecordBatch] = []
@@ -67,9 +70,7 @@ class ParquetTable:
             If the file cannot be written.
         """
         self._rows += rows
-        self._held_bytes += sum(
-            len(value) for row in rows for value in row.values() if isinstance(value, bytes)
-        )
+        self._held_bytes += sum(len(row[name] or b"") for name in self._binary for row in rows)
         if len(self._rows) >= ROWS_PER_BATCH:
             self._pack()
         held = sum(batch.num_rows for batch in self._batches)

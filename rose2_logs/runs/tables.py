@@ -208,16 +208,20 @@ def map_row(step: TrackedSnapshot, parameters: OccupancyParameters) -> Row:
         "rows": rows.stop - rows.start,
         "columns": columns.stop - columns.start,
         "cells_zstd": pack_image(cells, lambda part: cell_classes(part, parameters)),
-        "labels_zstd": pack_image(labels, lambda part: track_of_room[part]),
+        "labels_zstd": pack_image(labels, lambda part: track_of_room.take(part, mode="clip")),
     }
 
 
 def cell_classes(cells: NDArray[np.int8], parameters: OccupancyParameters) -> NDArray[np.int8]:
     """Classes of cells: -1 unknown, `FREE`, `BETWEEN` the thresholds, `OCCUPIED`."""
-    free, occupied = classify(cells, parameters)
-    classes = np.where(cells == UNKNOWN, np.int8(UNKNOWN), np.int8(BETWEEN))
+    import cv2
+
+    values = np.arange(256, dtype=np.uint8).view(np.int8)
+    free, occupied = classify(values, parameters)
+    classes = np.where(values == UNKNOWN, np.int8(UNKNOWN), np.int8(BETWEEN))
     classes[free], classes[occupied] = FREE, OCCUPIED
-    return classes
+    found = cv2.LUT(np.ascontiguousarray(cells).view(np.uint8), classes.view(np.uint8))
+    return np.asarray(found, np.uint8).view(np.int8)
 
 
 def pack_image(image: NDArray[Any], convert: Callable[[NDArray[Any]], NDArray[Any]] = np.asarray) -> bytes:
