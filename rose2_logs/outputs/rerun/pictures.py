@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 import cv2
 import numpy as np
@@ -52,7 +52,8 @@ class MapPictures:
         shades = _shades()
         colors = np.array([track_color(track) for track in track_ids], float).reshape(-1, 1, 3)
         painted = FILL_OPACITY * colors + (1 - FILL_OPACITY) * shades
-        return self._picture(self._painted(labels[self._part], [shades, *painted]), height_m)
+        tables = np.concatenate([shades[None], painted])
+        return self._picture(self._painted(labels[self._part], tables), height_m)
 
     def clean_map(self, clean: NDArray[np.bool_], height_m: float) -> Picture:
         """Draw the clean map (H, W): structure black, what was left out of it light gray."""
@@ -66,12 +67,13 @@ class MapPictures:
         return self._picture(np.asarray(shown, np.uint8), height_m, rr.components.Colormap.Inferno)
 
     def _painted(
-        self, labels: NDArray[np.integer] | NDArray[np.bool_], colors: Iterable[FloatArray]
+        self, labels: NDArray[np.integer] | NDArray[np.bool_], colors: FloatArray
     ) -> NDArray[np.uint8]:
-        """Pixels (H, W, 4): for each label 0..K one table (256, 3) of the color of each value of a cell."""
-        opaque = [np.pad(table, ((0, 0), (0, 1)), constant_values=255).astype(np.uint8) for table in colors]
+        """Pixels (H, W, 4): for each label 0..K one of the tables (256, 3) of the color of a cell's value."""
+        opaque = np.full((*colors.shape[:2], 4), 255, np.uint8)
+        opaque[..., :3] = colors
         # A pixel as one number is looked up several times faster than as four.
-        table = np.concatenate(opaque).view(np.uint32).ravel()
+        table = opaque.view(np.uint32).ravel()
         index = labels.astype(np.intp)
         index <<= 8
         index |= self._cells
