@@ -89,11 +89,8 @@ class Workers(Generic[Item, Result]):
                 self._start()
         except BaseException as error:
             self.__exit__(type(error), error, None)
-            if isinstance(error, OSError):  # no space for semaphores, too few processes or files allowed
-                raise WorkerError(
-                    f"{self._count} worker processes cannot start: {error.strerror or error}; "
-                    "give them space in /dev/shm and higher limits, or take workers=1"
-                ) from error
+            if isinstance(error, OSError):  # no space for semaphores, too few files allowed
+                raise self._not_started(error) from error
             raise
         return self
 
@@ -116,10 +113,24 @@ class Workers(Generic[Item, Result]):
             initargs=(self._function, self._folders),
         )
         self._stack.callback(self._pool.shutdown, wait=True, cancel_futures=True)
-        # Submitting a task starts a process if none is idle: the first workers import modules while this
-        # process opens files, the others start as there is work.
-        for _ in range(min(self._count, usable_cpus())):
-            self._pool.submit(_nothing)
+
+    def _submitted(self, pool: ProcessPoolExecutor, item: Item) -> _Task:
+        """Hand an item to the workers.
+
+        This starts one if none is idle. The first has to wait until what it is forked from has imported its
+        modules, which is done while this process opens files and imports its own.
+        """
+        packed = pack(item, self._folders)
+        try:
+            return _Task(pool.submit(_work, packed))
+        except OSError as error:  # too few processes or files allowed
+            raise self._not_started(error) from error
+
+    def _not_started(self, error: OSError) -> WorkerError:
+        return WorkerError(
+            f"{self._count} worker processes cannot start: {error.strerror or error}; "
+            "give them space in /dev/shm and higher limits, or take workers=1"
+        )
 
     def map(
         self,
@@ -155,8 +166,7 @@ class Workers(Generic[Item, Result]):
                 elif known is not None and (result := known(item)) is not None:
                     before = (item, _Task(result=result))
                 else:
-                    packed = pack(item, self._folders)
-                    before = (item, _Task(self._pool.submit(_work, packed)))
+                    before = (item, self._submitted(self._pool, item))
                 pending.append(before)
                 if len(pending) >= LOOK_AHEAD_PER_WORKER * self._count:
                     yield _taken(pending)
@@ -396,10 +406,6 @@ def give_back_freed_memory() -> None:
 
     with suppress(OSError, AttributeError):
         ctypes.CDLL(None).malloc_trim(0)
-
-
-def _nothing() -> None:
-    return
 
 
 def _work(packed: Packed) -> Packed:
