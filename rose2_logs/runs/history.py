@@ -250,29 +250,36 @@ class RunHistory:
         if self._back_projection is not None:
             yield from self._back_projection.back_projected(snapshots)
 
-    def summary(self, rooms: Iterable[RoomRows]) -> RunSummary:
+    def summary(self, rooms: Iterable[RoomRows], threads: int = 1) -> RunSummary:
         """Compare all maps with the last one; after it.
 
         Parameters
         ----------
         rooms : iterable of RoomRows
             Every room of every map, in the order of the maps.
+        threads : int
+            How many compare maps at once.
         """
         followed = list(self._parts.values()) or [self._run]
         part_of = {index: place for place, each in enumerate(followed) for index in each.snapshot_refs}
         # Of a part without rooms there are no rows.
-        found = [self._converged(each, ()) for each in followed]
+        found = [self._converged(each, (), 1) for each in followed]
         for place, rows in groupby(map_by_map(rooms), lambda rows: part_of[int(rows.snapshot[0])]):
-            found[place] = self._converged(followed[place], rows)
+            found[place] = self._converged(followed[place], rows, threads)
         parts = {
             number: RunSummary(each.totals, each.histories, convergence)
             for (number, each), convergence in zip(self._parts.items(), found, strict=False)
         }
         return RunSummary(self.totals, self.histories, Convergence.joined(found), parts)
 
-    def _converged(self, followed: _Followed, rooms: Iterable[RoomRows]) -> Convergence:
+    def _converged(self, followed: _Followed, rooms: Iterable[RoomRows], threads: int) -> Convergence:
         return measure_convergence(
-            rooms, followed.histories, followed.snapshot_refs, self._drifts, self._tracking
+            rooms,
+            followed.histories,
+            followed.snapshot_refs,
+            self._drifts,
+            self._tracking,
+            threads=threads,
         )
 
 

@@ -109,8 +109,15 @@ class RunStore:
         key = snapshot_key(found)
         self._tables[BACK_PROJECTED].add([key | row for row in tables.back_projected_rows(found)])
 
-    def finish(self, history: RunHistory) -> RunSummary:
+    def finish(self, history: RunHistory, threads: int = 1) -> RunSummary:
         """Add what the last map says about earlier ones, and give the tables their names.
+
+        Parameters
+        ----------
+        history : RunHistory
+            That has taken all maps.
+        threads : int
+            How many compare earlier maps with the last one.
 
         Returns
         -------
@@ -125,7 +132,7 @@ class RunStore:
         for table in self._tables.values():
             if table is not self._tables["snapshots"] and table is not self._tables["tracks"]:
                 table.close()
-        summary = history.summary(self._rooms())
+        summary = history.summary(self._rooms(), threads)
         convergence = summary.convergence
         for row in self._along():
             index = row["snapshot"]

@@ -12,7 +12,7 @@ import tempfile
 import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack, contextmanager, suppress
 from functools import lru_cache
@@ -226,6 +226,28 @@ def ordered_map(
     """Yield each item with its result, in the order of the items: `Workers` for a single stream."""
     with Workers(function, workers) as processes:
         yield from processes.map(items)
+
+
+def threaded_map(
+    function: Callable[[Item], Result], items: Iterable[Item], threads: int = 1
+) -> Iterator[tuple[Item, Result]]:
+    """Yield each item with its result, in the order of the items, by several threads of this process.
+
+    For functions that spend their time in libraries which let other threads run meanwhile. Items are read as
+    needed, at most one for each thread ahead; with one thread the work is done in the calling one.
+    """
+    if threads == 1:
+        yield from ((item, function(item)) for item in items)
+        return
+    pending: deque[tuple[Item, Future[Result]]] = deque()
+    with ThreadPoolExecutor(threads) as pool:
+        for item in items:
+            pending.append((item, pool.submit(function, item)))
+            if len(pending) > threads:
+                done, future = pending.popleft()
+                yield done, future.result()
+        for done, future in pending:
+            yield done, future.result()
 
 
 _CONTEXT: Any = multiprocessing.get_context(START_METHOD)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from rose2_logs.config.tracking import TrackingParameters
 from rose2_logs.model.occupancy import FloatArray
+from rose2_logs.system.workers import threaded_map
 from rose2_logs.tracking.overlap import share_of
 from rose2_logs.tracking.registration import RigidMotion
 from rose2_logs.tracking.track_history import SnapshotRef, TrackHistories
@@ -112,6 +113,8 @@ def measure_convergence(
     snapshot_refs: Mapping[int, SnapshotRef],
     drifts: Mapping[int, RigidMotion],
     parameters: TrackingParameters | None = None,
+    *,
+    threads: int = 1,
 ) -> Convergence:
     """Compare the rooms of every map with what they were in the end.
 
@@ -127,13 +130,14 @@ def measure_convergence(
         How each moved since the first one.
     parameters : TrackingParameters, optional
         From when on an area has settled, a shape is that of the last map, and the layout is final.
+    threads : int
+        How many compare maps at once.
     """
     parameters = parameters or TrackingParameters()
     layout = _LastLayout(histories, drifts, parameters.final_room_min_iou)
     measured = Convergence()
     likeness = dict.fromkeys(snapshot_refs, layout.likeness_of_nothing)
-    for of_map in map_by_map(rows):
-        placed = layout.placed(of_map)
+    for of_map, placed in threaded_map(layout.placed, map_by_map(rows), threads):
         iou = _iou_with_last(of_map, placed, histories, drifts)
         _follow_tracks(measured, of_map, iou, histories, snapshot_refs, parameters)
         likeness[int(of_map.snapshot[0])] = layout.likeness(placed)

@@ -35,6 +35,7 @@ from rose2_logs.runs.summary import SUMMARY, write_summary
 from rose2_logs.runs.tables import BACK_PROJECTED, TABLES
 from rose2_logs.system.files import refuse_existing, require_short, require_utf8
 from rose2_logs.system.warnings import WarningLog, collect_warnings, muted
+from rose2_logs.system.workers import usable_processes
 from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot
 
 __all__ = [
@@ -279,7 +280,7 @@ def _follow(
             logger.warning("%s: in the last map, %s", info.origin or info.log_path, note)
         if options.names is not None and names is not None:
             tell_unused(Path(options.names), names.unused(used, tracks))
-        summary = store.finish(history)
+        summary = store.finish(history, usable_processes(options.workers))
         for sink in sinks:
             sink.finish(summary)
     return summary

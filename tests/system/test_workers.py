@@ -7,7 +7,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
@@ -25,6 +25,7 @@ from rose2_logs.system.workers import (
     WorkerProcess,
     Workers,
     ordered_map,
+    threaded_map,
     usable_cpus,
     usable_processes,
 )
@@ -111,6 +112,34 @@ def test_items_are_taken_as_they_are_needed():
         assert taken <= done + 2 * LOOK_AHEAD_PER_WORKER
     results.close()
     assert taken < 40
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_threads_keep_the_order_and_read_a_little_ahead(count: int):
+    """However long each item takes."""
+    taken = []
+
+    def items() -> Iterator[int]:
+        for number in range(12):
+            taken.append(number)
+            yield number
+
+    def slower_first(number: int) -> int:
+        time.sleep(0.02 / (1 + number))
+        return number**2
+
+    for done, found in enumerate(threaded_map(slower_first, items(), count)):
+        assert found == (done, done**2)
+        assert len(taken) <= done + 1 + count
+    assert len(taken) == 12
+
+
+def test_an_error_in_a_thread_arrives_as_it_is():
+    """When the turn of its item comes."""
+    results = threaded_map(refuse_two, range(4), 2)
+    assert [next(results)[0] for _ in range(2)] == [0, 1]
+    with pytest.raises(InvalidMapError, match="two is bad"):
+        next(results)
 
 
 def test_the_script_is_in_its_place_after_processes_were_started(monkeypatch):

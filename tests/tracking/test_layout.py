@@ -237,14 +237,15 @@ def test_a_map_without_rooms_ends_a_final_layout():
 
 
 def test_rows_of_a_map_may_come_in_pieces():
-    """However the rows are read, a map is compared as a whole."""
+    """However the rows are read, a map is compared as a whole; by however many threads."""
     histories, all_rows, snapshot_refs = tracked(*FRONTIER)
     still = dict.fromkeys(snapshot_refs, RigidMotion.none())
     whole = measure_convergence(all_rows, histories, snapshot_refs, still)
     joined = RoomRows.joined(all_rows)
     for size in (1, 2, 5, len(joined.track)):
         pieces = [joined.part(begin, begin + size) for begin in range(0, len(joined.track), size)]
-        assert measure_convergence(pieces, histories, snapshot_refs, still) == whole
+        found = measure_convergence(pieces, histories, snapshot_refs, still, threads=size)
+        assert found == whole
 
 
 def test_tracks_that_few_maps_show_are_brief():
