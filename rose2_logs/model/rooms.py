@@ -156,7 +156,7 @@ class RoomMap:
             of_room[number].append(corners)
         return of_room
 
-    @property
+    @cached_property
     def adjacency(self) -> tuple[tuple[int, int], ...]:
         """Pairs of room numbers, smaller first, that at least one doorway connects; sorted."""
         return tuple(sorted({doorway.rooms for doorway in self.doorways}))

@@ -69,7 +69,7 @@ class RoomTracker:
     are 1, 2, ... in the order of appearance and belong to one room forever.
 
     Memory: `shapes_kept` packed shapes for each track of the last map and for at most `lost_kept` lost ones,
-    and some thousand points of the last map's walls.
+    and the points of the last map's walls.
 
     Parameters
     ----------
