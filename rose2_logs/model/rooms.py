@@ -126,8 +126,9 @@ class RoomMap:
         """
         import cv2
 
-        cells = np.zeros((len(self), 2), np.intp)
+        points = np.full((len(self), 2), np.nan)
         for number, window in enumerate(self.windows):
+            shape = self.polygons[number]
             if window is not None:
                 inside = np.equal(self.labels[window], number + 1).view(np.uint8)
                 framed = cv2.copyMakeBorder(inside, 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=0)
@@ -135,12 +136,11 @@ class RoomMap:
                 row, column = np.nonzero(depth >= LABEL_DEPTH_SHARE * depth.max())
                 down, right = (np.arange(len(n)) @ n / n.sum() for n in (inside.sum(1), inside.sum(0)))
                 middle = np.argmin((row - down) ** 2 + (column - right) ** 2)
-                cells[number] = window[0].start + row[middle], window[1].start + column[middle]
-        points = self.geometry.cell_centers(*cells.T)
-        for number, window in enumerate(self.windows):
-            if window is None:
-                shape = self.polygons[number]
-                points[number] = np.nan if shape.is_empty else shape.representative_point().coords[0]
+                points[number] = self.geometry.cell_centers(
+                    window[0].start + row[middle], window[1].start + column[middle]
+                )
+            elif not shape.is_empty:
+                points[number] = shape.representative_point().coords[0]
         return points
 
     @cached_property
