@@ -41,8 +41,8 @@ class RegionParameters(ParameterBlock):
     answer_views: int = number(
         1,
         "1",
-        "Views that the network sees: the map as it is, and turned by half. The mean of both gained nothing on "
-        "maps left out, for twice the time of the network.",
+        "Views that the network sees: the map as it is, and turned by half. The mean of both gained nothing "
+        "on maps left out, for twice the time of the network.",
         1,
         2,
     )

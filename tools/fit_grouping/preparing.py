@@ -26,7 +26,7 @@ FloatArray = NDArray[np.float64]
 FREE_MIN_GRAY, OCCUPIED_MAX_GRAY = 230, 89
 """What is free and occupied in simulated maps."""
 FIT_VIEWS = 2
-"""Trees are fitted on steadier answers than one view gives: 81.1 of the buildings left out rather than 80.8."""
+"""Trees are fitted on steadier answers than one view gives: 81.1 on buildings left out rather than 80.8."""
 
 
 @dataclass(frozen=True, eq=False)
