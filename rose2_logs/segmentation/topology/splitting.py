@@ -10,6 +10,7 @@ from scipy.ndimage import find_objects
 from shapely import STRtree, box, linestrings
 
 from rose2_logs.config.parameters import TopologyParameters
+from rose2_logs.model.labels import known_window
 from rose2_logs.model.occupancy import BoolArray, FloatArray
 from rose2_logs.segmentation.topology.voronoi import clearance_m, parts_of_room
 
@@ -50,8 +51,15 @@ def split_rooms(
         number += 1
         labels[window][beyond] = number
         if rounds + 1 < parameters.max_rounds:
-            pending += [(room, window, rounds + 1), (number, window, rounds + 1)]
+            pending += [(part, _shrunk(window, labels, part), rounds + 1) for part in (room, number)]
     return labels
+
+
+def _shrunk(window: tuple[slice, slice], labels: NDArray[np.int32], label: int) -> tuple[slice, slice]:
+    """Shrink a window of a label image (H, W) to what holds all of a label."""
+    rows, columns = known_window(labels[window] == label)
+    top, left = window[0].start, window[1].start
+    return slice(top + rows.start, top + rows.stop), slice(left + columns.start, left + columns.stop)
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +76,8 @@ class _Lines:
 
     def near(self, points: NDArray[np.float32]) -> tuple[FloatArray, FloatArray]:
         """Normals and offsets of the lines that meet the box around some points."""
-        near = np.sort(self.tree.query(box(*points.min(0), *points.max(0)), predicate="intersects"))
+        x, y = points.T  # each by itself: NumPy is slow at the minimum of rows of two
+        near = np.sort(self.tree.query(box(x.min(), y.min(), x.max(), y.max()), predicate="intersects"))
         return self.normals[near], self.offsets[near]
 
 
@@ -95,8 +104,11 @@ def _beyond_cut(
     points *= resolution_m
     of_cell = part[row, column]
     one, two = points[of_cell == largest[0] + 1], points[of_cell == largest[1] + 1]
-    candidates = [lines.near(points), _between(one, two, directions_rad, parameters.cut_tail_share)]
-    beyond = _cut(points, one, two, candidates, parameters.split_min_purity)
+    normals, offsets = lines.near(points)
+    beyond = _cut(points, one, two, normals, offsets, parameters.split_min_purity)
+    if beyond is None:
+        normals, offsets = _between(one, two, directions_rad, parameters.cut_tail_share)
+        beyond = _cut(points, one, two, normals, offsets, parameters.split_min_purity)
     return None if beyond is None else (row[beyond], column[beyond])
 
 
@@ -104,18 +116,18 @@ def _cut(
     points: NDArray[np.float32],
     one: NDArray[np.float32],
     two: NDArray[np.float32],
-    candidates: list[tuple[FloatArray, FloatArray]],
+    normals: FloatArray,
+    offsets: FloatArray,
     min_purity: float,
 ) -> BoolArray | None:
-    """Find which points (P,) are on the second part's side of the best line of the first set that divides."""
-    for normals, offsets in candidates:
-        purity = np.array([_purity(one, two, n, d) for n, d in zip(normals, offsets, strict=True)])
-        best = int(purity.argmax()) if len(purity) else -1
-        if best >= 0 and purity[best] >= min_purity:
-            above = points @ normals[best] > offsets[best]
-            beyond: BoolArray = above == ((two @ normals[best] > offsets[best]).mean() > 0.5)
-            return beyond
-    return None
+    """Find which points (P,) are on the second part's side of the best line; None if none divides."""
+    purity = np.array([_purity(one, two, n, d) for n, d in zip(normals, offsets, strict=True)])
+    best = int(purity.argmax()) if len(purity) else -1
+    if best < 0 or purity[best] < min_purity:
+        return None
+    above = points @ normals[best] > offsets[best]
+    beyond: BoolArray = above == ((two @ normals[best] > offsets[best]).mean() > 0.5)
+    return beyond
 
 
 def _purity(one: NDArray[np.float32], two: NDArray[np.float32], normal: FloatArray, offset: float) -> float:

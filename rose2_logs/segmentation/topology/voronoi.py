@@ -16,6 +16,8 @@ from rose2_logs.model.regions import RegionGraph, best_first
 
 DRAWN_BLOCK = 2
 """The graph is drawn by every so many cells: a passage of 30 cm is three of 10 cm wide."""
+ROUNDED_UP = 1 + 1e-6
+"""Numerical: more than single precision rounds off."""
 
 
 def parts_of_room(
@@ -38,9 +40,9 @@ def parts_of_room(
     Returns
     -------
     part : (H, W) int32
-        Parts 1.., 0 outside the room.
+        Parts 1.., 0 outside the room. Pieces too small for a part need not have a number of their own.
     """
-    if _is_one_part(inside, clear, parameters):
+    if _is_one_part(inside, clear, parameters) or _will_join(inside, clear, resolution_m, parameters):
         return inside.astype(np.int32)
     basin = _basins(inside, clear, resolution_m, parameters.summit_reach_m)
     count = int(basin.max()) + 1
@@ -65,6 +67,45 @@ def _is_one_part(inside: BoolArray, clear: NDArray[np.float32], parameters: Topo
         pieces, _ = cv2.connectedComponents((inside & (clear >= level)).astype(np.uint8), connectivity=8)
         if pieces > 2:
             return False
+    return True
+
+
+def _will_join(
+    inside: BoolArray, clear: NDArray[np.float32], resolution_m: float, parameters: TopologyParameters
+) -> bool:
+    """Check whether a room has only one part that is large enough, without dividing it into basins.
+
+    It is so if from each summit some way leads to a higher one that is nowhere too narrow a passage for the
+    lower of the two. For if two large parts were left, such a way would lead from the highest summit of the
+    less open one to a neighbor that it can be joined with. Most rooms pass, and basins take long.
+    """
+    height = np.where(inside, clear, np.float32(-1))
+    cross = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
+    place = np.flatnonzero(inside & (height == cv2.dilate(height, cross)))
+    high = height.ravel()[place]
+    order = np.argsort(-high, kind="stable")
+    place, high = place[order], high[order]
+    piece = cv2.connectedComponents(inside.view(np.uint8), connectivity=4)[1].ravel()
+    for corner in (inside.shape[1] - 1, inside.shape[1] + 1):
+        # Cells of one height that touch by a corner are one summit, and so may hold two pieces together.
+        other = np.minimum(place + corner, inside.size - 1)
+        touch = (piece[other] > 0) & (piece[other] != piece[place]) & (height.ravel()[other] == high)
+        if touch.any():
+            return False
+    # The first has none to join, nor have those of pieces too small for a part.
+    waiting = (np.bincount(piece) * resolution_m**2 >= parameters.split_min_area_m2)[piece[place]]
+    waiting[: int(waiting.argmax()) + 1] = False
+    while waiting.any():
+        first = int(waiting.argmax())
+        is_niche = high[first] < parameters.split_min_clearance_m
+        narrowest = 0.0 if is_niche else parameters.passage_min_ratio * float(high[first]) * ROUNDED_UP
+        wide = (height >= narrowest).view(np.uint8)
+        group = cv2.connectedComponents(wide, connectivity=4)[1].ravel()[place]
+        is_highest = group == 0
+        is_highest[np.unique(group, return_index=True)[1]] = True
+        if is_highest[first]:
+            return False
+        waiting &= is_highest
     return True
 
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from rose2_logs.config.parameters import TopologyParameters
+from rose2_logs.segmentation.topology import voronoi
 from rose2_logs.segmentation.topology.splitting import split_rooms
 from rose2_logs.segmentation.topology.voronoi import clearance_m, parts_of_room, voronoi_lines
 
@@ -139,3 +140,27 @@ def test_the_parts_of_a_mirrored_or_turned_map_are_the_same(change):
     part, changed = parts(walls), parts(np.ascontiguousarray(change(walls)))
     pairs = np.unique(np.column_stack([change(part).ravel(), changed.ravel()]), axis=0)
     assert len(pairs) == 3
+
+
+def test_what_is_seen_to_be_one_part_beforehand_would_be_one_after_dividing_it_as_well(monkeypatch):
+    """Floors with walls and pillars at random: dividing them gives no second part large enough."""
+    parameters = TopologyParameters(split_min_area_m2=1.0, split_min_clearance_m=0.3)
+
+    def large_parts(inside, clear):
+        part = parts_of_room(inside, clear, 0.05, parameters)
+        return int((np.bincount(part.ravel())[1:] * 0.05**2 >= parameters.split_min_area_m2).sum())
+
+    floors = []
+    for seed in range(40):
+        draw = np.random.default_rng(seed)
+        walls = draw.random((120, 140)) < 0.001
+        for _ in range(7):
+            along, first, length = draw.integers((0, 0, 10), (118, 100, 80))
+            window = (slice(along, along + 2), slice(first, first + length))
+            walls[window[:: draw.choice([1, -1])]] = True
+        floors.append((~walls, clearance_m(walls, 0.05, 1.0)))
+    quickly = [large_parts(*floor) for floor in floors]
+    monkeypatch.setattr(voronoi, "_will_join", lambda *_: False)
+    divided = [large_parts(*floor) for floor in floors]
+    assert divided == quickly
+    assert 5 < divided.count(1) < 35  # some of both kinds
