@@ -86,13 +86,15 @@ def detect_segments(
     for part, cells in among.sorted_parts():
         directions = range(len(among.directions_rad))[part]
         reached = np.zeros(len(directions) * count)
-        every = np.broadcast_to(chosen, (len(directions), count))
-        for runs in cells.runs(every, parameters):
-            length = np.where(runs.covered, runs.end - runs.start, 0.0)[runs.of_cell]
-            reached[runs.slot] = np.maximum(reached[runs.slot], length)
+        for runs in cells.runs(np.tile(chosen, len(directions)), parameters):
+            length = np.where(runs.covered, runs.end - runs.start, 0.0)
+            of_slot = np.zeros(len(reached))
+            of_slot[runs.slot] = length.take(runs.of_cell)
+            np.maximum(reached, of_slot, out=reached)
         for number, reach in zip(directions, reached.reshape(len(directions), count), strict=True):
             better = reach > longest + among.resolution_m / 2
-            best[better], longest[better] = number, reach[better]
+            np.copyto(best, np.int32(number), where=better)
+            np.copyto(longest, reach, where=better)
     chosen &= longest >= min_length_m
     members = np.zeros(clean.shape, bool)
     rows = [np.zeros((0, 5))]
@@ -100,9 +102,10 @@ def detect_segments(
         own = chosen & (best == np.arange(len(among.directions_rad))[part, None])
         for runs in cells.runs(own, parameters):
             keep = runs.covered & (runs.end - runs.start >= min_length_m)
-            direction = runs.direction + part.start
-            rows.append(np.column_stack([direction, runs.strip, runs.offset, runs.start, runs.end])[keep])
-            members.ravel()[among.index[runs.slot[keep[runs.of_cell]] % count]] = True
+            direction, strip, offset = cells.lines(runs)
+            rows.append(np.column_stack([direction + part.start, strip, offset, runs.start, runs.end])[keep])
+            on_segment = runs.slot[keep.take(runs.of_cell)]
+            members.ravel()[among.index.take(on_segment % count)] = True
     found = np.concatenate(rows)
     direction, _, offset, start, end = found[np.lexsort((found[:, 3], found[:, 1], found[:, 0]))].T
     return Segments(among.directions_rad, direction.astype(np.int32), offset, start, end), members
