@@ -31,6 +31,14 @@ def row_ends(mask: BoolArray) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArr
     return rows, mask[rows].argmax(1), mask.shape[1] - 1 - mask[rows, ::-1].argmax(1)
 
 
+def distance_from(mask: BoolArray) -> NDArray[np.float32]:
+    """Distance (H, W) of each cell from the nearest one of a mask, in cells."""
+    import cv2
+
+    distance = cv2.distanceTransform((~mask).view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
+    return np.asarray(distance, np.float32)
+
+
 def cells_where(values: NDArray[Scalar], which: Callable[[NDArray[Scalar]], BoolArray]) -> NDArray[np.intp]:
     """Index of the chosen cells into a flattened image, in reading order, without a mask of a large image.
 

@@ -18,7 +18,7 @@ from rose2_logs.errors import ParameterError
 from rose2_logs.model.analysis import FloorPlan, SnapshotAnalysis, Structure, Walls
 from rose2_logs.model.borders import Border
 from rose2_logs.model.explored import ExploredPart
-from rose2_logs.model.labels import label_sizes
+from rose2_logs.model.labels import distance_from, label_sizes
 from rose2_logs.model.occupancy import FloatArray, OccupancySnapshot
 from rose2_logs.model.outlines import room_outlines
 from rose2_logs.model.room_quality import room_quality
@@ -286,9 +286,11 @@ def _rooms_by_walls(
 ) -> _FoundRooms:
     """Faces joined where no wall divides them, and rooms split at narrow places of their Voronoi graph."""
     free, cell_m, lines_m = explored.free, explored.resolution_m, built.lines.ends_m
-    plan = make_floor_plan(lines_m, built.walls, free, strongest_rad, cell_m, parameters.floor_plan)
+    distance = distance_from(built.walls)
+    plan = make_floor_plan(lines_m, built.walls, distance, free, strongest_rad, cell_m, parameters.floor_plan)
     watch.lap("floor_plan")
-    split = split_rooms(plan.labels, built.walls, lines_m, scored.directions_rad, cell_m, parameters.topology)
+    split = split_rooms(plan.labels, distance, lines_m, scored.directions_rad, cell_m, parameters.topology)
+    del distance
     watch.lap("topology")
     finished = make_rooms(split, plan, free, explored.occupied, cell_m, parameters.floor_plan)
     return _FoundRooms(

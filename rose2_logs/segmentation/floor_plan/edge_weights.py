@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
-import cv2
 import numpy as np
 import shapely
 from numpy.typing import NDArray
@@ -59,6 +58,7 @@ def edge_evidence(
     edges_m: FloatArray,
     lines_m: FloatArray,
     walls: BoolArray,
+    distance: NDArray[np.float32],
     free: BoolArray,
     resolution_m: float,
     parameters: FloorPlanParameters,
@@ -73,6 +73,8 @@ def edge_evidence(
         Representative lines.
     walls, free : (H, W) bool
         Cells of walls and free cells.
+    distance : (H, W) float32
+        Of each cell from the nearest wall cell, in cells.
     """
     if len(lines_m) == 0:
         nothing = np.zeros(len(edges_m))
@@ -92,8 +94,7 @@ def edge_evidence(
         value = np.zeros(len(edges_m))
         value[on_line] = (spans[1] - spans[0]) * step
         lengths.append(value)
-    run_share = _passages(line, is_wall, step_m, lines_m, walls, resolution_m, parameters)
-    run_share[~is_free] = 0
+    run_share = _passages(line, is_wall, is_free, step_m, lines_m, distance, resolution_m, parameters)
     share = np.zeros(len(edges_m))
     first = offset[owner] + np.floor(start / step_m[owner] + 0.5).astype(np.int64)
     last = offset[owner] + np.floor(end / step_m[owner] + 0.5).astype(np.int64)
@@ -110,9 +111,10 @@ def edge_evidence(
 def _passages(
     line: NDArray[np.intp],
     is_wall: BoolArray,
+    is_free: BoolArray,
     step_m: FloatArray,
     lines_m: FloatArray,
-    walls: BoolArray,
+    distance: NDArray[np.float32],
     resolution_m: float,
     parameters: FloorPlanParameters,
 ) -> FloatArray:
@@ -127,38 +129,42 @@ def _passages(
     Returns
     -------
     share : (S,) float
-        0 on walls.
+        0 on walls and where nothing is free.
     """
     begins = np.flatnonzero(np.concatenate([[True], (np.diff(line) != 0) | (np.diff(is_wall) != 0)]))
     ends = np.append(begins[1:], len(line))
     run = np.repeat(np.arange(len(begins)), ends - begins)
     run_line = line[begins]
     length = (ends - begins) * step_m[run_line]
-    first_of_line = np.searchsorted(line, run_line)
-    vector = lines_m[run_line, 2:] - lines_m[run_line, :2]
+    gap = _between_jambs(begins, ends, line, is_wall, step_m, parameters)
+    gap &= length <= parameters.doorway_max_width_m
+    # Most stretches are walls, or lie where nothing is free.
+    looked = np.flatnonzero(np.logical_or.reduceat(is_free & ~is_wall, begins))
+    run_line, begin, count = run_line[looked], begins[looked], (ends - begins)[looked]
+    step = step_m[run_line]
+    start = lines_m[run_line, :2]
+    vector = lines_m[run_line, 2:] - start
     vector /= np.maximum(np.hypot(vector[:, 0], vector[:, 1]), 1e-12)[:, None]
-    normal = np.column_stack([-vector[:, 1], vector[:, 0]])
-    distance = _Image(
-        cv2.distanceTransform((~walls).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5), resolution_m
-    )
-    depth = np.minimum(length * parameters.passage_look_widths, parameters.passage_look_max_m)
-    ahead = np.linspace(0, 1, parameters.passage_look_samples)
+    (x, y), (along_x, along_y) = start.T, vector.T
+    image = _Image(distance, resolution_m)
+    depth = np.minimum(length[looked] * parameters.passage_look_widths, parameters.passage_look_max_m)
+    ahead = depth[:, None] * np.linspace(0, 1, parameters.passage_look_samples)
+    from_start = begin - np.searchsorted(line, run_line)
     looks = parameters.passage_look_points + 1
     sides = []
     for sign in (1, -1):
-        widest = np.zeros(len(begins))
+        widest = np.zeros(len(looked))
+        ahead_x, ahead_y = sign * -along_y[:, None] * ahead, sign * along_x[:, None] * ahead
         for part in np.arange(1, looks) / looks:
-            at = (begins - first_of_line + part * (ends - begins)) * step_m[run_line]
-            eye = lines_m[run_line, :2] + vector * at[:, None]
-            points = eye[:, None] + sign * normal[:, None] * (depth[:, None] * ahead)[..., None]
-            met = distance.at(points[..., 0], points[..., 1])
+            at = (from_start + part * count) * step
+            met = image.at((x + along_x * at)[:, None] + ahead_x, (y + along_y * at)[:, None] + ahead_y)
             met = np.where(np.minimum.accumulate(met, axis=1) > 0, met, 0)
             np.maximum(widest, met.max(1), out=widest)
         sides.append(widest * resolution_m)
-    gap = _between_jambs(begins, ends, line, is_wall, step_m, parameters)
-    gap &= length <= parameters.doorway_max_width_m
-    room = 2 * np.maximum(np.where(gap, np.maximum(*sides), np.minimum(*sides)), resolution_m / 2)
-    return np.where(is_wall, 0.0, (length / room)[run])
+    half = np.where(gap[looked], np.maximum(*sides), np.minimum(*sides))
+    share = np.zeros(len(begins))
+    share[looked] = length[looked] / (2 * np.maximum(half, resolution_m / 2))
+    return np.where(is_free & ~is_wall, share[run], 0.0)
 
 
 def _between_jambs(
@@ -205,11 +211,13 @@ def _read_lines(
     count = np.maximum(np.ceil(length / resolution_m).astype(np.int64), 1)
     line = np.repeat(np.arange(len(lines_m)), count)
     position = np.arange(len(line)) - np.repeat(np.cumsum(count) - count, count)
-    center = lines_m[line, :2] + vector[line] * ((position + 0.5) / count[line])[:, None]
-    normal = (np.column_stack([-vector[:, 1], vector[:, 0]]) / np.maximum(length, 1e-12)[:, None])[line]
+    share = (position + 0.5) / count[line]
+    (begin_x, begin_y), (along_x, along_y) = lines_m[:, :2].T, vector.T
+    x, y = begin_x[line] + along_x[line] * share, begin_y[line] + along_y[line] * share
+    across = np.stack([-along_y, along_x]) / np.maximum(length, 1e-12)
+    across_x, across_y = across[0][line], across[1][line]
     # Both masks are looked up at once, one in each bit.
     kinds = _Image(walls * np.uint8(WALL) | free * np.uint8(FREE), resolution_m)
-    (x, y), (across_x, across_y) = center.T.copy(), normal.T.copy()
     met = np.zeros(len(line), np.uint8)
     reach = round(parameters.wall_tolerance_m / resolution_m)
     for step in range(-reach, reach + 1):
@@ -241,14 +249,14 @@ class _Image(Generic[Number]):
         index = self._padded(y_m, self._rows)
         index *= self._columns + 2
         index += self._padded(x_m, self._columns)
-        return self._values.take(index)
+        return self._values.take(index.astype(np.intp))
 
-    def _padded(self, place_m: FloatArray, count: int) -> NDArray[np.intp]:
+    def _padded(self, place_m: FloatArray, count: int) -> FloatArray:
         """Number of the cell in the padded image; all that lies beside the image is in its margin."""
         cell = place_m / self._resolution_m
         np.floor(cell, out=cell)
         cell += 1
-        return np.clip(cell, 0, count + 1, out=cell).astype(np.intp)
+        return np.clip(cell, 0, count + 1, out=cell)
 
 
 def _place_edges(edges_m: FloatArray, lines_m: FloatArray) -> tuple[NDArray[np.intp], FloatArray, FloatArray]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import cv2
@@ -55,10 +56,15 @@ def build_faces(lines_m: FloatArray, frame: shapely.Polygon) -> FaceGraph:
     rings, face_of_ring = shapely.get_rings(polygons, return_index=True)
     points, ring = shapely.get_coordinates(rings, return_index=True)
     inner = np.flatnonzero(ring[1:] == ring[:-1])
-    vertex_key = np.rint(points / SNAP_M).astype(np.int64)
-    vertices, vertex = np.unique(vertex_key, axis=0, return_inverse=True)
-    ends = np.sort(np.column_stack([vertex[inner], vertex[inner + 1]]), axis=1)
-    pairs, edge = np.unique(ends, axis=0, return_inverse=True)
+    # Each vertex is one number, and each pair of vertices, for NumPy is slow at finding distinct rows.
+    lattice = np.rint(points / SNAP_M).astype(np.int64)
+    low = lattice.min(0, initial=0)
+    rows = int(lattice[:, 1].max(initial=0) - low[1]) + 1
+    keys, vertex = np.unique((lattice[:, 0] - low[0]) * rows + lattice[:, 1] - low[1], return_inverse=True)
+    vertices = np.column_stack(np.divmod(keys, rows)) + low
+    one, other = vertex[inner], vertex[inner + 1]
+    ends = np.minimum(one, other) * len(keys) + np.maximum(one, other)
+    pairs, edge = np.unique(ends, return_inverse=True)
     face = face_of_ring[ring[inner]]
     order = np.lexsort((face, edge))
     edge, face = edge[order], face[order]
@@ -67,7 +73,7 @@ def build_faces(lines_m: FloatArray, frame: shapely.Polygon) -> FaceGraph:
     edge_faces = np.full((len(pairs), 2), -1, np.int32)
     edge_faces[edge[~second], 0] = face[~second]
     edge_faces[edge[second], 1] = face[second]
-    edges = vertices[pairs].reshape(-1, 4) * SNAP_M
+    edges = np.column_stack([vertices[ends] for ends in np.divmod(pairs, len(keys))]) * SNAP_M
     return FaceGraph(polygons, edges, edge_faces)
 
 
@@ -81,8 +87,8 @@ def rasterize(
     rings, part = shapely.get_rings(parts, return_index=True)
     points, ring = shapely.get_coordinates(rings, return_index=True)
     corners = np.rint((points / resolution_m - 0.5) * scale).astype(np.int32)
-    ring_ends = np.searchsorted(ring, np.arange(len(rings)), side="right")
-    outlines = np.split(corners, ring_ends[:-1])
+    ring_ends = np.searchsorted(ring, np.arange(len(rings)), side="right").tolist()
+    outlines = [corners[begin:end] for begin, end in itertools.pairwise([0, *ring_ends])]
     part_ends = np.searchsorted(part, np.arange(len(parts)), side="right").tolist()
     begin = 0
     for value, end in zip(values[polygon].tolist(), part_ends, strict=True):
@@ -107,10 +113,13 @@ def free_area(
 
 
 def clearance(
-    face_of_cell: NDArray[np.int32], free: BoolArray, walls: BoolArray, count: int, resolution_m: float
+    face_of_cell: NDArray[np.int32],
+    free: BoolArray,
+    distance: NDArray[np.float32],
+    count: int,
+    resolution_m: float,
 ) -> FloatArray:
-    """Greatest distance (F,) in meters of a free cell of each face from a wall."""
-    distance = cv2.distanceTransform((~walls).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
+    """Greatest distance (F,) in meters of a free cell of each face from a wall; `distance` is in cells."""
     greatest = np.zeros(count + 1, np.float32)
     np.maximum.at(greatest, face_of_cell[free], distance[free])
     return greatest[1:].astype(float) * resolution_m

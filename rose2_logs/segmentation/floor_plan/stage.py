@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from shapely.affinity import rotate
 
 from rose2_logs.config.parameters import FloorPlanParameters
-from rose2_logs.model.labels import row_ends
+from rose2_logs.model.labels import distance_from, row_ends
 from rose2_logs.model.occupancy import BoolArray, FloatArray
 from rose2_logs.segmentation.floor_plan.edge_weights import EdgeEvidence, edge_evidence
 from rose2_logs.segmentation.floor_plan.faces import (
@@ -52,6 +52,7 @@ class FloorPlanResult:
 def make_floor_plan(
     lines_m: FloatArray,
     walls: BoolArray,
+    distance: NDArray[np.float32],
     free: BoolArray,
     direction_rad: float,
     resolution_m: float,
@@ -61,14 +62,25 @@ def make_floor_plan(
 
     The plane is cut within a box along `direction_rad`, the strongest dominant direction: what lies beyond
     counts as unseen, so that a box along the axes of the raster would give other rooms to a turned map.
+
+    Parameters
+    ----------
+    lines_m : (L, 4) float
+        Representative lines.
+    walls : (H, W) bool
+    distance : (H, W) float32
+        Of each cell from the nearest wall cell, in cells.
+    free : (H, W) bool
+    direction_rad, resolution_m : float
+    parameters : FloorPlanParameters
     """
-    plan = cut_by_lines(lines_m, walls, free, direction_rad, resolution_m, parameters)
+    plan = cut_by_lines(lines_m, walls, free, direction_rad, resolution_m, parameters, distance)
     graph, face_of_cell, seen = plan.graph, plan.face_of_cell, plan.seen
     count = len(graph.polygons)
     area = free_area(face_of_cell, free, count, resolution_m)
     # Without any line the map is one face, however little of it was seen.
     inside = (seen >= parameters.face_min_seen) | (count == 1)
-    widest = clearance(face_of_cell, free, walls, count, resolution_m)
+    widest = clearance(face_of_cell, free, distance, count, resolution_m)
     area[~inside] = 0
     group = 1 + group_faces(graph.edge_faces, plan.evidence, area, seen, widest, parameters)
     labels = np.concatenate([np.zeros(1, np.int32), group])[face_of_cell]
@@ -83,13 +95,19 @@ def cut_by_lines(
     direction_rad: float,
     resolution_m: float,
     parameters: FloorPlanParameters,
+    distance: NDArray[np.float32] | None = None,
 ) -> FloorPlanResult:
-    """Faces between lines (L, 4), with the weights of their edges, in no group yet."""
+    """Faces between lines (L, 4), with the weights of their edges, in no group yet.
+
+    The distance (H, W) of cells from the nearest wall cell, in cells, is found here unless it is known.
+    """
     graph = build_faces(
         lines_m, frame_along(free | walls, direction_rad, resolution_m, parameters.frame_margin_m)
     )
     count = len(graph.polygons)
-    evidence = edge_evidence(graph.edges_m, lines_m, walls, free, resolution_m, parameters)
+    if distance is None:
+        distance = distance_from(walls)
+    evidence = edge_evidence(graph.edges_m, lines_m, walls, distance, free, resolution_m, parameters)
     face_of_cell = label_faces(graph, (free.shape[0], free.shape[1]), resolution_m)
     area = free_area(face_of_cell, free, count, resolution_m)
     seen = area / np.maximum(shapely.area(graph.polygons), 1e-12)
@@ -117,7 +135,7 @@ def frame_along(
     if len(rows) == 0:
         return shapely.box(0, 0, known.shape[1] * resolution_m, known.shape[0] * resolution_m)
     corners = np.concatenate([np.column_stack([x, y]) for x in (first, last + 1) for y in (rows, rows + 1)])
-    turned = rotate(shapely.multipoints(corners * resolution_m), -direction_rad, (0, 0), use_radians=True)
+    turned = rotate(shapely.linestrings(corners * resolution_m), -direction_rad, (0, 0), use_radians=True)
     box = shapely.buffer(shapely.envelope(turned), margin_m, join_style="mitre")
     frame: shapely.Polygon = rotate(box, direction_rad, (0, 0), use_radians=True)
     return frame

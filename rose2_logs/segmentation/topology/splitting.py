@@ -17,7 +17,7 @@ from rose2_logs.segmentation.topology.voronoi import clearance_m, parts_of_room
 
 def split_rooms(
     labels: NDArray[np.int32],
-    walls: BoolArray,
+    distance: NDArray[np.float32],
     lines_m: FloatArray,
     directions_rad: FloatArray,
     resolution_m: float,
@@ -29,13 +29,26 @@ def split_rooms(
     where none does, along the dominant direction that does, midway between the parts. A cut touches the cells
     of its own room only.
 
+    Parameters
+    ----------
+    labels : (H, W) int32
+        Room 1.. of each cell, 0 for none.
+    distance : (H, W) float32
+        Of each cell from the nearest wall cell, in cells.
+    lines_m : (L, 4) float
+        Representative lines.
+    directions_rad : (D,) float
+        Dominant directions.
+    resolution_m : float
+    parameters : TopologyParameters
+
     Returns
     -------
     labels : (H, W) int32
         With new numbers for the split off parts, above the old ones.
     """
     labels = labels.copy()
-    clear = clearance_m(walls, resolution_m, parameters.clearance_blur_cells)
+    clear = clearance_m(distance, resolution_m, parameters.clearance_blur_cells)
     lines = _Lines.of(lines_m)
     number = int(labels.max(initial=0))
     pending = [

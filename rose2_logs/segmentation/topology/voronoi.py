@@ -10,7 +10,7 @@ from skimage.morphology import skeletonize
 from skimage.segmentation import watershed
 
 from rose2_logs.config.parameters import TopologyParameters
-from rose2_logs.model.labels import contacts, straight_runs
+from rose2_logs.model.labels import contacts, distance_from, straight_runs
 from rose2_logs.model.occupancy import BoolArray, FloatArray
 from rose2_logs.model.regions import RegionGraph, best_first
 
@@ -133,7 +133,7 @@ def voronoi_lines(
     (N, 4) float
         x0, y0, x1, y1 in meters, in the frame of the cells.
     """
-    clearance = clearance_m(walls, resolution_m, parameters.clearance_blur_cells)
+    clearance = clearance_m(distance_from(walls), resolution_m, parameters.clearance_blur_cells)
     clear = inside & (clearance >= parameters.doorway_min_width_m / 2)
     skeleton = np.pad(skeletonize(clear[::DRAWN_BLOCK, ::DRAWN_BLOCK]), 1)  # type: ignore[no-untyped-call]
     row, column = np.nonzero(skeleton)
@@ -150,9 +150,8 @@ def voronoi_lines(
     return cells[:, [1, 0, 3, 2]] * resolution_m
 
 
-def clearance_m(walls: BoolArray, resolution_m: float, blur_cells: float) -> NDArray[np.float32]:
-    """Distance (H, W) from the nearest wall cell in meters, blurred by a number of cells."""
-    distance = cv2.distanceTransform((~walls).view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
+def clearance_m(distance: NDArray[np.float32], resolution_m: float, blur_cells: float) -> NDArray[np.float32]:
+    """Turn the distance (H, W) from the nearest wall cell into meters, blurred by a number of cells."""
     clear: NDArray[np.float32] = np.asarray(cv2.GaussianBlur(distance, (0, 0), blur_cells), np.float32)
     clear *= np.float32(resolution_m)
     return clear

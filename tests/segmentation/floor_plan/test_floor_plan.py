@@ -7,6 +7,7 @@ import pytest
 import shapely
 
 from rose2_logs.config.parameters import FloorPlanParameters
+from rose2_logs.model.labels import distance_from
 from rose2_logs.model.outlines import outline
 from rose2_logs.segmentation.floor_plan.edge_weights import EdgeEvidence, edge_evidence
 from rose2_logs.segmentation.floor_plan.faces import build_faces, rasterize
@@ -53,7 +54,7 @@ def test_wall_and_gap_of_an_edge_are_measured_and_a_doorway_is_narrow():
     free &= ~walls
     lines = np.array([(0.0, 3.0, 6.0, 3.0), (3.0, 0.0, 3.0, 6.0)])
     edges = np.array([(0.0, 3.0, 6.0, 3.0), (3.0, 0.0, 3.0, 2.5)])
-    evidence = edge_evidence(edges, lines, walls, free, 0.05, PARAMETERS)
+    evidence = edge_evidence(edges, lines, walls, distance_from(walls), free, 0.05, PARAMETERS)
     assert evidence.wall_m[0] == pytest.approx(5.0, abs=0.1)
     assert evidence.open_m[0] == pytest.approx(1.0, abs=0.1)
     assert evidence.passage_share[0] < PARAMETERS.join_min_passage
@@ -68,7 +69,7 @@ def mouth_of_corridor(jamb_cells=40, corridor_cells=24):
     first = 2 + jamb_cells
     walls[100:, first : first + corridor_cells] = False
     line = np.array([(0.0, 5.1, 8.0, 5.1)])
-    return edge_evidence(line, line, walls, ~walls, 0.05, PARAMETERS).passage_share[0]
+    return edge_evidence(line, line, walls, distance_from(walls), ~walls, 0.05, PARAMETERS).passage_share[0]
 
 
 def test_the_mouth_of_a_narrow_corridor_is_a_doorway_of_the_hall():
@@ -83,7 +84,7 @@ def test_a_line_across_a_narrow_corridor_is_no_doorway_though_walls_go_on_at_bot
     walls[:, 60:62] = walls[:, 86:88] = True  # the corridor
     walls[79:81, :60] = walls[79:81, 88:] = True  # walls between the offices beside it
     line = np.array([(0.0, 4.0, 8.0, 4.0)])
-    share = edge_evidence(line, line, walls, ~walls, 0.05, PARAMETERS).passage_share[0]
+    share = edge_evidence(line, line, walls, distance_from(walls), ~walls, 0.05, PARAMETERS).passage_share[0]
     assert share > PARAMETERS.join_min_passage
 
 
@@ -100,7 +101,7 @@ def test_how_much_of_a_face_was_seen_does_not_hang_on_the_raster(turn_deg):
     walls = np.zeros_like(free)
     ends = np.array([(-9.0, side, 9.0, side) for side in (-1.05, 1.05)]).reshape(-1, 2)
     lines = (ends @ np.array([(c, s), (-s, c)]) + 7.5).reshape(-1, 4)
-    plan = make_floor_plan(lines, walls, free, turn, 0.05, PARAMETERS)
+    plan = make_floor_plan(lines, walls, distance_from(walls), free, turn, 0.05, PARAMETERS)
     middle = shapely.Point(7.5 - 2 * c, 7.5 - 2 * s)
     (face,) = (k for k, polygon in enumerate(plan.graph.polygons) if polygon.contains(middle))
     # Half of the corridor, less the margin of a meter at both ends and the lines' distance from its cells.
@@ -154,7 +155,7 @@ def test_a_wall_is_blind_where_it_shows_no_free_space_on_a_side():
     walls[49:52, 20:140] = True
     walls[52:80, 100:140] = True
     line = np.array([(1.0, 2.525, 7.0, 2.525)])
-    evidence = edge_evidence(line, line, walls, free, 0.05, PARAMETERS)
+    evidence = edge_evidence(line, line, walls, distance_from(walls), free, 0.05, PARAMETERS)
     assert evidence.wall_m[0] == pytest.approx(6.0, abs=0.1)
     assert evidence.blind_m[0] == pytest.approx(2.0, abs=0.1)
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from rose2_logs.config.parameters import TopologyParameters
+from rose2_logs.model.labels import distance_from
 from rose2_logs.segmentation.topology import voronoi
 from rose2_logs.segmentation.topology.splitting import split_rooms
 from rose2_logs.segmentation.topology.voronoi import clearance_m, parts_of_room, voronoi_lines
@@ -24,7 +25,7 @@ def dumbbell():
 
 def test_a_room_that_only_a_narrow_gap_holds_together_is_split_along_a_dominant_direction():
     labels, walls = dumbbell()
-    split = split_rooms(labels, walls, NO_LINES, AXES, 0.05, PARAMETERS)
+    split = split_rooms(labels, distance_from(walls), NO_LINES, AXES, 0.05, PARAMETERS)
     assert len(np.unique(split[split > 0])) == 2
     assert len(np.unique(split[:, :80])) == len(np.unique(split[:, 90:])) == 1
 
@@ -32,7 +33,7 @@ def test_a_room_that_only_a_narrow_gap_holds_together_is_split_along_a_dominant_
 def test_a_representative_line_that_divides_the_parts_is_where_the_cut_goes():
     labels, walls = dumbbell()
     line = np.array([(4.3, 0.0, 4.3, 5.0)])
-    split = split_rooms(labels, walls, line, AXES, 0.05, PARAMETERS)
+    split = split_rooms(labels, distance_from(walls), line, AXES, 0.05, PARAMETERS)
     columns = np.flatnonzero(split[50, :-1] != split[50, 1:])
     assert columns.tolist() == [85]
 
@@ -41,7 +42,7 @@ def test_of_several_lines_the_one_that_keeps_the_parts_apart_best_is_the_cut():
     labels, walls = dumbbell()
     best, crossing, along = (4.3, 0.0, 4.3, 5.0), (1.0, 0.0, 7.0, 5.0), (0.0, 2.5, 8.5, 2.5)
     for lines in ([best, crossing, along], [along, crossing, best]):
-        split = split_rooms(labels, walls, np.array(lines), AXES, 0.05, PARAMETERS)
+        split = split_rooms(labels, distance_from(walls), np.array(lines), AXES, 0.05, PARAMETERS)
         assert np.flatnonzero(split[20, :-1] != split[20, 1:]).tolist() == [83, 85]
         assert np.flatnonzero(split[50, :-1] != split[50, 1:]).tolist() == [85]
         assert len(np.unique(split[:, :84])) == 1
@@ -49,7 +50,7 @@ def test_of_several_lines_the_one_that_keeps_the_parts_apart_best_is_the_cut():
 
 def test_a_room_in_one_piece_stays_whole():
     labels = np.ones((80, 80), np.int32)
-    split = split_rooms(labels, np.zeros((80, 80), bool), NO_LINES, AXES, 0.05, PARAMETERS)
+    split = split_rooms(labels, distance_from(np.zeros((80, 80), bool)), NO_LINES, AXES, 0.05, PARAMETERS)
     assert (split == labels).all()
 
 
@@ -73,7 +74,7 @@ def test_the_drawn_voronoi_graph_is_a_straight_line_in_a_corridor_and_goes_throu
 
 def parts(walls):
     """Parts of all cells that are no wall, as one room."""
-    return parts_of_room(~walls, clearance_m(walls, 0.05, 1.0), 0.05, PARAMETERS)
+    return parts_of_room(~walls, clearance_m(distance_from(walls), 0.05, 1.0), 0.05, PARAMETERS)
 
 
 def test_a_narrow_gap_divides_the_parts_of_a_room_and_a_wide_one_does_not():
@@ -118,7 +119,7 @@ def test_a_room_of_three_parts_is_split_twice_and_its_neighbor_not_at_all():
     walls[47:53, 84:86] = walls[47:53, 184:186] = False
     labels = np.where(walls, 0, 1).astype(np.int32)
     labels[:, 271:] = 2
-    split = split_rooms(labels, walls, NO_LINES, AXES, 0.05, PARAMETERS)
+    split = split_rooms(labels, distance_from(walls), NO_LINES, AXES, 0.05, PARAMETERS)
     assert len({int(split[20, column]) for column in (40, 130, 230)}) == 3
     assert (split[:, 271:] == 2).all()
     assert len(np.unique(split[split > 0])) == 4
@@ -128,10 +129,10 @@ def test_a_line_that_ends_before_a_room_does_not_divide_it():
     labels, walls = dumbbell()
     beside, away = (4.3, 0.0, 4.3, 5.0), (4.35, 20.0, 4.35, 30.0)
     for lines in ([beside], [beside, away]):
-        split = split_rooms(labels, walls, np.array(lines), AXES, 0.05, PARAMETERS)
+        split = split_rooms(labels, distance_from(walls), np.array(lines), AXES, 0.05, PARAMETERS)
         assert np.flatnonzero(split[50, :-1] != split[50, 1:]).tolist() == [85]
-    alone = split_rooms(labels, walls, np.array([away]), AXES, 0.05, PARAMETERS)
-    assert (alone == split_rooms(labels, walls, NO_LINES, AXES, 0.05, PARAMETERS)).all()
+    alone = split_rooms(labels, distance_from(walls), np.array([away]), AXES, 0.05, PARAMETERS)
+    assert (alone == split_rooms(labels, distance_from(walls), NO_LINES, AXES, 0.05, PARAMETERS)).all()
 
 
 @pytest.mark.parametrize("change", [np.fliplr, np.flipud, np.rot90])
@@ -158,7 +159,7 @@ def test_what_is_seen_to_be_one_part_beforehand_would_be_one_after_dividing_it_a
             along, first, length = draw.integers((0, 0, 10), (118, 100, 80))
             window = (slice(along, along + 2), slice(first, first + length))
             walls[window[:: draw.choice([1, -1])]] = True
-        floors.append((~walls, clearance_m(walls, 0.05, 1.0)))
+        floors.append((~walls, clearance_m(distance_from(walls), 0.05, 1.0)))
     quickly = [large_parts(*floor) for floor in floors]
     monkeypatch.setattr(voronoi, "_will_join", lambda *_: False)
     divided = [large_parts(*floor) for floor in floors]
