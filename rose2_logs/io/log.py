@@ -139,13 +139,18 @@ class LogReader:
         if self._path_origin is not None:
             decided["path"] = self._path_origin
         if self.part_count > 1:
-            decided["parts"] = {"count": self.part_count, "analyzed": list(self._parts)}
+            found, taken = self._found_parts
+            sizes = [
+                {"part": number, "maps": len(part.times), "free_m2": round(part.free_m2, 1)}
+                for number, part in enumerate(found.parts, start=1)
+            ]
+            decided["parts"] = {"count": len(sizes), "analyzed": list(taken), "found": sizes}
         return decided
 
     @property
     def part_count(self) -> int:
         """How many parts the maps of the topic have that do not grow from each other."""
-        return self._found_parts[1]
+        return len(self._found_parts[0].parts)
 
     def part_at(self, log_time_ns: int) -> int | None:
         """Return which part a map is of that is read, from 1; None if the topic has but one."""
@@ -323,11 +328,11 @@ class LogReader:
     @property
     def _parts(self) -> dict[int, Part]:
         """The parts of the maps that are read, by number from 1."""
-        return self._found_parts[0]
+        return self._found_parts[1]
 
     @cached_property
-    def _found_parts(self) -> tuple[dict[int, Part], int]:
-        """The parts that are read, and how many there are."""
+    def _found_parts(self) -> tuple[Parts, dict[int, Part]]:
+        """The parts of the topic, and those that are read, by number."""
         times = self.source.log_times(self.topic)
         if len(times) > 1 and isinstance(self.source, MapFilesSource):
             return self._chosen(find_saved_parts(self.source.names, times, self._grid, self._occupancy))
@@ -341,8 +346,11 @@ class LogReader:
             found = found.with_patches(self._all_times()) if found.is_one_run else whole
         return self._chosen(found)
 
-    def _chosen(self, found: Parts) -> tuple[dict[int, Part], int]:
-        """The part that was asked for; else all in the time range, or one if they are of several runs."""
+    def _chosen(self, found: Parts) -> tuple[Parts, dict[int, Part]]:
+        """Parts, and those of them that are read.
+
+        The one that was asked for; else all in the time range, or one if they are of several runs.
+        """
         count, number = len(found.parts), self._asked_part
         if number is not None and not 1 <= number <= count:
             raise LogError(f"{self.info.path}: {self.topic} has no part {number}; it has {count}")
@@ -357,7 +365,7 @@ class LogReader:
             text = f"{self.info.path}: {self.topic}: {found.text(number, in_range)}; {other}"
             log_warning(logger, "parts", text, file=self.info.path, topic=self.topic)
         taken = (in_range or numbered) if number is None else {number: numbered[number]}
-        return taken, count
+        return found, taken
 
     def _grid(self, time_ns: int) -> Grid | None:
         """Read the map of one log time; None if there is none."""

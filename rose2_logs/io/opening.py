@@ -30,7 +30,7 @@ from rose2_logs.io.discovery import (
 )
 from rose2_logs.io.log import LogReader, choose_topic
 from rose2_logs.io.source import LogInfo, MessageSource
-from rose2_logs.system.text import counted
+from rose2_logs.system.text import counted, listed
 from rose2_logs.system.warnings import UNCOUNTED, log_warning
 
 if TYPE_CHECKING:
@@ -399,7 +399,7 @@ def _without_masks(log: Path, maps: list[Path]) -> list[Path]:
     masks = [each for each in maps if any(word in each.stem.lower() for word in MASK_WORDS)]
     if not masks or len(masks) == len(maps):
         return maps
-    text = f"{log}: {', '.join(each.name for each in masks[:_MOST_NAMED])} left out, as a mask and no map"
+    text = f"{log}: {listed([each.name for each in masks], _MOST_NAMED)} left out, as a mask and no map"
     log_warning(logger, "masks", f"{text}; name the file to read it", file=log)
     return [each for each in maps if each not in masks]
 
@@ -426,7 +426,7 @@ def _warn_files_as_one(log: Path, files: list[Path]) -> None:
     if not others and (len(names) == 1 or is_bag(names, log.resolve().name)):
         return
     read = f"{names[0]} is" if len(names) == 1 else f"{len(names)} files from {names[0]} on are"
-    ignored = f", {', '.join(others[:_MOST_NAMED])} ignored" if others else ""
+    ignored = f", {listed(others, _MOST_NAMED)} ignored" if others else ""
     text = (
         f"{log}: has no {BAG_DESCRIPTION}; {read} read as one log{ignored}; if that is wrong, name the file"
     )
@@ -449,7 +449,7 @@ def _files_of_bag(log: Path) -> list[Path]:
     if missing and (renamed := [each for each in _stored_in(log) if each not in files]):
         text = (
             f"{path}: lists {missing[0].name}, which is not there; {counted(len(renamed), 'file')} that it "
-            f"does not list, {', '.join(each.name for each in renamed[:_MOST_NAMED])}, read instead"
+            f"does not list, {listed([each.name for each in renamed], _MOST_NAMED)}, read instead"
         )
         log_warning(logger, "file_missing", text, file=missing[0])
         return files + renamed

@@ -20,7 +20,7 @@ from rose2_logs.config.selection import Times
 from rose2_logs.config.tracking import TrackingParameters
 from rose2_logs.io.grids import Grid
 from rose2_logs.model.occupancy import UNKNOWN, BoolArray, FloatArray, GridGeometry, classify
-from rose2_logs.system.text import counted
+from rose2_logs.system.text import counted, listed
 from rose2_logs.tracking.registration import WallFit, wall_faces
 
 LOOKED_AT = 64
@@ -59,6 +59,8 @@ LEAST_WALL_CELLS = 100
 """Walls that two maps show, 5 m of 5 cm, below which they are not compared."""
 MOST_COMPARED = 2000
 """Cells of walls and of the floor, evenly taken, that are enough to compare."""
+MOST_LISTED = 4
+"""Parts, and publishers, that a line names; `summary.json` has all of them."""
 MOST_STEPS = 4
 """Cells between a wall and the end of `WALL_REACH_M`, of 5 cm, of which each is looked at."""
 
@@ -118,13 +120,14 @@ class Parts:
 
     def text(self, number: int | None, in_range: Mapping[int, Part]) -> str:
         """Return what is told of the choice of one part, or of all, among the numbered ones in the range."""
-        sizes = ", ".join(
+        sizes = [
             f"{place} of {counted(len(each.times), 'map')} ({each.free_m2:.0f} m2 free at its end)"
             for place, each in in_range.items()
-        )
+        ]
         done = "each has its own coverage and tracks" if number is None else f"part {number} is analyzed"
         some = f", {len(in_range)} of them in the time range" if len(in_range) < len(self.parts) else ""
-        return f"{self.why}, so that there are {len(self.parts)} parts{some}: {sizes}; {done}"
+        named = f"{len(self.parts)} parts{some}: {listed(sizes, MOST_LISTED)}"
+        return f"{self.why}, so that there are {named}; {done}"
 
 
 def likeliest(parts: Mapping[int, Part]) -> int:
@@ -223,7 +226,7 @@ def find_parts(
         names = list(dict.fromkeys(publishers))
         of_each = [[place for place, one in enumerate(publishers) if one == name] for name in names]
         parts = [_part(times, places, maps.facts, _spread(places)) for places in of_each]
-        return Parts(tuple(parts), f"{', '.join(names)} publish in turn")
+        return Parts(tuple(parts), f"{listed(names, MOST_LISTED)} publish in turn")
     first, all_maps = range(min(len(times), LOOKED_AT)), range(len(times))
     if publishers is None and (grids_in_turn := _grids_in_turn(first, maps.facts)):
         grids = [_grid_of(place, maps.facts) for place in all_maps]

@@ -19,6 +19,7 @@ from rose2_logs.io.scans import Scan, scan_of, transforms_of
 from rose2_logs.io.source import LoggedBytes, MessageSource
 from rose2_logs.mapping.log_odds import Beams, beams_of
 from rose2_logs.mapping.transforms import Link, NotPlacedError, Transform, TransformTree, rotated
+from rose2_logs.system.text import listed
 from rose2_logs.system.warnings import log_warning
 
 logger = logging.getLogger(__name__)
@@ -290,10 +291,9 @@ def _no_way(frame: str, asked: str | None, tree: TransformTree) -> str:
     above = list(tree.above(frame))[1:]
     if not above:
         known = tree.frames
-        more = ", ..." if len(known) > _MOST_LISTED else ""
         return (
             f"the scans are in the frame {frame!r}, which is not among those of the transforms: "
-            f"{', '.join(known[:_MOST_LISTED]) or 'none'}{more}"
+            f"{listed(known, _MOST_LISTED) or 'none'}"
         )
     wanted = " or ".join(FIXED_FRAMES) if asked is None else asked
     return (

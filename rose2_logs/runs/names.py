@@ -17,6 +17,7 @@ from rose2_logs.errors import ParameterError
 from rose2_logs.io.room_names import is_plan, read_room_names
 from rose2_logs.model.occupancy import OccupancySnapshot
 from rose2_logs.model.room_names import RoomNames
+from rose2_logs.system.text import listed
 from rose2_logs.system.warnings import log_warning
 
 logger = logging.getLogger(__name__)
@@ -68,7 +69,6 @@ def names_in(
 def tell_unused(path: Path, unused: Sequence[str]) -> None:
     """Warn of names that no room has, if there are any."""
     if unused:
-        shown = ", ".join(repr(name) for name in unused[:TOLD_MOST])
-        more = f" and {len(unused) - TOLD_MOST} more" if len(unused) > TOLD_MOST else ""
-        text = f"{path}: no room has these names: {shown}{more}"
+        shown = listed([repr(name) for name in unused], TOLD_MOST)
+        text = f"{path}: no room has these names: {shown}"
         log_warning(logger, "unused_names", text, file=path)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 
 def percent(share: float, unit: str = "%") -> str:
     """Format a share in whole percent; anything less than the whole is never shown as 100 %.
@@ -35,6 +37,18 @@ def counted(number: int, noun: str) -> str:
     ('1 room', '2 rooms')
     """
     return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
+def listed(names: Sequence[str], most: int) -> str:
+    """Return the first of some names, at most so many, and how many more there are.
+
+    Examples
+    --------
+    >>> listed(["a", "b"], most=2), listed(["a", "b", "c", "d"], most=2)
+    ('a, b', 'a, b and 2 more')
+    """
+    more = len(names) - most
+    return ", ".join(names[:most]) + (f" and {more} more" if more > 0 else "")
 
 
 def apart(nanoseconds: int) -> str:

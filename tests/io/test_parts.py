@@ -33,7 +33,10 @@ def log_of(path, maps):
 def read(path, **options):
     with collect_warnings() as found, open_log(path, **options) as reader:
         free = [int((each.cells == 0).sum()) // 80 for each in reader.snapshots()]
-        return free, reader.decided.get("parts"), found.kinds
+        parts = reader.decided.get("parts")
+        if parts is not None:
+            assert [each["part"] for each in parts.pop("found")] == [*range(1, parts["count"] + 1)]
+        return free, parts, found.kinds
 
 
 GROWING = [50, 80, 110, 140, 170]
@@ -85,7 +88,7 @@ def test_parts_without_a_map_in_the_time_range_are_left_out(tmp_path):
             assert list(lasts) == numbers
             assert lasts[numbers[-1]].log_time_ns == reader.last().log_time_ns
             assert {reader.part_at(each.log_time_ns) for each in reader.snapshots()} <= set(numbers)
-            assert reader.decided["parts"] == {"count": 2, "analyzed": numbers}
+            assert reader.decided["parts"]["analyzed"] == numbers
             assert ("parts" in warnings.kinds) == (len(numbers) > 1)
 
 
@@ -96,6 +99,19 @@ def test_parts_in_the_time_range_are_told_with_their_numbers(tmp_path):
     (told,) = warnings.kinds["parts"].first
     assert "there are 3 parts, 2 of them in the time range: 2 of 5 maps (33 m2" in told["message"]
     assert told["message"].endswith("part=2 takes one alone")
+
+
+def test_of_many_parts_a_line_names_the_first_and_the_summary_all(tmp_path):
+    path = log_of(tmp_path / "run.mcap", [seen(columns) for columns in (60, 110, 170) * 16])
+    with collect_warnings() as warnings, open_log(path) as reader:
+        assert len(reader.lasts()) == 16
+    (told,) = warnings.kinds["parts"].first
+    assert "there are 16 parts: 1 of 3 maps" in told["message"]
+    assert "4 of 3 maps (33 m2 free at its end) and 12 more; each has" in told["message"]
+    assert len(told["message"]) < 400 + len(str(path))
+    assert reader.decided["parts"]["found"] == [
+        {"part": number, "maps": 3, "free_m2": 33.0} for number in range(1, 17)
+    ]
 
 
 def test_of_publishers_in_turn_only_those_in_the_time_range_are_chosen_from(tmp_path):
@@ -294,7 +310,7 @@ def test_parts_of_logs_as_users_have_them(name, analyzed):
     with collect_warnings() as found, open_log(SHARED / "faults" / f"{name}.mcap") as reader:
         free = [int((each.cells == 0).sum()) for each in reader.snapshots()]
     assert free[-6:] == [4862, 13862, 22448, 31130, 40130, 44896]
-    assert reader.decided["parts"] == {"analyzed": analyzed, "count": 2}
+    assert [reader.decided["parts"][key] for key in ("analyzed", "count")] == [analyzed, 2]
     assert found.kinds["parts"].count == 1
 
 

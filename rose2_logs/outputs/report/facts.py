@@ -13,7 +13,7 @@ from rose2_logs.model.room_plan import RoomPlan
 from rose2_logs.model.room_quality import UNSURE_BELOW
 from rose2_logs.outputs.report.words import MISSING, date_of, duration, size
 from rose2_logs.runs.run import Run
-from rose2_logs.system.text import percent
+from rose2_logs.system.text import listed, percent
 
 LATE_COVERAGE = 0.95
 """A layout that became final only beyond would likely have changed if the run had gone on."""
@@ -173,7 +173,7 @@ def _room_notes(plan: RoomPlan) -> list[Note]:
         if room.wall_support is not None and room.is_unsure
     )
     if unsure:
-        names = _listed([f"{name} ({percent(sure)})" for sure, name in unsure])
+        names = listed([f"{name} ({percent(sure)})" for sure, name in unsure], NAMED_MOST)
         found_notes.append(
             Note(f"Rooms with little of their outline supported by walls, hence unsure (?): {names}.")
         )
@@ -186,7 +186,7 @@ def _room_notes(plan: RoomPlan) -> list[Note]:
         reverse=True,
     )
     if open_ends:
-        names = _listed([f"{name} ({length:.1f} m)" for length, name in open_ends])
+        names = listed([f"{name} ({length:.1f} m)" for length, name in open_ends], NAMED_MOST)
         found_notes.append(
             Note(f"Rooms with open frontier, not explored to the end: {names}.", is_warning=False)
         )
@@ -199,7 +199,7 @@ def _room_notes(plan: RoomPlan) -> list[Note]:
         reverse=True,
     )
     if unseen:
-        names = _listed([f"{name} ({percent(part)})" for part, name in unseen])
+        names = listed([f"{name} ({percent(part)})" for part, name in unseen], NAMED_MOST)
         found_notes.append(
             Note(
                 f"Rooms of which a good part was never seen (predicted, or behind furniture): {names}.",
@@ -213,7 +213,9 @@ def _border_notes(plan: RoomPlan) -> list[Note]:
     unsure = sorted((border.strength, border.rooms) for border in plan.borders if border.is_unsure)
     if not unsure:
         return []
-    names = _listed([f"{one} and {other} ({percent(strength)})" for strength, (one, other) in unsure])
+    names = listed(
+        [f"{one} and {other} ({percent(strength)})" for strength, (one, other) in unsure], NAMED_MOST
+    )
     return [Note(f"Rooms that may be one, with how sure their border is: {names}.", is_warning=False)]
 
 
@@ -229,11 +231,6 @@ def _shift_notes(results: Run) -> list[Note]:
         f"{shifts[most]['snapshot']}: loop closures, or trouble of SLAM."
     )
     return [Note(text.replace("1 times, most by", "once, by"))] if len(shifts) == 1 else [Note(text)]
-
-
-def _listed(names: list[str]) -> str:
-    more = len(names) - NAMED_MOST
-    return ", ".join(names[:NAMED_MOST]) + (f" and {more} more" if more > 0 else "")
 
 
 def meanings(results: Run) -> list[tuple[str, str]]:

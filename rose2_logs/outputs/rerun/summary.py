@@ -10,7 +10,7 @@ from rose2_logs.model.room_names import NameOf, room_name, short_name
 from rose2_logs.model.room_quality import UNSURE_SIGN, is_unsure
 from rose2_logs.runs.history import RunSummary
 from rose2_logs.runs.sink import RunInfo
-from rose2_logs.system.text import counted, percent
+from rose2_logs.system.text import counted, listed, percent
 from rose2_logs.tracking.track_history import SnapshotRef, TrackHistories
 
 NAMED_MOST = 6
@@ -110,12 +110,12 @@ def _worth_a_look(histories: TrackHistories, name_of: NameOf) -> list[str]:
     shares = [(histories.tracks[track].wall_support, track) for track in histories.in_last_map]
     unsure = sorted((share, track) for share, track in shares if share is not None and is_unsure(share))
     if unsure:
-        named = ", ".join(
-            f"{_cell(short_name(track, name_of))}{UNSURE_SIGN} ({_percent(share)})"
-            for share, track in unsure[:NAMED_MOST]
+        named = [
+            f"{_cell(short_name(track, name_of))}{UNSURE_SIGN} ({_percent(share)})" for share, track in unsure
+        ]
+        lines.append(
+            f"**Unsure**, with little of the outline supported by walls: room {listed(named, NAMED_MOST)}."
         )
-        more = f" and {len(unsure) - NAMED_MOST} more" if len(unsure) > NAMED_MOST else ""
-        lines.append(f"**Unsure**, with little of the outline supported by walls: room {named}{more}.")
     if histories.largest_shift is not None:
         at, motion = histories.largest_shift
         x, y = motion.shift_xy_m
