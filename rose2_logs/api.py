@@ -29,6 +29,7 @@ from rose2_logs.model.occupancy import UNKNOWN, GridGeometry, OccupancySnapshot,
 from rose2_logs.runs.run import Run
 from rose2_logs.runs.sink import Sink
 from rose2_logs.runs.stream import TrackedStream, start_workers
+from rose2_logs.system.files import require_local
 from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot
 from rose2_logs.workflows.analyze import OnSnapshot, analyze_log, log_stem
 from rose2_logs.workflows.compare import compare_runs, compare_stored
@@ -581,7 +582,9 @@ def _path(given: Any, name: str) -> Path:
         raise ParameterError(f"{name} must be a str or a Path, not {_type(given)}")
     if not os.fspath(given):
         raise ParameterError(f"{name} is an empty text; '.' is the current folder")
-    return Path(given)
+    path = Path(given)
+    require_local(path)
+    return path
 
 
 def _check_resolution(given: object) -> None:

@@ -20,7 +20,7 @@ from rose2_logs.batch import dataset
 from rose2_logs.batch.finding import find_logs
 from rose2_logs.batch.folders import LOGS_FOLDER, assign_names, locked, put_in_place, work_folder
 from rose2_logs.batch.local_workers import LocalWorkers
-from rose2_logs.batch.location import Location
+from rose2_logs.batch.location import Location, require_place
 from rose2_logs.batch.options import BatchOptions
 from rose2_logs.batch.record import (
     RECORD,
@@ -35,7 +35,7 @@ from rose2_logs.errors import LogError, OutputError, ParameterError
 from rose2_logs.io.discovery import BAG_DESCRIPTION
 from rose2_logs.runs.summary import SUMMARY, write_json
 from rose2_logs.runs.tables import BACK_PROJECTED, TABLES
-from rose2_logs.system.files import require_utf8
+from rose2_logs.system.files import OnFailure, require_local, require_utf8
 from rose2_logs.system.workers import usable_cpus
 
 if TYPE_CHECKING:
@@ -109,7 +109,9 @@ class Workers(AbstractContextManager["Workers"], Protocol):
         ...
 
 
-def run_batch(arguments: Sequence[str], out: Path, options: BatchOptions, listener: Listener) -> BatchResult:
+def run_batch(
+    arguments: Sequence[str], out: str | Path, options: BatchOptions, listener: Listener
+) -> BatchResult:
     """Analyze many logs, each into its own folder, with one data set and one summary of all.
 
     Each log's results go to ``out/logs/NAME``, as `analyze_log` writes them; the tables of all logs to
@@ -121,7 +123,7 @@ def run_batch(arguments: Sequence[str], out: Path, options: BatchOptions, listen
     ----------
     arguments : sequence of str
         Logs, folders, patterns, URLs; see `find_logs`.
-    out : path
+    out : str or path
         Output folder, created if needed. Workers on other machines must see it at the same path. Or a URL of
         an object store, to which the workers upload their results.
     options : BatchOptions
@@ -134,7 +136,7 @@ def run_batch(arguments: Sequence[str], out: Path, options: BatchOptions, listen
     LogError
         If there are no logs, or a URL for results cannot be written to.
     ParameterError
-        If the scheduler does not answer.
+        If the scheduler does not answer, or a URL for results names no place in an object store.
     OutputError
         If the folder cannot be used, another batch is writing to it, or it holds results of other options
         that may not be replaced.
@@ -142,12 +144,14 @@ def run_batch(arguments: Sequence[str], out: Path, options: BatchOptions, listen
         If the scheduler is lost.
     """
     # A path holds one of the two slashes of a URL.
-    if url := re.match(r"([a-z][a-z0-9+.-]+):/+(.+)", str(out)):
+    if url := re.fullmatch(r"([a-z][a-z0-9+.-]+):/+(.*)", str(out)):
+        place = f"{url[1]}://{url[2].rstrip('/')}"
         if url[1] in ("http", "https", "file"):
-            raise ParameterError(f"{url[1]}://{url[2]}: results go to a folder or to an object store")
+            raise ParameterError(f"{out}: results go to a folder or to an object store")
+        require_place(place)
         with tempfile.TemporaryDirectory(prefix="rose2_logs_") as scratch:
-            place = f"{url[1]}://{url[2].rstrip('/')}"
             return _run_batch(arguments, Path(scratch), place, options, listener)
+    require_local(Path(out))
     out = Path(os.path.abspath(out))  # noqa: PTH100 (as in find_logs)
     require_utf8(out)
     return _run_batch(arguments, out, "", options, listener)
@@ -170,10 +174,9 @@ def _run_batch(
     with locked(out), work_folder(out) as work, _opened(url, work.name) as store:
         batch = _Batch(out, work, options, listener, store)
         tasks = batch.plan(logs)
-        try:
+        with OnFailure(batch.sum_up):
             batch.carry_out(tasks)
-        finally:
-            files = batch.sum_up()
+        files = batch.sum_up()
     return BatchResult(url or str(out), tuple(sorted(batch.states, key=lambda state: state.name)), files)
 
 
@@ -187,10 +190,9 @@ def _opened(url: str, run: str) -> Iterator[Store | None]:
 
     store = Store(url, run)
     store.open()
-    try:
+    with OnFailure(store.close):
         yield store
-    finally:
-        store.close()
+    store.close()
 
 
 class _Batch:

@@ -10,7 +10,7 @@ from pathlib import Path
 from urllib.parse import urlsplit
 from urllib.request import url2pathname
 
-from rose2_logs.batch.location import WEB_SCHEMES, Location
+from rose2_logs.batch.location import WEB_SCHEMES, Location, require_place
 from rose2_logs.errors import LogError
 from rose2_logs.io.discovery import MAP_ENDINGS, STORAGE_ENDINGS, is_bag, is_storage, logs_among, plain_name
 
@@ -36,12 +36,16 @@ def find_logs(arguments: Sequence[str], out: Path) -> list[Location]:
     LogError
         If a folder or a pattern has no logs, or a URL cannot be listed. A single log that is not there is
         returned: opening it reports why.
+    ParameterError
+        If a URL ends behind its scheme.
     """
     found: dict[str, Location] = {}
     # Many arguments may be in the same folder, which is listed only once.
     is_bag_at = cache(_is_bag_at)
     for argument in arguments:
         path = _local_path(argument)
+        if "://" in path:
+            require_place(path)
         logs = _remote(path, is_bag_at) if "://" in path else _local(path, out, is_bag_at)
         if not logs:
             raise LogError(

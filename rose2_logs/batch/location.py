@@ -7,11 +7,25 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from urllib.parse import parse_qsl, unquote, urlsplit
 
+from rose2_logs.errors import ParameterError
 from rose2_logs.system.files import readable
 
 WEB_SCHEMES = ("http://", "https://")
 _SIGNED = re.compile("signature|token|credential|^sig$", re.IGNORECASE)
 """Names of query parameters in the signed URLs of the large object stores."""
+
+
+def require_place(url: str) -> None:
+    """Check that a URL names a place: more than its scheme.
+
+    Raises
+    ------
+    ParameterError
+        If it does not.
+    """
+    scheme, _, place = url.partition("://")
+    if not place.strip("/"):
+        raise ParameterError(f"{scheme}://: names no place; write {scheme}://BUCKET/FOLDER, or a local path")
 
 
 @dataclass(frozen=True, order=True, slots=True)

@@ -19,6 +19,7 @@ from rose2_logs.cli.message_options import MESSAGE_OPTIONS
 from rose2_logs.cli.messages import show_messages
 from rose2_logs.config.parameters import Parameters, load_parameters
 from rose2_logs.config.run_options import METHOD, Option, RunOptions, options_of
+from rose2_logs.system.files import require_local
 
 VALUES = {bool: "", int: "N", str: "NAME", Path: "PATH"}
 """Placeholder in a command's help for the value of an option of this type, where it declares none."""
@@ -45,6 +46,16 @@ Settings = Annotated[
 PARAMETER_OPTIONS = {"config": Config, "settings": Settings}
 MADE_FROM = (RunOptions, BatchOptions, Parameters)
 """A command that takes one of these gets an option for each of its fields."""
+
+
+def part_option(of: str, panel: str | None = None) -> Any:
+    """Make the option that takes one part of the results of a run."""
+    return typer.Option(
+        metavar="N",
+        help=f"Part of {of}, from 1, where the map was begun anew within the log. By default the last.",
+        show_default=False,
+        rich_help_panel=panel,
+    )
 
 
 def option_of(name: str) -> Any:
@@ -82,6 +93,10 @@ def _with_options(command: Callable[..., Any]) -> Callable[..., Any]:
     def with_options(**given: Any) -> Any:
         quiet, verbose, as_json, _ = (given.pop(each) for each in MESSAGE_OPTIONS)
         show_messages(quiet=quiet, verbose=verbose, as_json=as_json)
+        for value in given.values():
+            for path in value if isinstance(value, list) else [value]:
+                if isinstance(path, Path):
+                    require_local(path)
         return command(**{each: _built(kind, name, given) for each, kind in made.items()}, **given)
 
     parameters: list[inspect.Parameter] = []

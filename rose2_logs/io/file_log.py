@@ -21,6 +21,7 @@ from rose2_logs.io.grids import Decoder, Grid, Patch
 from rose2_logs.io.log_file import LATEST_NS, LogFile, Place
 from rose2_logs.io.messages import decoder
 from rose2_logs.io.source import LoggedBytes, LoggedMap, LogInfo, MessageSource, TopicInfo, places_of
+from rose2_logs.system.files import OnFailure
 from rose2_logs.system.text import apart
 from rose2_logs.system.warnings import log_warning
 
@@ -153,11 +154,8 @@ class FileLog(MessageSource):
         self._places: dict[str, list[Timed]] = {}
         # By file: how much later its log times are taken from each place on where they jump.
         self._delays: dict[int, list[int]] = {}
-        try:
+        with OnFailure(self.close):
             self._open(files, open_file)
-        except BaseException:
-            self.close()
-            raise
         start_ns, end_ns = self._extent(path)
         self.info = LogInfo(
             path,

@@ -30,6 +30,7 @@ from rose2_logs.io.discovery import (
 )
 from rose2_logs.io.log import LogReader, choose_topic
 from rose2_logs.io.source import LogInfo, MessageSource
+from rose2_logs.system.files import OnFailure, require_local
 from rose2_logs.system.text import counted, listed
 from rose2_logs.system.warnings import UNCOUNTED, log_warning
 
@@ -112,14 +113,11 @@ def open_log(
         If the log cannot be opened.
     """
     source = open_source(path, limits, occupancy)
-    try:
+    with OnFailure(source.close):
         if map_from is not None or source.info.format == CARMEN_FORMAT:
             built = _with_maps(source, map_from, map_frame, selection, limits, mapping)
             return LogReader(built, topic or built.topic, selection, occupancy, part)
         return LogReader(source, topic, selection, occupancy, part)
-    except BaseException:
-        source.close()
-        raise
 
 
 def _with_maps(
@@ -203,6 +201,8 @@ def open_source(
     ------
     LogError
         If the log cannot be opened.
+    ParameterError
+        If it is a URL.
     """
     try:
         source = _open_source(path, limits)
@@ -225,6 +225,7 @@ def _open_source(path: LogPath, limits: ReadingParameters) -> MessageSource:
     if not log.exists():
         found = [Path(each) for each in glob.glob(str(path))]  # noqa: PTH207 (may be absolute)
         if not found:
+            require_local(log)
             raise LogError(f"{path}: no such file or directory", file=str(path))
         return _open_files(log, _in_natural_order(found), limits)
     return _open_files(log, [log], limits)
@@ -273,7 +274,7 @@ def _open_storage(
     open_file, name, bag_name = _formats()[kind]
     size = sum(each.stat().st_size for each in (log.iterdir() if log.is_dir() else files) if each.is_file())
     scratch = tempfile.TemporaryDirectory(prefix="rose2_logs_") if any(map(_is_packed, files)) else None
-    try:
+    with OnFailure(lambda: scratch and scratch.cleanup()):
         if scratch is not None:
             files = [
                 _decompressed(file, Path(scratch.name, str(number)), limits) if _is_packed(file) else file
@@ -288,10 +289,6 @@ def _open_storage(
             size_bytes=size,
             on_close=(lambda: None) if scratch is None else scratch.cleanup,
         )
-    except BaseException:
-        if scratch is not None:
-            scratch.cleanup()
-        raise
 
 
 def _formats() -> dict[str, tuple[OpenFile, str, str]]:

@@ -68,7 +68,7 @@ def distinct_labels(labels: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDA
         Index into the flattened image.
     """
     flat = labels.ravel()
-    starts = np.flatnonzero(np.concatenate([[True], flat[1:] != flat[:-1]]))
+    starts = np.flatnonzero(np.concatenate([[True], flat[1:] != flat[:-1]])[: flat.size])
     values, index = np.unique(flat[starts], return_index=True)
     return values.astype(np.int64), starts[index]
 

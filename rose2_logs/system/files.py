@@ -4,16 +4,22 @@ from __future__ import annotations
 
 import logging
 import os
-from collections.abc import Iterable, Iterator
+import re
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
+from types import TracebackType
 
-from rose2_logs.errors import OutputError
+from rose2_logs.errors import OutputError, ParameterError
 
 logger = logging.getLogger(__name__)
 
 LONGEST_NAME_BYTES = 255 - len("..journal")
 """File systems allow 255 bytes; the hidden files of a run in progress add a dot and an ending to the name."""
+
+_URL = re.compile("([a-z][a-z0-9+.-]+):(?:/+(.*))?", re.IGNORECASE)
+"""A URL as a path has it: with one of its slashes, without any if nothing follows. A drive is one letter."""
 
 
 def part_of(path: Path) -> Path:
@@ -69,6 +75,24 @@ def replacing(path: Path) -> Iterator[Path]:
             part.unlink(missing_ok=True)
 
 
+@dataclass(frozen=True)
+class OnFailure:
+    """Undo what was begun if the context fails; its error is the one that is told, also if undoing fails."""
+
+    undo: Callable[[], object]
+
+    def __enter__(self) -> None:
+        """Begin the context."""
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Undo after an error."""
+        if kind is not None:
+            with suppress(Exception):
+                self.undo()
+
+
 def readable(path: Path | str) -> str:
     """Return a path as valid text; bytes that are not UTF-8 become backslash escapes."""
     return os.fsencode(path).decode(errors="backslashreplace")
@@ -88,6 +112,21 @@ def require_utf8(path: Path) -> None:
         raise OutputError(
             f"{readable(path)}: its name is not valid UTF-8, so results cannot refer to it; rename it"
         ) from error
+
+
+def require_local(path: Path) -> None:
+    """Check that a path is no URL, whose scheme would be the name of a folder.
+
+    Raises
+    ------
+    ParameterError
+        If it is one.
+    """
+    if url := _URL.fullmatch(str(path)):
+        raise ParameterError(
+            f"{url[1]}://{url[2] or ''}: is a URL, where a local path is needed; only batch reads logs from "
+            "URLs and writes results to object stores"
+        )
 
 
 def require_short(files: Iterable[Path]) -> None:

@@ -167,6 +167,12 @@ def test_time_options_are_seconds_into_the_log(cli, maps: Path, tmp_path: Path):
             ["batch", "x.bag", "-o", "http://bucket/out"],
             "http://bucket/out: results go to a folder or to an object store",
         ),
+        (["batch", "x.bag", "-o", "s3://"], "s3://: names no place; write s3://BUCKET/FOLDER"),
+        (["batch", "gs://", "-o", "out"], "gs://: names no place"),
+        (["analyze", "x.bag", "-o", "s3://bucket/out"], "s3://bucket/out: is a URL, where a local path"),
+        (["analyze", "s3://bucket/x.bag", "-o", "out"], "s3://bucket/x.bag: is a URL"),
+        (["info", "s3://bucket/x.bag"], "s3://bucket/x.bag: is a URL"),
+        (["figure", "out", "-o", "s3://"], "s3://: is a URL"),
         (
             ["batch", "x.bag", "-o", "out", "--scheduler", "a:1", "--workers", "2"],
             "--workers 2 is for this machine",

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from rose2_logs.model.labels import contacts, labels_near, numbered, straight_runs
+from rose2_logs.model.labels import contacts, distinct_labels, labels_near, numbered, straight_runs
 
 
 @pytest.mark.parametrize("step", [(0, 1), (1, 0), (1, 1), (1, -1)])
@@ -93,3 +93,11 @@ def test_contacts_are_those_of_a_loop_over_all_cells(labels: np.ndarray):
                     expected.append(tuple(sorted((int(labels[row, column]), int(labels[other])))))
     meet = contacts(labels)
     assert sorted(zip(meet.low.tolist(), meet.high.tolist(), strict=True)) == sorted(expected)
+
+
+@given(arrays.arrays(np.int32, st.tuples(st.integers(0, 5), st.integers(0, 5)), elements=st.integers(0, 3)))
+def test_distinct_labels_are_those_of_numpy_also_of_an_image_without_cells(labels: np.ndarray):
+    values, first = distinct_labels(labels)
+    expected_values, expected_first = np.unique(labels, return_index=True)
+    assert values.tolist() == expected_values.tolist()
+    assert first.tolist() == expected_first.tolist()

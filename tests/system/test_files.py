@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from rose2_logs.errors import OutputError
-from rose2_logs.system.files import reason_of, replacing
+from rose2_logs.errors import OutputError, ParameterError
+from rose2_logs.system.files import OnFailure, reason_of, replacing, require_local
 
 
 @pytest.mark.parametrize("below", ["file/out.txt", "file/folder/out.txt"])
@@ -29,3 +29,30 @@ def test_other_errors_lose_only_their_number():
     assert reason_of(OSError(28, "No space left on device")) == "No space left on device"
     assert reason_of(OSError("lost")) == "lost"
     assert reason_of(ValueError("odd")) == "odd"
+
+
+def test_after_a_failure_what_was_begun_is_undone_and_the_first_error_told():
+    undone = []
+
+    def undo() -> None:
+        undone.append(True)
+        raise OSError("cannot be closed")
+
+    with pytest.raises(ValueError, match="cannot be opened"), OnFailure(undo):
+        raise ValueError("cannot be opened")
+    assert undone == [True]
+    with OnFailure(undo):
+        pass
+    assert undone == [True]
+
+
+@pytest.mark.parametrize("url", ["s3://", "s3://bucket/run", "HTTPS://host/run.mcap", "a+b.c-d://x"])
+def test_a_url_is_no_local_path(url: str):
+    for path in (Path(url), Path(url) / "below"):
+        with pytest.raises(ParameterError, match="is a URL, where a local path is needed"):
+            require_local(path)
+
+
+@pytest.mark.parametrize("path", ["C:/runs", "runs/s3:", "run 1: first", "12:30", "/data/s3:/x", "a:b/c"])
+def test_a_name_with_a_colon_is_a_local_path(path: str):
+    require_local(Path(path))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Annotated, Self
 
@@ -47,10 +46,11 @@ def batch(
         ),
     ],
     out: Annotated[
-        Path,
+        str,
         typer.Option(
             "--out",
             "-o",
+            metavar="PATH",
             help="Folder for results, or URL of an object store (s3://...): those of a log go to "
             "OUT/logs/NAME/, the tables of all logs to OUT/tables/, one row per log to OUT/summary.csv and "
             "OUT/summary.parquet.",

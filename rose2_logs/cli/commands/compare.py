@@ -10,6 +10,7 @@ import typer
 from rich.markup import escape
 
 from rose2_logs.cli.messages import warning
+from rose2_logs.cli.options import part_option
 from rose2_logs.cli.printing import print_line, print_table, shown
 from rose2_logs.config.parameters import Parameters
 
@@ -25,17 +26,6 @@ EXAMPLE = (
 EXAMPLES = {"compare": EXAMPLE}
 WALLS_SHOWN = 12
 """Walls that are printed, the longest of each kind first; the table holds all."""
-
-
-PartA = Annotated[
-    int | None,
-    typer.Option(
-        metavar="N",
-        help="Part of A, from 1, where its map was begun anew within the log. By default the last.",
-        show_default=False,
-    ),
-]
-PartB = Annotated[int | None, typer.Option(metavar="N", help="The same for B.", show_default=False)]
 
 
 def compare(
@@ -58,8 +48,8 @@ def compare(
             show_default=False,
         ),
     ] = None,
-    part_a: PartA = None,
-    part_b: PartB = None,
+    part_a: Annotated[int | None, part_option("A")] = None,
+    part_b: Annotated[int | None, part_option("B")] = None,
 ) -> None:
     """Compare the last layouts of two runs: rooms and walls that are new, missing or moved."""
     from rose2_logs.runs.run import named_run

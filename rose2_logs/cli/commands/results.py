@@ -9,6 +9,7 @@ import typer
 
 from rose2_logs.cli.exit_codes import EXIT_KNOWN
 from rose2_logs.cli.messages import show_error
+from rose2_logs.cli.options import part_option
 from rose2_logs.cli.printing import print_file
 from rose2_logs.outputs.report import PANELS
 from rose2_logs.workflows import FIGURE_WIDTH_PX
@@ -43,15 +44,7 @@ Coverage = Annotated[
 Last = Annotated[
     bool, typer.Option("--last", help="The last map, which is the default.", rich_help_panel=WHICH_MAP)
 ]
-Part = Annotated[
-    int | None,
-    typer.Option(
-        metavar="N",
-        help="Part of the run, from 1, where the map was begun anew within the log. By default the last.",
-        show_default=False,
-        rich_help_panel=WHICH_MAP,
-    ),
-]
+Part = Annotated[int | None, part_option("the run", WHICH_MAP)]
 Overwrite = Annotated[
     bool, typer.Option("--overwrite", help="Replace files that exist already.", rich_help_panel=WHAT)
 ]

@@ -40,6 +40,7 @@ from rose2_logs.io.mcap.records import (
     records_in,
 )
 from rose2_logs.io.source import DamagedMessageError
+from rose2_logs.system.files import OnFailure
 from rose2_logs.system.warnings import log_warning
 
 logger = logging.getLogger(__name__)
@@ -80,7 +81,7 @@ class McapFile(LogFile):
             self._stream = CheckedFile(path)
         except OSError as error:
             raise LogError(f"{path}: cannot be opened: {error.strerror}", file=path) from error
-        try:
+        with OnFailure(self._stream.close):
             if self._stream.read(len(MAGIC)) != MAGIC:
                 raise LogError(f"{path}: is not an MCAP file; it does not start like one", file=path)
             index_damage = ""
@@ -96,9 +97,6 @@ class McapFile(LogFile):
                     log_warning(logger, "damaged_index", text, file=path)
             else:
                 self._take_summary()
-        except BaseException:
-            self._stream.close()
-            raise
 
     def _typed(self, channel: Channel) -> Channel:
         """Give a channel without schema the type that was named."""

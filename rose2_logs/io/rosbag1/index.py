@@ -43,6 +43,7 @@ from rose2_logs.io.rosbag1.records import (
     time_ns,
 )
 from rose2_logs.io.source import DamagedMessageError
+from rose2_logs.system.files import OnFailure
 from rose2_logs.system.warnings import log_warning
 
 logger = logging.getLogger(__name__)
@@ -82,11 +83,8 @@ class BagFile(LogFile):
             self._size = path.stat().st_size
         except OSError as error:
             raise LogError(f"{path}: cannot be opened: {error.strerror}", file=path) from error
-        try:
+        with OnFailure(self._stream.close):
             self._open()
-        except BaseException:
-            self._stream.close()
-            raise
         self.message_counts = Counter(dict(zip(*self._counted(), strict=True)))
         times = self._index["time"]
         self.start_ns = int(times.min()) if len(times) else None

@@ -20,6 +20,7 @@ from rose2_logs.config.reading import ReadingParameters
 from rose2_logs.errors import LogError
 from rose2_logs.io.log_file import LATEST_NS, Channel, LogFile, Place, StoredMessage, check_count
 from rose2_logs.io.source import DamagedMessageError
+from rose2_logs.system.files import OnFailure
 from rose2_logs.system.warnings import log_warning
 
 logger = logging.getLogger(__name__)
@@ -60,19 +61,16 @@ class SqliteFile(LogFile):
             )
         except sqlite3.Error as error:
             raise LogError(f"{path}: cannot be opened: {error}", file=path) from error
-        try:
-            self._set_up()
-            self._read_channels()
-            rows = self._read_rows()
-            self._rows = rows[rows["channel"] != _NO_CHANNEL]
-        except _DAMAGE as error:
-            self.close()
-            raise LogError(
-                f"{path}: cannot be read as a bag: {error}; try `sqlite3 {path.name} .recover`", file=path
-            ) from error
-        except BaseException:
-            self.close()
-            raise
+        with OnFailure(self.close):
+            try:
+                self._set_up()
+                self._read_channels()
+                rows = self._read_rows()
+                self._rows = rows[rows["channel"] != _NO_CHANNEL]
+            except _DAMAGE as error:
+                raise LogError(
+                    f"{path}: cannot be read as a bag: {error}; try `sqlite3 {path.name} .recover`", file=path
+                ) from error
         channels, counts = np.unique(self._rows["channel"], return_counts=True)
         self.message_counts = Counter(dict(zip(channels.tolist(), counts.tolist(), strict=True)))
         times = self._rows["time"]
