@@ -274,7 +274,8 @@ def _open_storage(
     open_file, name, bag_name = _formats()[kind]
     size = sum(each.stat().st_size for each in (log.iterdir() if log.is_dir() else files) if each.is_file())
     scratch = tempfile.TemporaryDirectory(prefix="rose2_logs_") if any(map(_is_packed, files)) else None
-    with OnFailure(lambda: scratch and scratch.cleanup()):
+    clean_up = (lambda: None) if scratch is None else scratch.cleanup
+    with OnFailure(clean_up):
         if scratch is not None:
             files = [
                 _decompressed(file, Path(scratch.name, str(number)), limits) if _is_packed(file) else file
@@ -287,7 +288,7 @@ def _open_storage(
             limits,
             format_name=bag_name if is_bag else name,
             size_bytes=size,
-            on_close=(lambda: None) if scratch is None else scratch.cleanup,
+            on_close=clean_up,
         )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,7 +11,8 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from rose2_logs.drawing.palette import track_color
-from rose2_logs.model.room_plan import RoomPlan, predicted_parts, wall_outlines
+from rose2_logs.model.occupancy import FloatArray
+from rose2_logs.model.room_plan import PlanRoom, RoomPlan, predicted_parts, wall_outlines
 from rose2_logs.system.files import replacing
 
 if TYPE_CHECKING:
@@ -24,9 +26,19 @@ ROOMS, PREDICTED, DOORWAYS, WALLS, LABELS = "ROOMS", "PREDICTED", "DOORWAYS", "W
 LAYERS = {ROOMS: 7, PREDICTED: 8, DOORWAYS: 1, WALLS: 7, LABELS: 7}
 """Layers and their AutoCAD color indices: 7 is black or white, 8 gray, 1 red."""
 TEXT_HEIGHT_M = 0.25
-"""Readable on a print at 1:100 (2.5 mm)."""
-LABEL_RISE_M = 0.75 * TEXT_HEIGHT_M
-"""The two lines of a label are centered this far above and below its point, half a line apart."""
+"""Of labels at least, where there is space: readable on a print at 1:100 (2.5 mm)."""
+TEXT_SHARE = 1 / 75
+"""Height of labels as a share of that of the view which a file is opened with: 8 pixels of 600."""
+TEXT_MIN_M = 0.1
+"""Of labels in small rooms: below it, they cannot be read on a print at 1:100 (1 mm)."""
+TEXT_STEP = 0.9
+"""Labels become smaller by this factor until they are within their rooms."""
+LETTER_WIDTH = 0.8
+"""Width that a letter takes in the fonts of CAD programs, with the space beside it, in its height."""
+LINE_RISE = 0.75
+"""The two lines of a label are centered this many heights above and below its point, half a line apart."""
+TURNED_GAIN = 1.5
+"""A label is turned to be read from the right where it can then be this many times as high."""
 MARGIN = 1.05
 """Of the view that a file is opened with, over all that is drawn."""
 VIEW_ASPECT = 4 / 3
@@ -87,6 +99,8 @@ def _draw(plan: RoomPlan, space: Modelspace) -> None:
     from ezdxf.enums import TextEntityAlignment
 
     predicted = predicted_parts(plan)
+    x0, y0, x1, y1 = plan.bounds_m
+    wanted_m = max(TEXT_HEIGHT_M, TEXT_SHARE * MARGIN * max(y1 - y0, (x1 - x0) / VIEW_ASPECT))
     for room in plan.rooms:
         color = rgb2int(track_color(room.number))
         for ring in _rings(room.shape):
@@ -103,16 +117,36 @@ def _draw(plan: RoomPlan, space: Modelspace) -> None:
                 space.add_lwpolyline(ring, close=True, dxfattribs=attributes)
         if room.label_point_m is None:
             continue
+        lines = (room.name, f"{room.area_m2:.1f} m2")
+        height_m, is_turned = _label_size(room, max(map(len, lines)), wanted_m)
         x, y = room.label_point_m
-        for text, rise in ((room.name, LABEL_RISE_M), (f"{room.area_m2:.1f} m2", -LABEL_RISE_M)):
-            label = space.add_text(text, height=TEXT_HEIGHT_M, dxfattribs={"layer": LABELS})
-            label.set_placement((x, y + rise), align=TextEntityAlignment.MIDDLE_CENTER)
+        for text, rise_m in zip(lines, (LINE_RISE * height_m, -LINE_RISE * height_m), strict=True):
+            attributes = {"layer": LABELS, "rotation": 90.0 * is_turned}
+            label = space.add_text(text, height=height_m, dxfattribs=attributes)
+            middle = (x - rise_m, y) if is_turned else (x, y + rise_m)
+            label.set_placement(middle, align=TextEntityAlignment.MIDDLE_CENTER)
     for door in plan.doorways:
         start, end = door.ends_m.tolist()
         space.add_line(start, end, dxfattribs={"layer": DOORWAYS})
     for wall in wall_outlines(plan):
         for ring in _rings(wall):
             space.add_lwpolyline(ring, close=True, dxfattribs={"layer": WALLS})
+
+
+def _label_size(room: PlanRoom, letters: int, wanted_m: float) -> tuple[float, bool]:
+    """Height of a room's label, and whether it is turned, so that it is within the room where it can be."""
+    steps = math.ceil(math.log(TEXT_MIN_M / wanted_m, TEXT_STEP))
+    heights = np.maximum(wanted_m * TEXT_STEP ** np.arange(steps + 1), TEXT_MIN_M)
+    x, y = room.label_point_m or (0.0, 0.0)
+    long, short = heights * LETTER_WIDTH * letters / 2, heights * (LINE_RISE + 0.5)
+
+    def fitting(half_x: FloatArray, half_y: FloatArray) -> float:
+        boxes = shapely.box(x - half_x, y - half_y, x + half_x, y + half_y)
+        return float(heights[shapely.covers(room.shape, boxes)].max(initial=TEXT_MIN_M))
+
+    level_m, turned_m = fitting(long, short), fitting(short, long)
+    is_turned = turned_m >= TURNED_GAIN * level_m
+    return (turned_m if is_turned else level_m), is_turned
 
 
 def _rings(shape: BaseGeometry) -> list[list[tuple[float, float]]]:

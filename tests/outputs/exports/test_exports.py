@@ -126,6 +126,63 @@ def test_dxf_opens_on_the_plan(plan, tmp_path: Path):
     assert (corner >= high).all()
 
 
+def labels_of(plan, folder: Path):
+    """Texts of the labels in a DXF: what they say, height, angle in degrees, and the box that each is in."""
+    (file,) = write_plan(plan, ["dxf"], folder, "labels")
+    texts = ezdxf.readfile(file).modelspace().query('TEXT[layer=="LABELS"]')
+    boxes = [ezdxf.bbox.extents([each]) for each in texts]
+    return [
+        (each.dxf.text, each.dxf.height, each.dxf.rotation, shapely.box(*box.extmin.vec2, *box.extmax.vec2))
+        for each, box in zip(texts, boxes, strict=True)
+    ]
+
+
+def with_rooms(boxes_m):
+    """A plan of rooms in boxes (x0, y0, x1, y1), labeled in the middle."""
+    plan = two_rooms_plan()
+    rooms = [
+        dataclasses.replace(
+            plan.rooms[0],
+            number=number,
+            shape=shapely.box(*box),
+            label_point_m=tuple(np.add(box[:2], box[2:]) / 2),
+        )
+        for number, box in enumerate(boxes_m, start=1)
+    ]
+    return dataclasses.replace(plan, rooms=tuple(rooms), doorways=(), walls_m=np.zeros((0, 2, 2)), map=None)
+
+
+@pytest.mark.parametrize("side_m", [12.0, 80.0, 400.0])
+def test_labels_are_read_when_a_dxf_opens_and_are_within_their_rooms(side_m: float, tmp_path: Path):
+    """Those of a small room are smaller; along a narrow one they are read from the right."""
+    boxes = [
+        (0.0, 0.0, side_m, side_m / 2),
+        *(
+            tuple(side_m * np.array([x0, y0, x1, y1]))
+            for x0, y0, x1, y1 in ((0.0, 0.55, 0.1, 0.65), (0.2, 0.55, 0.24, 0.9), (0.3, 0.55, 0.9, 0.59))
+        ),
+    ]
+    plan = with_rooms(boxes)
+    labels = labels_of(plan, tmp_path)
+    names, heights, angles, _ = zip(*labels[::2], strict=True)
+    assert names == ("Room 1", "Room 2", "Room 3", "Room 4")
+    assert heights[0] == max(heights) >= max(0.25, side_m * 0.75 / 80)
+    assert angles == (0.0, 0.0, 90.0, 0.0)
+    for room, (_, height, _, box), (_, _, _, area_box) in zip(
+        plan.rooms, labels[::2], labels[1::2], strict=True
+    ):
+        assert height > 0.1
+        # A box has space for what letters as g reach below the line.
+        space = room.shape.buffer(0.3 * height)
+        assert space.covers(box)
+        assert space.covers(area_box)
+
+
+def test_a_label_in_a_closet_is_as_small_as_can_be_read(tmp_path: Path):
+    labels = labels_of(with_rooms([(0, 0, 30, 20), (0, 21, 0.3, 21.3)]), tmp_path)
+    assert labels[2][1] == pytest.approx(0.1)
+
+
 def test_overlapping_segments_are_one_wall():
     """Rows of cells a cell apart, both faces of a wall, and walls that meet; not what is apart."""
     rows = [[[0.0, y], [5.0, y]] for y in (0.0, 0.05, 0.1, 0.2)]
