@@ -24,7 +24,7 @@ from rose2_logs.io.messages import is_called_map, is_patch_type, ros_type
 from rose2_logs.io.parts import Part, Parts, find_parts, find_saved_parts, likeliest
 from rose2_logs.io.poses import RobotPath
 from rose2_logs.io.saved_maps import MapFilesSource
-from rose2_logs.io.scan_topics import mappable_topics
+from rose2_logs.io.scan_topics import mappable_topics, without_transforms
 from rose2_logs.io.source import DamagedMessageError, LoggedMap, LogInfo, MessageSource, TopicInfo, distinct
 from rose2_logs.model.occupancy import OccupancySnapshot
 from rose2_logs.system.warnings import log_warning
@@ -452,6 +452,8 @@ def choose_topic(info: LogInfo, asked: str | None = None) -> str:
         others = ", ".join(sorted({topic.message_type for topic in info.topics})[:MOST_LISTED])
         found = f", only {others}" if others else ""
         remedy = building or "record the mapping node's topic too, usually /map"
+        if scans_alone := without_transforms(info):
+            remedy = f"{scans_alone}; {remedy}, or the transforms"
         raise NoMapTopicError(
             f"{where} no topic has occupancy grids (nav_msgs/OccupancyGrid){found}; {remedy}"
         )

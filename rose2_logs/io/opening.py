@@ -405,6 +405,7 @@ def _without_masks(log: Path, maps: list[Path]) -> list[Path]:
 def _stored_in(log: Path) -> list[Path]:
     """A folder's files of the first storage kind found; annotated logs only if there are no others."""
     inside = [each for each in log.iterdir() if each.is_file()]
+    inside = [each for each in inside if plain_name(each.name).lower().endswith(STORAGE_ENDINGS)]
     inside = [each for each in inside if not each.name.endswith(ANNOTATED_ENDING)] or inside
     for suffix in STORAGE_ENDINGS:
         files = [each for each in inside if plain_name(each.name).lower().endswith(suffix)]
@@ -418,15 +419,17 @@ def _stored_in(log: Path) -> list[Path]:
 def _warn_files_as_one(log: Path, files: list[Path]) -> None:
     """Warn that files without a description are read as one run: they may be several, or incomplete."""
     names = [file.name for file in files]
-    inside = [each.name for each in log.iterdir() if each.is_file()]
-    stored = set(filter(is_storage, inside))
-    others = sorted(stored.difference(names))
+    inside = list(log.iterdir())
+    stored = {each.name for each in inside if each.is_file() and is_storage(each.name)}
+    bags = [f"{each.name}/" for each in inside if (each / BAG_DESCRIPTION).is_file()]
+    others = sorted(stored.difference(names)) + sorted(bags)
     if not others and (len(names) == 1 or is_bag(names, log.resolve().name)):
         return
     read = f"{names[0]} is" if len(names) == 1 else f"{len(names)} files from {names[0]} on are"
     ignored = f", {listed(others, _MOST_NAMED)} ignored" if others else ""
     text = (
-        f"{log}: has no {BAG_DESCRIPTION}; {read} read as one log{ignored}; if that is wrong, name the file"
+        f"{log}: has no {BAG_DESCRIPTION}; {read} read as one log{ignored}; if that is wrong, name the file, "
+        "or analyze the folder as a batch"
     )
     log_warning(logger, "files_as_one", text, file=log)
 

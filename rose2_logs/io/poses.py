@@ -16,6 +16,7 @@ from rose2_logs.io.grids import yaw_of
 from rose2_logs.io.messages import Fields, fields_of, ros_type
 from rose2_logs.io.source import LoggedBytes, LogInfo, MessageSource
 from rose2_logs.model.occupancy import FloatArray
+from rose2_logs.system.text import listed
 from rose2_logs.system.warnings import log_warning
 
 logger = logging.getLogger(__name__)
@@ -172,10 +173,10 @@ def _choose(
             return topics, _posed(source.stream(topics), read, start_ns)
     if transforms and not wanted.base:
         frames = sorted(_first_transforms(source, transforms))
-        known = f"{', '.join(frames[:FRAMES_TOLD])}{' ...' if len(frames) > FRAMES_TOLD else ''}"
         text = (
             f"{path}: the robot's way is not known: no transforms lead from {wanted.frame!r} to a frame with "
-            f"the name of a base, such as {BASE_FRAMES[0]}; base_frame=NAME names it, of {known or 'none'}"
+            f"the name of a base, such as {BASE_FRAMES[0]}; base_frame=NAME names it, of "
+            f"{listed(frames, FRAMES_TOLD) or 'none'}"
         )
         log_warning(logger, "base_frame", text, file=path)
     return (), iter(())

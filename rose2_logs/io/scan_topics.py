@@ -29,6 +29,15 @@ def transform_topics(info: LogInfo) -> tuple[str, ...]:
     return _topics(info, TRANSFORM_TYPES)
 
 
+def without_transforms(info: LogInfo) -> str:
+    """Say that a log has laser scans, but nothing that tells where they were taken; else nothing."""
+    scans = scan_topics(info)
+    if not scans or transform_topics(info):
+        return ""
+    holding = f"{', '.join(scans)} {'holds' if len(scans) == 1 else 'hold'} laser scans"
+    return f"{holding}, but no transforms (/tf) tell where they were taken"
+
+
 def mappable_topics(info: LogInfo) -> tuple[str, ...]:
     """Topics with laser scans from which maps can be built: the log also says where they were taken."""
     if info.format == CARMEN_FORMAT:

@@ -181,7 +181,8 @@ class TrackedStream:
     def _step(self, snapshot: OccupancySnapshot, analysis: SnapshotAnalysis) -> TrackedSnapshot:
         note = coarser_for_its_size(snapshot.geometry, analysis.resolution_m, self._occupancy)
         if note is not None and not self._has_told_coarser:
-            logger.warning("snapshot %d and those of its size: %s", snapshot.index, note)
+            text = f"{self._source}: snapshot {snapshot.index} and those of its size: {note}"
+            log_warning(logger, "coarser", text, file=self._source, topic=self._topic)
             self._has_told_coarser = True
         if not self._has_told_far:
             far = find_far_cells(snapshot.cells, snapshot.geometry.resolution_m, self._occupancy)

@@ -34,7 +34,7 @@ from rose2_logs.runs.stream import SnapshotWorkers, TrackedStream, start_workers
 from rose2_logs.runs.summary import SUMMARY, write_summary
 from rose2_logs.runs.tables import BACK_PROJECTED, TABLES
 from rose2_logs.system.files import refuse_existing, require_short, require_utf8
-from rose2_logs.system.warnings import WarningLog, collect_warnings, muted
+from rose2_logs.system.warnings import WarningLog, collect_warnings, log_warning, muted
 from rose2_logs.system.workers import usable_processes
 from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot
 
@@ -277,7 +277,8 @@ def _follow(
         _project_back(reader, history, store, sinks)
         note = left_out_note(history.totals.outside_m2_last, history.totals.free_m2_last)
         if note is not None:
-            logger.warning("%s: in the last map, %s", info.origin or info.log_path, note)
+            where = info.origin or info.log_path
+            log_warning(logger, "outside", f"{where}: in the last map, {note}", file=where)
         if options.names is not None and names is not None:
             tell_unused(Path(options.names), names.unused(used, tracks))
         summary = store.finish(history, usable_processes(options.workers))

@@ -163,10 +163,13 @@ def segment_snapshot(
     if (odd := oddity(snapshot, parameters.occupancy)) is not None:
         log_warning(logger, odd[0], f"{name}: {odd[1]}")
     found, tree = analyze_with_tree(snapshot, parameters, method, voronoi=voronoi)
-    coarser = coarser_for_its_size(snapshot.geometry, found.resolution_m, parameters.occupancy)
-    for note in (coarser, left_out_note(found.outside_m2, found.free_area_m2)):
+    notes = {
+        "coarser": coarser_for_its_size(snapshot.geometry, found.resolution_m, parameters.occupancy),
+        "outside": left_out_note(found.outside_m2, found.free_area_m2),
+    }
+    for kind, note in notes.items():
         if note is not None:
-            logger.warning("%s: %s", name, note)
+            log_warning(logger, kind, f"{name}: {note}")
     stages = {each.name: getattr(found, each.name) for each in fields(found)}
     return Segmentation(**stages, snapshot=snapshot, parameters=parameters, name=name, _tree=tree)
 

@@ -90,6 +90,13 @@ def test_the_same_comparison_gives_the_same_tables(cli, results, tmp_path: Path)
         assert (tmp_path / "one" / table).read_bytes() == (tmp_path / "two" / table).read_bytes()
 
 
+def test_what_is_not_moved_has_no_sign(cli, results, tmp_path: Path):
+    """Not even where the place that was found is too little below zero to be shown."""
+    code, out, _ = cli("compare", results[0], results[0], "-o", tmp_path / "same")
+    assert code == 0
+    assert re.search(r"^B's frame in A's +\+0\.00, \+0\.00 m, turned by \+0\.00 deg", out, re.MULTILINE)
+
+
 def test_a_comparison_needs_neither_the_annotated_log_nor_the_log(cli, results, tmp_path: Path):
     """The last maps, rooms and walls are stored with the results, and nothing is analyzed again."""
     assert cli("compare", *results, "-o", tmp_path / "with", "--no-rrd")[0] == 0

@@ -34,6 +34,19 @@ def test_the_error_and_info_offer_it(cli, log, tmp_path):
     assert json.loads(cli("info", log, "--json")[1])["map_from"] == ["/scan"]
 
 
+def test_what_scans_lack_is_told(cli, tmp_path):
+    bearings = np.linspace(-1.0, 1.0, 9)
+    scans = [("/scan", Scan(float(k), np.ones(9), bearings)) for k in range(3)]
+    alone = write_scans(tmp_path / "alone.mcap", scans)
+    told = "/scan holds laser scans, but no transforms (/tf) tell where they were taken"
+    code, _, err = cli("analyze", alone, "-o", tmp_path / "out")
+    assert code == 2
+    assert f"{told}; record the mapping node's topic too, usually /map, or the transforms" in err
+    code, out, _ = cli("info", alone)
+    assert code == 0
+    assert f"no occupancy grids; {told}: analyze cannot use this log" in out
+
+
 def test_rooms_are_found_in_built_maps_and_these_are_in_the_annotated_log(cli, log, tmp_path):
     settings = ("--every", "30", "--set", "mapping.usable_range_m=6")
     code, _, err = cli("analyze", log, "-o", tmp_path / "out", "--map-from", "/scan", *settings, "--no-rrd")

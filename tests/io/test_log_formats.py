@@ -502,6 +502,19 @@ def test_a_folder_of_several_logs_is_not_taken_for_one_without_a_word(tmp_path):
     )
 
 
+def test_bags_below_a_log_are_not_ignored_without_a_word(tmp_path):
+    log = run_of_maps()
+    (tmp_path / "runs").mkdir()
+    write_mcap(tmp_path / "runs" / "monday.mcap", log)
+    for day in ("friday", "tuesday"):
+        write_rosbag2(tmp_path / "runs" / day, log, "MCAP")
+    with collect_warnings() as warning_log:
+        assert_are(read(tmp_path / "runs"), growing_maps())
+    told = warning_log.kinds["files_as_one"].first[0]["message"]
+    assert "monday.mcap is read as one log, friday/, tuesday/ ignored" in told
+    assert told.endswith("or analyze the folder as a batch")
+
+
 def test_an_annotated_copy_beside_a_log_is_no_part_of_it(tmp_path):
     log = run_of_maps()
     (tmp_path / "run").mkdir()
@@ -511,6 +524,7 @@ def test_an_annotated_copy_beside_a_log_is_no_part_of_it(tmp_path):
         assert_are(read(tmp_path / "run"), growing_maps()[:3])
     assert not warning_log.kinds
     (tmp_path / "run" / "run_0.mcap").unlink()
+    (tmp_path / "run" / "summary.json").write_text("{}")
     assert_are(read(tmp_path / "run"), growing_maps())
 
 

@@ -78,6 +78,8 @@ def _print_overview(found: LayoutComparison) -> None:
 
     x, y, yaw = found.placement.motion.pose
     yaw_deg = math.degrees(math.remainder(yaw, 2 * math.pi))
+    # Rounded, and 0.0 added, as what is too little to be shown may be below zero.
+    x, y, yaw_deg = (round(each, 2) + 0.0 for each in (x, y, yaw_deg))
     table = Table(box=None, show_header=False, pad_edge=False)
     table.add_row("A", f"{shown(found.a.name)}, {len(found.a.tracks)} rooms")
     table.add_row("B", f"{shown(found.b.name)}, {len(found.b.tracks)} rooms")

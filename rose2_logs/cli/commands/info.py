@@ -11,6 +11,7 @@ from rose2_logs.cli.flags import with_flags
 from rose2_logs.cli.messages import printable
 from rose2_logs.cli.printing import duration, megabytes, print_json, print_line, print_table, shown
 from rose2_logs.config.parameters import Parameters
+from rose2_logs.io.scan_topics import without_transforms
 
 if TYPE_CHECKING:
     from rose2_logs.workflows.info import LogFacts, MapFacts
@@ -65,7 +66,7 @@ def print_log_facts(facts: LogFacts) -> None:
         print_line(f"  first map {_map_line(topic_facts.first)}")
         print_line(f"  last map  {_map_line(topic_facts.last)}")
         if topic_facts.coverage_first is not None:
-            print_line(f"  coverage  {topic_facts.coverage_first:.1%} to 100%")
+            print_line(f"  coverage  {topic_facts.coverage_first:.1%} to 100.0%")
     if not facts.maps and facts.map_from:
         scans = escape(printable(facts.map_from[0]))
         print_line(f"no occupancy grids: analyze --map-from {scans} builds maps from its laser scans")
@@ -75,7 +76,8 @@ def print_log_facts(facts: LogFacts) -> None:
             "analyze --type nav_msgs/OccupancyGrid reads them"
         )
     elif not facts.maps:
-        print_line("no occupancy grids: analyze cannot use this log")
+        scans = escape(printable(without_transforms(info)))
+        print_line(f"no occupancy grids{scans and '; '}{scans}: analyze cannot use this log")
 
 
 def _map_line(facts: MapFacts) -> str:
