@@ -341,6 +341,9 @@ class LogReader:
             return self._chosen(whole)  # maps of one time cannot be told apart
         publishers = self.source.publishers(self.topic)
         found = find_parts(times, self._grid, self._occupancy, publishers)
+        if found.why and len(found.parts) == 1:
+            text = f"{self.info.path}: {self.topic}: {found.why}"
+            log_warning(logger, "in_turn", text, file=self.info.path, topic=self.topic)
         if len(self._topics) > 1 and len(found.parts) > 1:
             # Patches are of the full map before them, which does not say who published them.
             found = found.with_patches(self._all_times()) if found.is_one_run else whole

@@ -8,6 +8,7 @@ several runs, one part is read.
 from __future__ import annotations
 
 import re
+from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -49,12 +50,21 @@ SAME_WALLS_SHARE = 0.5
 mask it is 3 %. Floors of one building share so many that only their names tell."""
 TURN_WALLS_SHARE = 0.8
 """The same where buildings come in turn: of one that the log comes back to, nearly all walls are there."""
+ALIKE_SHARE = 0.1
+"""A map shows this share more of the walls of the map before the last than of those of the last one where two
+publishers with much the same building take turns. In a run it is below 1 %, but where a map was bad."""
+LEAST_ALIKE = 0.25
+"""Share of such maps from which on it is told: a door may open and close a few times."""
 KEPT_SHARE = 0.8
 """Share of a map's free area that the next map of its run has at least."""
 FLOOR = re.compile(
     r"(floor|level|stor(e?)y|etage|building|bldg)[ _-]*[a-z0-9]+|[0-9]+(st|nd|rd|th)[ _-]*floor"
 )
 """What names of maps tell of floors."""
+ALIKE = (
+    "{} of its first {} maps show the walls of the map before the last rather than those of the last one, "
+    "as if two nodes published much the same building in turn; they are not told apart"
+)
 LEAST_WALL_CELLS = 100
 """Walls that two maps show, 5 m of 5 cm, below which they are not compared."""
 MOST_COMPARED = 2000
@@ -100,7 +110,7 @@ class Parts:
     ----------
     parts : tuple of Part
     why : str
-        What shows that there are several.
+        What shows that there are several; of one part, what looks as if there were.
     is_one_run : bool
         Whether they follow one another in one log, so that they are parts of one run.
     """
@@ -155,7 +165,7 @@ class _Maps:
         self._facts: dict[int, MapFacts | None] = {}
         self._walls_kept: dict[tuple[int, int], float] = {}
         self._has_moved: dict[tuple[int, int], bool] = {}
-        self._held: tuple[int, _Seen | None] = (-1, None)
+        self._held: deque[tuple[int, _Seen]] = deque(maxlen=2)
 
     def facts(self, place: int) -> MapFacts | None:
         """Return what is known of a map; None if it cannot be read."""
@@ -179,6 +189,15 @@ class _Maps:
             self._look(now)
         return self._walls_kept[before, now]
 
+    def like_before_last(self) -> int:
+        """How many maps show the walls of the map before the last, and fewer of those of the last one."""
+        kept = self._walls_kept
+        return sum(
+            kept[pair] - kept.get((pair[0] + 1, pair[1]), 1.0) >= ALIKE_SHARE
+            for pair in kept
+            if pair[1] == pair[0] + 2
+        )
+
     def _is_moved(self, before: int, now: int) -> bool:
         """Whether a map shows the walls of an earlier one, moved as a whole."""
         if (before, now) not in self._has_moved:
@@ -190,14 +209,19 @@ class _Maps:
 
     def _look(self, place: int) -> None:
         """Read a map, and compare it with the one that was read before."""
-        before, held = self._held
-        if place == before:
+        if self._held and place == self._held[-1][0]:
             return
         now = self._read(int(self._times[place]))
-        if held is not None and now is not None:
-            self._walls_kept[before, place] = _walls_kept(held, now, self._occupancy)
-        self._held = place, None if now is None else _Seen.of(now, self._occupancy)
-        self._facts[place] = None if self._held[1] is None else self._held[1].facts
+        if now is None:
+            self._facts[place] = None
+            return
+        for before, held in reversed(self._held):
+            kept = self._walls_kept[before, place] = _walls_kept(held, now, self._occupancy)
+            if kept > 1 - ALIKE_SHARE:
+                break  # of none it can show much more
+        seen = _Seen.of(now, self._occupancy)
+        self._held.append((place, seen))
+        self._facts[place] = seen.facts
 
 
 def find_parts(
@@ -238,10 +262,14 @@ def find_parts(
     if begins_in_turn and (of_each := _buildings_in_turn(all_maps, maps)):
         parts = [_part(times, places, maps.facts) for places in of_each]
         return Parts(tuple(parts), "maps of several buildings come in turn, as of several publishers")
+    alike = maps.like_before_last()
     spread = _spread(range(len(times)))
     begins = [0, *_begins(spread, maps), len(times)]
     parts = [_part(times, range(low, high), maps.facts, spread) for low, high in pairwise(begins)]
-    return Parts(tuple(parts), "the map is begun anew" if len(parts) > 1 else "", is_one_run=True)
+    if len(parts) > 1:
+        return Parts(tuple(parts), "the map is begun anew", is_one_run=True)
+    is_mixed = alike >= max(LEAST_TURNS, LEAST_ALIKE * len(first))
+    return Parts(tuple(parts), ALIKE.format(alike, len(first)) if is_mixed else "", is_one_run=True)
 
 
 def _spread(places: Sequence[int]) -> list[int]:

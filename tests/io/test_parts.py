@@ -240,6 +240,20 @@ def test_publishers_with_one_grid_are_told_apart_by_their_buildings(count, tmp_p
     assert len(read(path, part=2)[0]) == 1
 
 
+@pytest.mark.parametrize("grows", [True, False])
+def test_publishers_with_much_the_same_building_are_told(grows, tmp_path):
+    """As a map server beside a SLAM where walls were moved: 85 % of those of both are the same."""
+    changed = building([5, 25, 40, 90], [5, 30, 72, 123, 154, 170])
+    grown = [np.where(np.arange(200) < (columns if grows else 200), HOUSE, -1) for columns in GROWING]
+    _, parts, kinds = read(log_of(tmp_path / "run.mcap", [each for one in grown for each in (one, changed)]))
+    assert parts is None
+    (told,) = kinds["in_turn"].first
+    assert "of its first 10 maps show the walls of the map before the last" in told["message"]
+    # One map of another building in between, now and then, is none of a publisher.
+    maps = [*grown, changed, *[HOUSE] * 10, changed, *[HOUSE] * 10]
+    assert "in_turn" not in read(log_of(tmp_path / "few.mcap", maps))[2]
+
+
 def test_buildings_that_come_in_turn_at_the_beginning_only_are_of_one_run(tmp_path):
     """A window that goes back and forth between two places, and on to many others later in a long log."""
 
