@@ -45,8 +45,9 @@ _PARAMETER = re.compile(r"\bthe parameter (\w+\.\w+)")
 def with_flags(message: str) -> str:
     """Return a message of the library with options and parameters as the command line has them.
 
-    The library knows no flags: its messages name options as Python writes them, ``overwrite=True``.
+    The library knows no flags: its messages name options as Python writes them, ``overwrite=True``. What
+    stands in quotes was given by the user and stays.
     """
     flags = _flags()
-    options = re.compile(r"(?<![\w/])(?:" + "|".join(map(re.escape, flags)) + ")")
+    options = re.compile(r"(?<![\w/'])(?:" + "|".join(map(re.escape, flags)) + ")")
     return _PARAMETER.sub(r"--set \1", options.sub(lambda found: flags[found[0]], message))

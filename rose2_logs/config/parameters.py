@@ -29,7 +29,6 @@ from rose2_logs.config.reading import ReadingParameters
 from rose2_logs.config.regions import RegionParameters
 from rose2_logs.config.tracking import QualityParameters, TrackingParameters
 from rose2_logs.errors import ParameterError
-from rose2_logs.system.files import reason_of
 
 CELL_VALUES = ("auto", "stored", "percent", "zero_one", "fifty_unknown", "costs")
 """How the numbers in the cells of maps can be read."""
@@ -554,14 +553,18 @@ def load_parameters(config: Path | None = None, settings: Iterable[str] = ()) ->
 
         try:
             parameters = parameters.replaced(tomllib.loads(config.read_text(encoding="utf-8")))
-        except (OSError, ValueError, RecursionError) as error:
-            raise ParameterError(f"{config}: cannot be read as TOML: {reason_of(error)}") from error
+        except OSError as error:
+            raise ParameterError(f"{config}: cannot be read: {error.strerror}") from error
+        except (ValueError, RecursionError) as error:
+            raise ParameterError(f"{config}: cannot be read as TOML: {error}") from error
     for setting in settings:
         try:
             parsed = _parsed_setting(setting)
         except (ValueError, RecursionError) as error:  # also a number of thousands of digits
             shown = setting if len(setting) <= LONGEST_SHOWN else f"{setting[:LONGEST_SHOWN]}..."
-            raise ParameterError(f"setting {shown!r}: write it as block.name=value") from error
+            name, sign, _ = setting.partition("=")
+            hint = "; its value is a number as 4.5, a name, or true or false" if sign and "." in name else ""
+            raise ParameterError(f"setting {shown!r}: write it as block.name=value{hint}") from error
         if not all(isinstance(values, Mapping) for values in parsed.values()):
             meant = _meant(next(iter(parsed)))
             hint = f"; {meant}" if meant else ""

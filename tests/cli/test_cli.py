@@ -152,6 +152,8 @@ def test_time_options_are_seconds_into_the_log(cli, maps: Path, tmp_path: Path):
         (["analyze", "nowhere.mcap", "-o", "out"], "nowhere.mcap"),
         (["analyze", "x.bag", "-o", "out", "--set", "walls.nothing=1"], "walls.nothing"),
         (["analyze", "x.bag", "-o", "out", "--set", "walls.cluster_gap_m=wide"], "of type float, not 'wide'"),
+        (["analyze", "x.bag", "-o", "out", "--set", "walls.extension_m=4,5"], "its value is a number as 4.5"),
+        (["analyze", "x.bag", "-o", "out", "--config", "no.toml"], "no.toml: cannot be read: No such file"),
         (["analyze", "x.bag", "-o", "out", "--set", "walls.cluster_gap_m"], "write it as block.name=value"),
         (["analyze", "x.bag", "-o", "out", "--set", "floor_plan.grouping=x"], "it must be one of"),
         (["analyze", "x.bag", "-o", "out", "--set", "floor_plan.grouping=dbscan"], "x.bag"),

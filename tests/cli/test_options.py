@@ -73,6 +73,7 @@ def test_no_message_of_the_library_names_a_flag():
         ("choose one (topic='/map')", "(--topic '/map')"),
         ("start_s=nan: it must be", "--start nan: it must be"),
         ("raise the parameter reading.map_max_cells", "raise --set reading.map_max_cells"),
+        ("setting 'detail=2': write it as", "setting 'detail=2': write it as"),
         ("/data/topic=7/run.mcap: cannot be read", "/data/topic=7/run.mcap: cannot be read"),
     ],
 )
