@@ -52,6 +52,7 @@ MASK_WORDS = ("mask", "keepout", "speed_limit")
 """In the names of masks of costmap filters: where a robot must not go, or go slowly."""
 _TOLD_FROM_BYTES = 100_000_000
 """Compressed files of this size or more take a while, and their room on the disk."""
+_ARCHIVE_ENDINGS = frozenset((".zip", ".tar", ".tgz", ".tbz2", ".txz", ".7z", ".rar"))
 _MOST_NAMED = 3
 """Number of files that a warning names."""
 _FORMATS = (
@@ -345,6 +346,8 @@ def _kind(file: Path) -> str:
         holds = "holds no" if is_packed(begin) else "does not start like a"
         what = "is empty" if not begin else f"{holds} {kind} file"
         raise LogError(f"{file}: {what}; was it copied completely?", file=file)
+    if _ARCHIVE_ENDINGS.intersection(PurePosixPath(name).suffixes):
+        raise LogError(f"{file}: is an archive; unpack it, and give the log in it", file=file)
     raise LogError(f"{file}: is not a supported kind of log; give {_FORMATS}", file=file)
 
 

@@ -581,6 +581,8 @@ def test_a_map_topic_on_which_nothing_was_recorded_is_said_to_be_empty(tmp_path)
         ("short.mcap", b"\x89MCAP0\r\n", None),
         ("short.db3", b"SQLite format 3\0", "cannot be read as a bag"),
         ("laser.log", b"FLASER 1 2 3", "line 1 is no whole FLASER message"),
+        ("run.zip", b"PK\3\4 and so on", "is an archive; unpack it"),
+        ("run.tar.gz", b"\x1f\x8b and so on", "is an archive; unpack it"),
         ("text.log", b"just some text", "not a supported kind of log"),
         ("map.yaml", b"- a list", "does not describe a map"),
         ("map.pgm", b"P5 1 1 255 \0", "map.yaml next to it"),
