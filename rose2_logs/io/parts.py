@@ -52,7 +52,7 @@ TURN_WALLS_SHARE = 0.8
 """The same where buildings come in turn: of one that the log comes back to, nearly all walls are there."""
 ALIKE_SHARE = 0.1
 """A map shows this share more of the walls of the map before the last than of those of the last one where two
-publishers with much the same building take turns. In a run it is below 1 %, but where a map was bad."""
+publishers with much the same building take turns. In a run it is below 2 %, but where a map was bad."""
 LEAST_ALIKE = 0.25
 """Share of such maps from which on it is told: a door may open and close a few times."""
 KEPT_SHARE = 0.8
