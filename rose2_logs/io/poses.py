@@ -226,8 +226,8 @@ def _connected(source: MessageSource, topics: tuple[str, ...], wanted: _Wanted) 
     if robots := _robots_in(wanted, edges):
         if len(robots) > 1:
             text = (
-                f"{path}: the robot's way is that of {robots[0]}; {', '.join(robots[1:])} are other robots, "
-                "which are not shown; base_frame=NAME chooses one"
+                f"{path}: the robot's way is that of {robots[0]}; other robots are not shown "
+                f"({', '.join(robots[1:])}); base_frame=NAME chooses one"
             )
             log_warning(logger, "one_robot", text, file=path, topic=topics[0])
         return replace(wanted, base=robots[0])

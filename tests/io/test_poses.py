@@ -216,7 +216,7 @@ def test_the_way_is_that_of_the_robot_in_the_namespace_of_the_map(tmp_path, capl
 def test_of_two_robots_on_one_topic_one_is_shown_and_the_other_is_told_of(tmp_path, caplog):
     path = write(tmp_path / "run.mcap", both_robots(("/tf", "/tf"), ("one/base_link", "two/base_link")))
     assert set(way(path)[1][:, 1]) == {1.0}
-    assert "two/base_link are other robots" in caplog.text
+    assert "other robots are not shown (two/base_link)" in caplog.text
     with open_log(path) as log:
         assert set(log.robot_path("map", "two/base_link").until(2**62)[:, 1]) == {7.0}
         assert log.decided["path"] == "/tf"
@@ -250,7 +250,7 @@ def test_names_of_robots_may_end_with_an_underscore(tmp_path, caplog):
     with open_log(write(tmp_path / "run.mcap", messages)) as log:
         for topic, y in (("/map", 1.0), ("/robot2/map", 7.0)):
             assert set(RobotPath(log.source, "map", map_topic=topic).until(2**62)[:, 1]) == {y}
-    assert "robot2_base_link are other robots" in caplog.text
+    assert "other robots are not shown (robot2_base_link)" in caplog.text
 
 
 def test_a_robot_is_not_what_it_carries(tmp_path, caplog):
