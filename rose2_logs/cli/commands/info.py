@@ -11,7 +11,6 @@ from rose2_logs.cli.flags import with_flags
 from rose2_logs.cli.messages import printable
 from rose2_logs.cli.printing import duration, megabytes, print_json, print_line, print_table, shown
 from rose2_logs.config.parameters import Parameters
-from rose2_logs.io.scan_topics import without_transforms
 
 if TYPE_CHECKING:
     from rose2_logs.workflows.info import LogFacts, MapFacts
@@ -76,6 +75,8 @@ def print_log_facts(facts: LogFacts) -> None:
             "analyze --type nav_msgs/OccupancyGrid reads them"
         )
     elif not facts.maps:
+        from rose2_logs.io.scan_topics import without_transforms
+
         scans = escape(printable(without_transforms(info)))
         print_line(f"no occupancy grids{scans and '; '}{scans}: analyze cannot use this log")
 
