@@ -12,7 +12,7 @@ from shapely.geometry.base import BaseGeometry
 
 from rose2_logs.config.tracking import QualityParameters
 from rose2_logs.model.explored import ExploredPart
-from rose2_logs.model.labels import contacts
+from rose2_logs.model.labels import contacts, distance_from
 from rose2_logs.model.occupancy import UNKNOWN, BoolArray, FloatArray, OccupancySnapshot
 from rose2_logs.model.rooms import RoomMap
 
@@ -115,13 +115,10 @@ def _within(mask: BoolArray, reach_cells: float) -> BoolArray:
     """Cells no further from one of a mask (H, W) than a number of cells."""
     import cv2
 
-    def is_near(mask: BoolArray) -> BoolArray:
-        return cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5) <= reach_cells
-
     if reach_cells > DISK_MAX_CELLS:
-        return is_near(mask)
+        return distance_from(mask) <= reach_cells
     middle = int(reach_cells) + 1
-    disk = is_near(np.pad([[True]], middle))
+    disk = distance_from(np.pad([[True]], middle)) <= reach_cells
     return cv2.dilate(mask.astype(np.uint8), disk.astype(np.uint8)) > 0
 
 

@@ -10,7 +10,7 @@ from skimage.measure import label
 from skimage.segmentation import watershed
 
 from rose2_logs.config.regions import RegionParameters
-from rose2_logs.model.labels import contacts, label_sizes
+from rose2_logs.model.labels import contacts, distance_from, label_sizes
 from rose2_logs.model.occupancy import BoolArray
 from rose2_logs.segmentation.regions.plan_frame import Labels, PlanFrame, grown_labels
 
@@ -63,7 +63,7 @@ def clearance_basins(
     free: BoolArray, blocked: BoolArray, cell_m: float, parameters: RegionParameters
 ) -> Labels:
     """Basins (H, W) of the clearance on the free cells: each belongs to one summit."""
-    distance = cv2.distanceTransform((~blocked).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
+    distance = distance_from(blocked)
     # No clearance is larger than what 16 bits tell.
     steps = np.rint(np.minimum(distance, np.iinfo(np.uint16).max // CLEARANCE_STEPS) * CLEARANCE_STEPS)
     sigma = parameters.clearance_blur_m / cell_m

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rose2_logs.model.labels import contacts, numbered
+from rose2_logs.model.labels import contacts, distance_from, numbered
 from rose2_logs.model.occupancy import BoolArray, FloatArray
 from rose2_logs.segmentation.regions.plan_frame import Labels, grown_labels, without_specks
 from rose2_logs.segmentation.regions.plan_raster import OFFSETS, PlanRaster
@@ -272,5 +272,5 @@ def _share_along(
 
 
 def _clearance(blocked: BoolArray, cell_m: float) -> NDArray[np.float32]:
-    distance = cv2.distanceTransform((~blocked).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
+    distance = distance_from(blocked)
     return (distance * np.float32(cell_m)).astype(np.float32)
