@@ -95,7 +95,7 @@ def guarded_port(host: str, port: int, behind: tuple[str, int]) -> Iterator[int]
     loop = asyncio.new_event_loop()
     gate = _Gate((host,), behind)
     # As with other servers, a port of one that has just ended can be taken again.
-    server = loop.run_until_complete(asyncio.start_server(gate.receive, host, port, limit=HEAD_MOST_BYTES))
+    server = loop.run_until_complete(asyncio.start_server(gate.accept, host, port, limit=HEAD_MOST_BYTES))
     thread = threading.Thread(target=loop.run_forever, daemon=True)
     thread.start()
     try:
@@ -108,12 +108,12 @@ def guarded_port(host: str, port: int, behind: tuple[str, int]) -> Iterator[int]
 
 
 async def _ended(server: asyncio.Server) -> None:
-    """Close a server and its connections."""
+    """Close a server and its connections, those too that are just being accepted."""
     server.close()
-    open_connections = [task for task in asyncio.all_tasks() if task is not asyncio.current_task()]
-    for task in open_connections:
-        task.cancel()
-    await asyncio.gather(*open_connections, return_exceptions=True)
+    while tasks := asyncio.all_tasks() - {asyncio.current_task()}:
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
 
 
 class _Gate:
@@ -122,8 +122,19 @@ class _Gate:
     def __init__(self, names: tuple[str, ...], behind: tuple[str, int]) -> None:
         self._names = names
         self._behind = behind
+        self._connections: set[asyncio.Task[None]] = set()
 
-    async def receive(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    def accept(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        """Begin a connection, as a task of ours.
+
+        Of a coroutine, asyncio would make the task itself, and up to Python 3.11 it logs a traceback where
+        that one is cancelled.
+        """
+        task = asyncio.get_running_loop().create_task(self._receive(reader, writer))
+        self._connections.add(task)
+        task.add_done_callback(self._connections.discard)
+
+    async def _receive(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         try:
             with suppress(OSError, asyncio.IncompleteReadError, asyncio.LimitOverrunError, TimeoutError):
                 head = await asyncio.wait_for(reader.readuntil(b"\r\n\r\n"), HEAD_WAIT_S)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import gc
 import http.client
 import socket
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import pytest
@@ -116,6 +117,17 @@ def test_programs_that_speak_http_2_pass():
             assert inside.recv(100).startswith(HTTP2)
             inside.sendall(b"settings")
         assert link.recv(100) == b"settings"
+
+
+def test_connections_still_open_at_the_end_are_closed_without_a_word(caplog: pytest.LogCaptureFixture):
+    """Some wait for the end of a head, some are just being accepted; asyncio logs tasks that end badly."""
+    for _ in range(20):
+        with ExitStack() as links, guarded_port("127.0.0.1", 0, ("127.0.0.1", 1)) as port:
+            for _ in range(5):
+                link = links.enter_context(socket.create_connection(("127.0.0.1", port), timeout=60))
+                link.sendall(b"GET / HTTP/1.1\r\n")
+        gc.collect()
+    assert caplog.records == []
 
 
 def test_a_port_in_use_is_an_error():
