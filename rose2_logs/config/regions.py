@@ -119,4 +119,17 @@ class RegionParameters(ParameterBlock):
     piece_gap_m: float = number(
         0.3, "m", "Pieces of a room hang together across gaps of this much noise; others are rooms.", 0.0
     )
+    object_max_m2: float = number(
+        3.0,
+        "m2",
+        "Pieces below that a wall closes in the midst of their room lie within an object, such as a stack of "
+        "pallets, and are no rooms. Stalls are as small, but beside other rooms or the unknown.",
+        0.0,
+    )
+    object_wall_m: float = number(
+        0.3, "m", "What lies around such a piece is looked at across a wall of this thickness.", 0.0
+    )
+    object_min_surrounded: float = number(
+        0.9, "share", "A piece with this much of its own room around it lies in its midst.", 0, 1
+    )
     door_max_width_m: float = number(1.4, "m", "Wider openings between rooms are not doors.", 0.0)

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from rose2_logs.config.regions import RegionParameters
 from rose2_logs.model.occupancy import BoolArray
 
 
@@ -14,10 +15,13 @@ def rooms_in_one_piece(
     labels: NDArray[np.int32],
     occupied: BoolArray,
     resolution_m: float,
-    gap_m: float,
     piece_min_m2: float,
+    parameters: RegionParameters,
 ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
     """Make rooms of their own of the pieces of a room that do not hang together.
+
+    A small piece that a wall closes in the midst of its room is no room: it is the floor within an object,
+    such as a stack of pallets or a column, and is left out.
 
     Parameters
     ----------
@@ -27,10 +31,10 @@ def rooms_in_one_piece(
         Occupied cells: what they close is no gap.
     resolution_m : float
         Side of a cell.
-    gap_m : float
-        Pieces hang together across gaps up to this wide: noise, the legs of furniture.
     piece_min_m2 : float
         Smaller pieces stay with the largest one of their room.
+    parameters : RegionParameters
+        How wide a gap pieces hang together across, and what is within an object.
 
     Returns
     -------
@@ -42,8 +46,7 @@ def rooms_in_one_piece(
     count = int(labels.max(initial=0))
     pieces = labels.copy()
     rooms = list(range(count + 1))
-    reach = max(0, round(gap_m / resolution_m / 2))
-    kernel = np.ones((2 * reach + 1, 2 * reach + 1), np.uint8)
+    kernel = _square(parameters.piece_gap_m / resolution_m / 2)
     for room, box in enumerate(ndimage.find_objects(labels, max_label=count), start=1):
         if box is None:
             continue
@@ -56,6 +59,39 @@ def rooms_in_one_piece(
         cells = np.bincount(components[inside], minlength=number)
         large = np.flatnonzero(cells * resolution_m**2 >= piece_min_m2)
         for other in large[large != cells.argmax()].tolist():
-            pieces[box][inside & (components == other)] = len(rooms)
+            piece = inside & (components == other)
+            is_small = cells[other] * resolution_m**2 < parameters.object_max_m2
+            if is_small and _is_within_object(labels, occupied, room, box, piece, resolution_m, parameters):
+                pieces[box][piece] = 0
+                continue
+            pieces[box][piece] = len(rooms)
             rooms.append(room)
     return pieces, np.array(rooms, np.int32)
+
+
+def _is_within_object(
+    labels: NDArray[np.int32],
+    occupied: BoolArray,
+    room: int,
+    box: tuple[slice, slice],
+    piece: BoolArray,
+    resolution_m: float,
+    parameters: RegionParameters,
+) -> bool:
+    """Whether a piece of the box of a room has that room, and hardly anything else, around its wall."""
+    kernel = _square(parameters.object_wall_m / resolution_m)
+    reach = len(kernel) // 2
+    low = [max(side.start - reach, 0) for side in box]
+    window = tuple(slice(a, side.stop + reach) for a, side in zip(low, box, strict=True))
+    near = np.zeros(labels[window].shape, np.uint8)
+    rows, columns = np.nonzero(piece)
+    near[rows + box[0].start - low[0], columns + box[1].start - low[1]] = 1
+    around = (cv2.dilate(near, kernel) > near) & ~occupied[window]
+    if not around.any():
+        return False
+    return bool((labels[window][around] == room).mean() >= parameters.object_min_surrounded)
+
+
+def _square(reach_cells: float) -> NDArray[np.uint8]:
+    side = 2 * max(0, round(reach_cells)) + 1
+    return np.ones((side, side), np.uint8)

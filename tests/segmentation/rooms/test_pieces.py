@@ -1,16 +1,22 @@
 """Rooms in one piece."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from rose2_logs.config.regions import RegionParameters
 from rose2_logs.segmentation.rooms.pieces import rooms_in_one_piece
 
 GAP_M, PIECE_M2 = 0.3, 1.0
+REGIONS = RegionParameters()
 
 
 def in_one_piece(labels, resolution_m, gap_m, piece_min_m2, occupied=None):
     occupied = np.zeros(labels.shape, bool) if occupied is None else occupied
-    return rooms_in_one_piece(labels, occupied, resolution_m, gap_m, piece_min_m2)
+    return rooms_in_one_piece(
+        labels, occupied, resolution_m, piece_min_m2, replace(REGIONS, piece_gap_m=gap_m)
+    )
 
 
 def test_what_a_wall_closes_is_no_gap():
@@ -66,3 +72,47 @@ def test_no_room_gives_no_piece():
     pieces, room_of_piece = in_one_piece(np.zeros((4, 5), np.int32), 0.05, GAP_M, PIECE_M2)
     assert not pieces.any()
     assert room_of_piece.tolist() == [0]
+
+
+def object_in_a_room(inner_cells: int = 28, wall_cells: int = 2) -> tuple[np.ndarray, np.ndarray]:
+    """A room of 6 m x 6 m with a closed object whose floor is seen, 1.4 m x 1.4 m, in it; 5 cm a cell."""
+    labels, occupied = np.zeros((140, 140), np.int32), np.zeros((140, 140), bool)
+    labels[10:130, 10:130] = 1
+    box = slice(40, 40 + inner_cells + 2 * wall_cells)
+    labels[box, box], occupied[box, box] = 0, True
+    inner = slice(40 + wall_cells, 40 + wall_cells + inner_cells)
+    labels[inner, inner], occupied[inner, inner] = 1, False
+    return labels, occupied
+
+
+def with_object(labels, occupied, **changed) -> tuple[int, bool]:
+    """Number of rooms, and whether the floor in the object is in none."""
+    pieces, _ = rooms_in_one_piece(labels, occupied, 0.05, PIECE_M2, replace(REGIONS, **changed))
+    return int(pieces.max()), bool(pieces[50, 50] == 0)
+
+
+def test_the_floor_within_an_object_is_no_room():
+    assert with_object(*object_in_a_room()) == (1, True)
+
+
+def test_larger_closed_floor_is_a_room():
+    """34 cells are 2.89 m2, 35 are 3.06."""
+    assert with_object(*object_in_a_room(34)) == (1, True)
+    assert with_object(*object_in_a_room(35)) == (2, False)
+    assert with_object(*object_in_a_room(), object_max_m2=1.9) == (2, False)
+
+
+def test_floor_behind_a_thick_wall_is_a_room():
+    """A wall of 0.25 m is looked across, one of 0.3 m is not."""
+    assert with_object(*object_in_a_room(wall_cells=5)) == (1, True)
+    assert with_object(*object_in_a_room(wall_cells=6)) == (2, False)
+    assert with_object(*object_in_a_room(wall_cells=6), object_wall_m=0.35) == (1, True)
+
+
+@pytest.mark.parametrize("beside", [0, 2], ids=["the unknown", "another room"])
+def test_closed_floor_beside_something_else_than_its_room_is_a_room(beside):
+    """As a stall in a corner."""
+    labels, occupied = object_in_a_room()
+    labels[:40] = beside
+    assert with_object(labels, occupied)[1] is False
+    assert with_object(labels, occupied, object_min_surrounded=0.5)[1] is True
