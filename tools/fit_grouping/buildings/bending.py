@@ -21,6 +21,11 @@ OTHER_KINDS = {
     "hall": {"none": 0.5, "slant": 0.14, "arc": 0.16, "bend": 0.2},
     "depot": {"none": 1.0},
     "arena": {"none": 1.0},
+    "warehouse": {"none": 1.0},
+    "loop": {"none": 0.85, "slant": 0.1, "arc": 0.05},
+    "openhome": {"none": 0.9, "slant": 0.06, "bend": 0.04},
+    "wings": {"none": 0.85, "slant": 0.12, "arc": 0.03},
+    "gallery": {"none": 0.6, "slant": 0.15, "arc": 0.12, "bend": 0.13},
     "passage": {"none": 0.74, "slant": 0.1, "arc": 0.08, "bend": 0.08},
 }
 """The same for kinds of plans that differ: wings of villas are turned anyway, halls may lie in an arc,

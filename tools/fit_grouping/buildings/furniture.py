@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import cv2
 import numpy as np
@@ -12,11 +13,11 @@ from scipy.ndimage import find_objects
 
 from fit_grouping.buildings.raster import CELL_M, Generator, Mask, between, cells, chance
 from fit_grouping.buildings.walls import WalledPlan
-from fit_grouping.buildings.workrooms import furnish_workroom
+from fit_grouping.buildings.workrooms import furnish_niches, furnish_workroom
 
-STYLES = ("none", "survey", "home", "office", "dense", "work")
-"""Ways to furnish: not at all, dots and boxes as drawn by hand, as in homes, as in offices, cluttered, and
-with rows of desks, screens and cabinets."""
+STYLES = ("none", "survey", "home", "office", "dense", "work", "niches")
+"""Ways to furnish: not at all, dots and boxes as drawn by hand, as in homes, as in offices, cluttered, with
+rows of desks, screens and cabinets, and with cabinets at steps along all walls."""
 HALLS = {
     "rows": 0.2,
     "pillars": 0.1,
@@ -31,6 +32,9 @@ HALLS = {
 OTHER_HALLS = {
     "depot": {"pallets": 0.35, "rows": 0.25, "pillars": 0.1, "boxes": 0.1, "mixed": 0.1, "islands": 0.1},
     "shop": {"islands": 0.5, "rows": 0.3, "mixed": 0.1, "stands": 0.1},
+    "wings": {"benches": 0.35, "study": 0.25, "rows": 0.15, "tables": 0.1, "pillars": 0.05, "empty": 0.1},
+    "gallery": {"stands": 0.45, "empty": 0.15, "pillars": 0.1, "islands": 0.15, "mixed": 0.1, "study": 0.05},
+    "warehouse": {"crates": 0.35, "racks": 0.3, "pallets": 0.15, "mixed": 0.1, "boxes": 0.1},
     "faculty": {"rows": 0.35, "pillars": 0.2, "tables": 0.2, "mixed": 0.15, "empty": 0.1},
 }
 """The same for kinds of plans that differ."""
@@ -130,6 +134,8 @@ class Furnisher:
             self._survey_room(drawn)
         elif self.style == "work":
             furnish_workroom(self.rng, drawn)
+        elif self.style == "niches":
+            furnish_niches(self.rng, drawn)
         else:
             self._room(drawn, area_m2)
 
@@ -154,6 +160,14 @@ class Furnisher:
             self._stands(drawn, area_m2)
         if kind == "pallets":
             self._pallets(drawn)
+        if kind == "benches":
+            self._benches(drawn)
+        if kind == "study":
+            self._study(drawn)
+        if kind == "crates":
+            self._crates(drawn)
+        if kind == "racks":
+            self._racks(drawn)
         if kind in ("rows", "mixed"):
             self._rows(drawn, rng.uniform(0.3, 1.0), rng.uniform(1.2, 3.0))
         if kind in ("tables", "mixed"):
@@ -223,6 +237,114 @@ class Furnisher:
         self._grid(part, rng.uniform(1.6, 3.2), rng.uniform(1.6, 3.2), put, share=rng.uniform(0.5, 1.0))
         step = rng.uniform(3, 8)
         self._grid(drawn, step, step, lambda p: cv2.circle(drawn, p, int(rng.integers(1, 4)), 1, -1))
+
+    def _benches(self, drawn: Mask) -> None:
+        """Rows of benches of a lecture hall in one block to three, straight or in arcs, with frayed ends."""
+        rng = self.rng
+        image = np.rot90(drawn, int(rng.integers(4)))
+        drawn_rows = np.zeros(image.shape, np.uint8)
+        height, width = image.shape
+        deep, step = between(rng, 0.35, 1.0), between(rng, 1.0, 2.2)
+        rim, front = between(rng, 0.6, 2.0), between(rng, 1.5, 4.0)
+        blocks, way = int(rng.integers(1, 4)), between(rng, 0.8, 1.8)
+        bow = rng.uniform(0.02, 0.12) if chance(rng, 0.3) else 0.0
+        hollow, seen = chance(rng, 0.4), rng.uniform(0.8, 1.0)
+        stops = np.linspace(rim, width - rim + way, blocks + 1).astype(int).tolist()
+        for y in range(front, height - rim - deep, max(step, deep + cells(0.5))):
+            for low, high in pairwise(stops):
+                end = high - way
+                if end - low < cells(0.8) or not chance(rng, seen):
+                    continue
+                x = np.linspace(low, end, 9)
+                sag = bow * (x - width / 2) ** 2 / max(width, 1)
+                front_line = np.column_stack([x, y + sag])
+                outline = np.vstack([front_line, front_line[::-1] + (0, deep)]).astype(np.int32)
+                if hollow:
+                    cv2.polylines(drawn_rows, [outline], True, 1, 1)
+                else:
+                    cv2.fillPoly(drawn_rows, [outline], 1)
+        image |= drawn_rows
+        if chance(rng, 0.6):  # a lectern
+            x = int(width * rng.uniform(0.2, 0.7))
+            image[front // 3 : front // 3 + cells(0.6), x : x + between(rng, 0.8, 3.0)] = 1
+
+    def _study(self, drawn: Mask) -> None:
+        """Blocks of tables in a grid, each with chairs around it that fray its outline."""
+        rng = self.rng
+        long, deep = rng.uniform(1.2, 3.6), rng.uniform(0.8, 2.4)
+        half = cells(long / 2), cells(deep / 2)
+
+        def put(spot: tuple[int, int]) -> None:
+            low, high = (spot[0] - half[0], spot[1] - half[1]), (spot[0] + half[0], spot[1] + half[1])
+            cv2.rectangle(drawn, low, high, 1, int(rng.choice([-1, 1])))
+            for _ in range(rng.poisson(3 * (long + deep))):
+                x, y = int(rng.integers(low[0] - 6, high[0] + 7)), int(rng.integers(low[1] - 6, high[1] + 7))
+                cv2.circle(drawn, (x, y), int(rng.integers(0, 3)), 1, -1)
+
+        share = rng.uniform(0.6, 1.0)
+        self._grid(drawn, long + rng.uniform(1.2, 3.0), deep + rng.uniform(1.2, 3.0), put, share=share)
+
+    def _crates(self, drawn: Mask) -> None:
+        """Blocks of crates, cages and pallets that can be looked into: outlines with gaps, bars within."""
+        rng = self.rng
+        height, width = drawn.shape
+        for _ in range(rng.integers(1, 4)):
+            wide, deep = between(rng, 0.9, 3.6), between(rng, 0.9, 3.2)
+            step = wide + between(rng, 0.0, 2.5), deep + between(rng, 0.0, 2.5)
+            columns, rows = int(rng.integers(1, 9)), int(rng.integers(1, 5))
+            low_x, low_y = int(rng.integers(width)), int(rng.integers(height))
+            gaps, bars, thick = rng.choice([0.0, 0.1, 0.35]), chance(rng, 0.5), int(rng.integers(1, 3))
+            for y in range(low_y, min(height - deep, low_y + rows * step[1]), step[1]):
+                for x in range(low_x, min(width - wide, low_x + columns * step[0]), step[0]):
+                    if chance(rng, 0.9):
+                        self._crate(drawn, (x, y, x + wide, y + deep), gaps, bars, thick)
+        for _ in range(rng.poisson(1.5)):  # one by itself, at a slant
+            size = (rng.uniform(1.0, 3.0) / CELL_M, rng.uniform(1.0, 2.5) / CELL_M)
+            corners = cv2.boxPoints((self._spot(drawn), size, rng.uniform(0, 90))).astype(np.int32)
+            cv2.polylines(drawn, [corners], chance(rng, 0.7), 1, int(rng.integers(1, 4)))
+        if chance(rng, 0.7):  # posts
+            step_x, step_y = rng.uniform(2, 9), rng.uniform(2, 9)
+            radius = int(rng.integers(0, 4))
+            self._grid(drawn, step_x, step_y, lambda p: cv2.circle(drawn, p, radius, 1, -1), share=0.9)
+
+    def _crate(
+        self, drawn: Mask, box: tuple[int, int, int, int], gaps: float, bars: bool, thick: int
+    ) -> None:
+        """One outline, of which a share is not seen, with bars across it."""
+        x0, y0, x1, y1 = box
+        own = np.zeros((y1 - y0, x1 - x0), np.uint8)
+        own[:thick] = own[-thick:] = 1
+        own[:, :thick] = own[:, -thick:] = 1
+        if bars:
+            own[(y1 - y0) // 2] = 1
+            own[:, (x1 - x0) // 2 :: max(1, (x1 - x0) // 2)] = 1
+        own &= self.rng.random(own.shape) >= gaps
+        if chance(self.rng, 0.3):  # one side open
+            np.rot90(own, int(self.rng.integers(4)))[: thick + 1, thick:-thick] = 0
+        drawn[y0:y1, x0:x1] |= own
+
+    def _racks(self, drawn: Mask) -> None:
+        """Long racks with aisles between: whole, as outlines, or as the posts that are seen of them."""
+        rng = self.rng
+        image = drawn if chance(rng, 0.5) else drawn.T
+        height, width = image.shape
+        rim, deep, aisle = between(rng, 1.5, 4.0), between(rng, 0.5, 2.4), between(rng, 1.6, 4.5)
+        low, high = int(height * rng.uniform(0.05, 0.35)), int(height * rng.uniform(0.6, 0.95))
+        bay = between(rng, 1.0, 3.0)
+        way = rng.choice(["whole", "outline", "posts"])
+        cross = int(rng.integers(low, high)) if chance(rng, 0.5) else -1
+        for x in range(rim, width - rim - deep, deep + aisle):
+            for y in range(low, high - bay, bay):
+                if (cross >= 0 and abs(y + bay // 2 - cross) < cells(1.5)) or chance(rng, 0.06):
+                    continue
+                part = image[y : y + bay, x : x + deep]
+                if way == "whole":
+                    part[:] = 1
+                elif way == "outline":
+                    part[:, 0] = part[:, -1] = 1
+                    part[0] = part[0] | (rng.random(part.shape[1]) < rng.choice([0.0, 0.8]))
+                for row, column in ((0, 0), (0, -2), (-2, 0), (-2, -2)):
+                    part[row : row + 2 or None, column : column + 2 or None] = 1
 
     def _front(self, drawn: Mask) -> None:
         """Desks, shelves or wardrobes side by side along most of a wall: the floor ends before it."""

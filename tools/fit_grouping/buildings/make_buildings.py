@@ -1,6 +1,6 @@
 """Makes simulated maps with true rooms and keeps them in a file.
 
-python tools/fit_grouping/buildings/make_buildings.py OUT.npz --count 400 --seed 1
+python tools/fit_grouping/buildings/make_buildings.py OUT.npz --count 400 --seed 1 [--kinds suites,loop]
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ import argparse
 import sys
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 
 import cv2
@@ -19,7 +19,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from fit_grouping.buildings.bending import bent
 from fit_grouping.buildings.furniture import STYLES, Furnisher
-from fit_grouping.buildings.makers import make_plan
+from fit_grouping.buildings.makers import KINDS, make_plan
 from fit_grouping.buildings.sensing import SimulatedMap, make_map
 from fit_grouping.buildings.walls import build_walls
 from rose2_logs.system.files import replacing
@@ -37,19 +37,27 @@ FURNISHING = {
     "arena": [0.1, 0.0, 0.55, 0.15, 0.2, 0.0],
     "shop": [0.0, 0.0, 0.0, 0.6, 0.4, 0.0],
     "hall": [0.1, 0.0, 0.0, 0.6, 0.3, 0.0],
+    "suites": [0.05, 0.04, 0.0, 0.16, 0.1, 0.45, 0.2],
+    "loop": [0.05, 0.05, 0.0, 0.1, 0.1, 0.35, 0.35],
+    "openhome": [0.08, 0.02, 0.72, 0.0, 0.12, 0.0, 0.06],
+    "wings": [0.06, 0.02, 0.0, 0.17, 0.1, 0.5, 0.15],
+    "gallery": [0.1, 0.0, 0.0, 0.5, 0.25, 0.0, 0.15],
+    "warehouse": [0.05, 0.0, 0.0, 0.6, 0.35],
 }
-"""Shares of the furnishing styles for each kind of plan, in the order of `furniture.STYLES`."""
+"""Shares of the furnishing styles for each kind of plan, in the order of `furniture.STYLES`; none of the last
+ones where the list is shorter."""
 
 
-def simulate(seed: int) -> SimulatedMap:
-    """One map; the same for the same seed."""
+def simulate(seed: int, kinds: Collection[str] = KINDS) -> SimulatedMap:
+    """One map of a kind of the given ones; the same for the same seed and kinds."""
     rng = np.random.default_rng(seed)
     while True:
-        plan = make_plan(rng)
+        plan = make_plan(rng, kinds)
         if not plan.rooms.any():
             continue
         walled = build_walls(rng, plan)
-        style = str(rng.choice(STYLES, p=FURNISHING[plan.kind]))
+        shares = FURNISHING[plan.kind]
+        style = str(rng.choice(STYLES[: len(shares)], p=shares))
         furniture = Furnisher(rng, walled, style).furnish()
         if plan.things is not None:
             furniture |= plan.things
@@ -90,10 +98,21 @@ def main() -> None:
     parser.add_argument("out", type=Path)
     parser.add_argument("--count", type=int, default=400)
     parser.add_argument("--seed", type=int, default=1, help="number of the first map's seed")
+    parser.add_argument(
+        "--kinds",
+        type=lambda text: text.split(","),
+        default=KINDS,
+        metavar="KIND,...",
+        help=f"kinds of plans to make, in their usual shares (all): {', '.join(KINDS)}",
+    )
     arguments = parser.parse_args()
+    unknown = sorted(set(arguments.kinds) - set(KINDS))
+    if unknown:
+        parser.error(f"no such kind of plan: {', '.join(unknown)}; there are {', '.join(KINDS)}")
     cv2.setNumThreads(1)
     start = time.perf_counter()
-    maps = [simulate(seed) for seed in range(arguments.seed, arguments.seed + arguments.count)]
+    seeds = range(arguments.seed, arguments.seed + arguments.count)
+    maps = [simulate(seed, arguments.kinds) for seed in seeds]
     write_maps(arguments.out, maps)
     counts = Counter(made.kind.split("/")[0] for made in maps)
     print(f"{len(maps)} maps in {time.perf_counter() - start:.0f} s: {dict(counts)}")

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 
 import numpy as np
 
+from fit_grouping.buildings.joined_rooms import loop, openhome, suites
+from fit_grouping.buildings.large_floors import gallery, warehouse, wings
 from fit_grouping.buildings.plans import Plan, campus, chamfers, cubicles, hall, home, office, passage
 from fit_grouping.buildings.raster import Generator
 from fit_grouping.buildings.villas import villa
@@ -24,8 +26,16 @@ MAKERS: tuple[tuple[Callable[[Generator], Plan], float], ...] = (
     (depot, 0.04),
     (arena, 0.04),
     (shop, 0.03),
+    (suites, 0.13),
+    (loop, 0.07),
+    (openhome, 0.14),
+    (wings, 0.08),
+    (gallery, 0.05),
+    (warehouse, 0.04),
 )
-"""Makers of plans and their shares."""
+"""Makers of plans and their shares, relative to each other."""
+KINDS = tuple(maker.__name__ for maker, _ in MAKERS)
+"""Names of the kinds of plans."""
 TIDY_CORNERS = {
     "villa": (0.0, 0.0),
     "passage": (0.0, 0.0),
@@ -33,14 +43,19 @@ TIDY_CORNERS = {
     "depot": (0.2, 0.0),
     "shop": (0.5, 0.0),
     "arena": (0.1, 0.1),
+    "loop": (0.1, 0.1),
+    "openhome": (0.2, 0.08),
+    "wings": (0.1, 0.1),
+    "gallery": (0.4, 0.1),
+    "warehouse": (0.2, 0.0),
 }
 """How many corners are cut off a building of a kind and how many of its rooms are cut in two, on average."""
 USUAL_CORNERS = (0.35, 0.15)
 
 
-def make_plan(rng: Generator) -> Plan:
-    """Lay out a building of a random kind."""
-    makers, shares = zip(*MAKERS, strict=True)
+def make_plan(rng: Generator, kinds: Collection[str] = KINDS) -> Plan:
+    """Lay out a building of a random kind of the given ones."""
+    makers, shares = zip(*[made for made in MAKERS if made[0].__name__ in kinds], strict=True)
     plan: Plan = makers[rng.choice(len(makers), p=np.array(shares) / sum(shares))](rng)
     chamfers(rng, plan, *TIDY_CORNERS.get(plan.kind, USUAL_CORNERS))
     plan.tidy()

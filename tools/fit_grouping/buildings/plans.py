@@ -39,8 +39,16 @@ class Plan:
         Rooms that open on corridors along most of a wall.
     labs : set of int
         Rooms that a row of cabinets and pieces of wall parts from a corridor.
+    suite : set of int
+        Rooms whose walls to each other have wide gaps, in the share of them that `joined` is.
+    galleries : set of int
+        Halls that meet through portals, rows of pillars and pieces of wall.
+    zones : set of int
+        Parts of an open floor of a home, which a counter, a stub or a change of width parts.
     open_fronts : float
         Share of doors that are openings of most of the wall.
+    joined : float
+        Share of the walls between rooms of a suite that have gaps.
     frayed : float
         Share of the walls between rooms of which gaps, dots or cabinets are seen.
     gates : float
@@ -64,7 +72,11 @@ class Plan:
     public: set[int] = field(default_factory=set)
     lobbies: set[int] = field(default_factory=set)
     labs: set[int] = field(default_factory=set)
+    suite: set[int] = field(default_factory=set)
+    galleries: set[int] = field(default_factory=set)
+    zones: set[int] = field(default_factory=set)
     open_fronts: float = 0.05
+    joined: float = 0.0
     frayed: float = 0.0
     gates: float = 0.0
     glazed: bool = False
@@ -86,6 +98,20 @@ class Plan:
         margin = cells(self.margin_m)
         height, width = self.rooms.shape
         return margin, margin, width - margin, height - margin
+
+    @property
+    def marks(self) -> tuple[set[int], ...]:
+        """Sets of the rooms of each kind."""
+        return (
+            self.corridors,
+            self.halls,
+            self.public,
+            self.lobbies,
+            self.labs,
+            self.suite,
+            self.galleries,
+            self.zones,
+        )
 
     def paint(self, rectangle: Rectangle, *, over: bool = False) -> int:
         """Make a room of the ground in a rectangle that is still free (or of all of it); its number."""
@@ -110,7 +136,7 @@ class Plan:
     def merge(self, one: int, other: int) -> None:
         """Make two rooms one."""
         self.rooms[self.rooms == other] = one
-        for kinds in (self.corridors, self.halls, self.public, self.lobbies, self.labs):
+        for kinds in self.marks:
             if other in kinds:
                 kinds.discard(other)
                 kinds.add(one)
@@ -133,7 +159,7 @@ class Plan:
         number = np.arange(count)
         number[(size < ROOM_MIN_M2) | narrow] = 0
         number[0] = 0
-        for kinds in (self.corridors, self.halls, self.public, self.lobbies, self.labs):
+        for kinds in self.marks:
             now = {int(n) for n in number if n and was[n] in kinds}
             kinds.clear()
             kinds.update(now)

@@ -27,7 +27,7 @@ THOROUGH_HOMES, THOROUGH = 0.75, 0.45
 """Share of the maps for which robots looked into every corner."""
 HOME_DAMAGE = 0.5
 """Faint walls and gaps in homes, relative to elsewhere."""
-WORKPLACES = frozenset({"offices", "faculty"})
+WORKPLACES = frozenset({"offices", "faculty", "suites", "loop", "wings"})
 """Kinds of plans that are mapped from their corridors, often while they are still explored."""
 SEEN_FROM_DOORS = (0.0, 0.2, 0.5, 0.85)
 """Share of the rooms of a workplace that are seen through their doors only."""
@@ -40,7 +40,19 @@ FRONT_TRANSMISSION = (0.02, 0.25)
 """Share of the rays that pass whole fronts: single ones, as through blinds and between posts."""
 YARD_VIEWS = (3, 12)
 """Views from the ground outside."""
-DRAWN_SHARE = {"villa": 0.05, "offices": 0.05, "faculty": 0.05, "depot": 0.15, "arena": 0.03}
+DRAWN_SHARE = {
+    "villa": 0.05,
+    "offices": 0.05,
+    "faculty": 0.05,
+    "depot": 0.15,
+    "arena": 0.03,
+    "suites": 0.05,
+    "loop": 0.07,
+    "openhome": 0.06,
+    "wings": 0.08,
+    "gallery": 0.08,
+    "warehouse": 0.3,
+}
 """Share of drawings among the maps of a kind; 0.12 elsewhere."""
 ROOM_SEEN_MIN_M2 = 0.5
 """Rooms of which less was seen are none in the truth."""

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from fit_grouping.buildings.plans import Plan
 from fit_grouping.buildings.raster import Generator, Labels, Mask, between, cells, chance
 
-HOMES = frozenset({"home", "villa"})
+HOMES = frozenset({"home", "villa", "openhome"})
 """Kinds of plans that people live in."""
 DOOR_PLACE_MIN_M = 0.9
 """A border that is as long has place for a door."""
@@ -30,14 +30,67 @@ DOUBLE_DOOR_M, DOUBLE_LEAF_SHARE = (1.5, 2.6), 0.6
 """Width of the double doors that part corridors, and how often a leaf of them stands half open."""
 CABINET_M, CABINET_GAP_M, CABINET_DEEP_M = (1.0, 3.2), (0.6, 2.4), (0.25, 0.6)
 """Cabinets and pieces of wall between a lab and a corridor, and the gaps between them."""
+GAP_SHARE, LARGE_GAP_SHARE = (0.25, 0.67), (0.5, 0.9)
+"""Share of a wall that a gap takes which leaves a stub at each end: between offices, between halls and zones."""
+SUITE_PIECE_M, SUITE_GAP_M, SUITE_DEEP_M = (0.4, 1.8), (0.8, 2.2), (0.2, 0.6)
+"""Pieces of a wall between offices, the gaps between them, and the depth of cabinets in their place."""
+PIER_M, PIER_GAP_M, PIER_DEEP_M = (0.3, 2.5), (1.0, 4.5), (0.3, 2.5)
+"""Pillars, pieces of wall and booths between halls, and the gaps between them."""
+CABINET_AT_STUB = 0.35
+"""How often a cabinet stands at what is left of a wall beside a gap."""
+COUNTER_SHARE, COUNTER_DEEP_M = (0.25, 0.65), (0.4, 0.7)
+"""Share of an opening that a counter reaches into, and how deep it is."""
+SUITE_OPENINGS = {"gap": 0.42, "pieces": 0.28, "one side": 0.15, "stub": 0.15}
+GALLERY_OPENINGS = {"large gap": 0.25, "piers": 0.25, "stub": 0.15, "one side": 0.1, "open": 0.05, "door": 0.2}
+ZONE_OPENINGS = {
+    "large gap": 0.24,
+    "counter": 0.2,
+    "stub": 0.16,
+    "one side": 0.14,
+    "piers": 0.04,
+    "open": 0.12,
+    "door": 0.1,
+}
+"""How rooms of a suite, halls of a gallery and zones of an open floor meet, and how often."""
 FRAYED_GAP_M, FRAYED_PIECE_M, FRAYED_DOT_STEP_M = (0.15, 0.7), (0.2, 1.6), (0.1, 0.22)
 """What is seen of a frayed wall: gaps between pieces, or dots too near to each other to walk through."""
 GATE_M = (0.9, 3.5)
 """Width of openings to the outside: doors to gates."""
-PUBLIC_AGAIN = 0.4
-"""Probability of one more opening between living rooms that are joined already."""
+PUBLIC_AGAIN, ZONES_AGAIN = 0.4, 0.65
+"""Probability of one more opening between living rooms (or halls), and zones, that are joined already."""
 WINDOWS, HOME_WINDOWS = 2.0, 2.5
 """Windows of a building, on average."""
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """What stands on a border, with gaps between.
+
+    Attributes
+    ----------
+    long_m, gap_m : tuple of float
+        Ranges of the lengths of the pieces and of the gaps.
+    deep_m : tuple of float
+        Range of their depths.
+    deep_share : float
+        Share of the pieces that are as deep; the others are as thick as the walls.
+    from_end : float
+        How often the first piece stands at the border's end.
+    """
+
+    long_m: tuple[float, float]
+    gap_m: tuple[float, float]
+    deep_m: tuple[float, float]
+    deep_share: float
+    from_end: float = 0.0
+
+
+PIECES = {
+    "cabinets": Pieces(CABINET_M, CABINET_GAP_M, CABINET_DEEP_M, 0.7),
+    "pieces": Pieces(SUITE_PIECE_M, SUITE_GAP_M, SUITE_DEEP_M, 0.3, 0.7),
+    "piers": Pieces(PIER_M, PIER_GAP_M, PIER_DEEP_M, 0.35),
+}
+"""Openings that leave pieces of a border."""
 
 
 @dataclass(frozen=True)
@@ -186,6 +239,13 @@ def _opening_kind(rng: Generator, plan: Plan, a: int, b: int) -> str:
     """Door, wide opening, one with a jamb at one side, one that leaves stubs, or no jamb at all."""
     if a in plan.corridors and b in plan.corridors and not (a in plan.public and b in plan.public):
         return str(rng.choice(["door", "double", "wide", "stub", "open"], p=[0.25, 0.3, 0.15, 0.2, 0.1]))
+    for kinds, openings in (
+        (plan.suite, SUITE_OPENINGS),
+        (plan.galleries, GALLERY_OPENINGS),
+        (plan.zones, ZONE_OPENINGS),
+    ):
+        if a in kinds and b in kinds:
+            return str(rng.choice(list(openings), p=list(openings.values())))
     ways = plan.corridors | plan.lobbies | plan.halls
     if (a in plan.labs and b in ways) or (b in plan.labs and a in ways):
         return str(rng.choice(["cabinets", "wide", "one side"], p=[0.6, 0.2, 0.2]))
@@ -214,6 +274,11 @@ def _opening(rng: Generator, kind: str, stretch: Stretch, thickness: int, usual_
     elif kind == "wide":
         width = min(max(round(room_for * rng.uniform(0.3, 0.85)), cells(1.0)), cells(WIDE_MAX_M))
         low = thickness + int(rng.integers(0, room_for - width + 1))
+    elif kind in ("gap", "large gap", "counter"):
+        share = rng.uniform(*(GAP_SHARE if kind == "gap" else LARGE_GAP_SHARE))
+        stub = cells(STUB_MIN_M)
+        width = min(max(round(room_for * share), cells(0.8)), room_for - 2 * stub)
+        low = thickness + int(rng.integers(stub, room_for - width - stub + 1))
     elif kind == "one side":
         width = round(room_for * rng.uniform(0.45, 0.9))
         low = thickness // 2 if chance(rng, 0.5) else stretch.length - width - thickness // 2
@@ -278,19 +343,13 @@ def build_walls(rng: Generator, plan: Plan) -> WalledPlan:
     reached, taste = _Groups(neighbors), _Groups(neighbors)
     place_min = cells(DOOR_PLACE_MIN_M)
     pairs = [p for p, parts in runs.items() if p[0] > 0 and sum(r.length for r in parts) >= place_min]
-    ways = plan.corridors | plan.halls | plan.public | plan.lobbies
+    ways = plan.corridors | plan.halls | plan.public | plan.lobbies | plan.zones
     order = sorted(pairs, key=lambda p: (not (p[0] in ways or p[1] in ways)) + rng.uniform(0, 0.9))
     usual_m = rng.uniform(0.75, 1.1)
     leaves = rng.choice([0.0, 0.15, 0.4])
     for a, b in order:
         both_corridors = a in plan.corridors and b in plan.corridors
-        again = (
-            PUBLIC_AGAIN
-            if a in plan.public and b in plan.public
-            else 0.1
-            if (a in ways) != (b in ways)
-            else 0.05
-        )
+        again = _again(plan, a, b, ways)
         joined = reached.of(a) == reached.of(b)
         if joined and not both_corridors and not chance(rng, again):
             if not (a in ways or b in ways) and chance(rng, plan.frayed):
@@ -305,10 +364,14 @@ def build_walls(rng: Generator, plan: Plan) -> WalledPlan:
             taste.unite(a, b)
         if not (a in ways or b in ways) and chance(rng, plan.frayed):
             _fray(rng, walls, stretch, thickness)
-        if kind == "cabinets":
-            _cabinets(rng, walls, stretch, thickness)
+        if kind in PIECES:
+            _pieces(rng, walls, stretch, thickness, PIECES[kind])
         else:
             _clear(walls, stretch, low, high, thickness)
+        if kind == "counter":
+            _counter(rng, walls, stretch, low, high)
+        if kind == "gap" and chance(rng, CABINET_AT_STUB):
+            _cabinet_at_stub(rng, walls, stretch, low, high)
         if kind == "double":
             middle = (low + high) // 2
             for half in ((low, middle), (middle, high)):
@@ -338,22 +401,61 @@ def build_walls(rng: Generator, plan: Plan) -> WalledPlan:
     return WalledPlan(plan, walls, glass, neighbors, number[rooms])
 
 
-def _cabinets(rng: Generator, walls: Mask, stretch: Stretch, thickness: int) -> None:
-    """Clear a border but for cabinets and pieces of wall with gaps between them."""
-    _clear(walls, stretch, thickness, stretch.length - thickness, thickness)
-    at = thickness + between(rng, *CABINET_GAP_M)
+def _again(plan: Plan, a: int, b: int, ways: set[int]) -> float:
+    """Probability of an opening between rooms that are joined already."""
+    if (a in plan.public and b in plan.public) or (a in plan.galleries and b in plan.galleries):
+        return PUBLIC_AGAIN
+    if a in plan.suite and b in plan.suite:
+        return plan.joined
+    if a in plan.zones and b in plan.zones:
+        return ZONES_AGAIN
+    return 0.1 if (a in ways) != (b in ways) else 0.05
+
+
+def _pieces(rng: Generator, walls: Mask, stretch: Stretch, thickness: int, pieces: Pieces) -> None:
+    """Clear a border but for cabinets, pillars and pieces of wall with gaps between them."""
+    first, last = thickness, stretch.length - thickness
+    _clear(walls, stretch, first, last, thickness)
+    at = first if chance(rng, pieces.from_end) else first + between(rng, *pieces.gap_m)
     hollow = chance(rng, 0.5)
     side = rng.choice([-1, 1])
-    while at < stretch.length - thickness:
-        end = min(at + between(rng, *CABINET_M), stretch.length - thickness)
-        deep = side * between(rng, *CABINET_DEEP_M) if chance(rng, 0.7) else thickness - 1
-        ends = [(at, 0), (end, 0), (end, deep), (at, deep)]
-        corners = np.round([stretch.point(*point) for point in ends]).astype(np.int32)
-        if hollow:
-            cv2.polylines(walls, [corners], True, 1, 1)
-        else:
-            cv2.fillPoly(walls, [corners], 1)
-        at = end + between(rng, *CABINET_GAP_M)
+    while at < last:
+        end = min(at + between(rng, *pieces.long_m), last)
+        deep = side * between(rng, *pieces.deep_m) if chance(rng, pieces.deep_share) else thickness - 1
+        _box(walls, stretch, (at, 0), (end, deep), hollow=hollow)
+        at = end + between(rng, *pieces.gap_m)
+
+
+def _counter(rng: Generator, walls: Mask, stretch: Stretch, low: int, high: int) -> None:
+    """A counter that goes on from a jamb into an opening, or stands in it."""
+    reach = round((high - low) * rng.uniform(*COUNTER_SHARE))
+    at = int(rng.choice([low, high - reach, low + (high - low - reach) // 2]))
+    half = between(rng, *COUNTER_DEEP_M) / 2
+    aside = rng.choice([-half, 0.0, half])
+    _box(walls, stretch, (at, aside - half), (at + reach, aside + half), hollow=chance(rng, 0.3))
+
+
+def _cabinet_at_stub(rng: Generator, walls: Mask, stretch: Stretch, low: int, high: int) -> None:
+    """A cabinet at one side or both of what is left of a wall beside a gap."""
+    start, end = (0, low) if chance(rng, 0.5) else (high, stretch.length)
+    long = min(between(rng, *CABINET_M), end - start)
+    at = start if chance(rng, 0.5) else end - long
+    sides = [int(rng.choice([-1, 1]))] if chance(rng, 0.6) else [-1, 1]
+    for side in sides:
+        deep = side * between(rng, *CABINET_DEEP_M)
+        _box(walls, stretch, (at, 0), (at + long, deep), hollow=chance(rng, 0.5))
+
+
+def _box(
+    walls: Mask, stretch: Stretch, one: tuple[float, float], other: tuple[float, float], *, hollow: bool
+) -> None:
+    """A rectangle between two corners, each given by its place along a border and aside of it."""
+    (a, b), (c, d) = one, other
+    corners = np.round([stretch.point(*p) for p in ((a, b), (c, b), (c, d), (a, d))]).astype(np.int32)
+    if hollow:
+        cv2.polylines(walls, [corners], True, 1, 1)
+    else:
+        cv2.fillPoly(walls, [corners], 1)
 
 
 def _fray(rng: Generator, walls: Mask, stretch: Stretch, thickness: int) -> None:
@@ -377,9 +479,7 @@ def _fray(rng: Generator, walls: Mask, stretch: Stretch, thickness: int) -> None
             continue
         end = min(at + between(rng, *FRAYED_PIECE_M), last)
         low, high = -between(rng, 0.05, 0.5), between(rng, 0.05, 0.5)
-        ends = [(at, low), (end, low), (end, high), (at, high)]
-        corners = np.round([stretch.point(*point) for point in ends]).astype(np.int32)
-        cv2.fillPoly(walls, [corners], 1)
+        _box(walls, stretch, (at, low), (end, high), hollow=False)
         at = end + between(rng, 0.05, FRAYED_GAP_M[1])
 
 

@@ -42,25 +42,25 @@ HALL_M2 = 60.0
 
 def offices(rng: Generator) -> Plan:
     """Rooms of very different width along corridors that double doors part, labs open among them."""
-    plan = _ground(rng, "offices", between(rng, 20, 58), between(rng, 11, 38 if chance(rng, 0.5) else 18))
+    plan = empty_building(rng, "offices", between(rng, 20, 58), between(rng, 11, 38 if chance(rng, 0.5) else 18))
     area = plan.inner
     width, depth = between(rng, 1.4, 3.2), between(rng, 3.6, 7.0)
     segments = corridor_segments(rng, area, width, depth)
     numbers = {plan.corridor(segment) for segment in segments}
     unite_touching(plan, numbers)
-    _double_doors(rng, plan, segments)
+    double_doors(rng, plan, segments)
     for segment in segments:
         for side in (0, 1):
             if not chance(rng, 0.08):
                 own = depth if chance(rng, 0.7) else between(rng, 2.6, 7.5)
-                _uneven_row(rng, plan, _beside(segment, side, own, area))
+                uneven_row(rng, plan, strip_beside(segment, side, own, area))
     if chance(rng, 0.5):
         halved(rng, plan, area, rng.uniform(15, 60), 2.5)
     corner_rooms(rng, plan, 0.6, 1.0, 2.4)
     bays(rng, plan, 0.8)
     notches(rng, plan, 0.3)
     alcoves(rng, plan, rng.choice([0.0, 0.0, 0.3]))
-    _unbuilt(rng, plan, rng.choice([0.0, 0.08, 0.2]))
+    unbuilt(rng, plan, rng.choice([0.0, 0.08, 0.2]))
     plan.frayed = rng.choice([0.0, 0.2, 0.5])
     plan.open_fronts = rng.choice([0.02, 0.1, 0.3])
     return plan
@@ -68,25 +68,25 @@ def offices(rng: Generator) -> Plan:
 
 def faculty(rng: Generator) -> Plan:
     """A floor of a university: one corridor with an atrium, or two with a core and suites at their ends."""
-    plan = _ground(rng, "faculty", between(rng, 32, 72), between(rng, 20, 44))
+    plan = empty_building(rng, "faculty", between(rng, 32, 72), between(rng, 20, 44))
     area = plan.inner
     corridors = _twin(rng, plan) if chance(rng, 0.5) else _spine(rng, plan)
     for segment in corridors:
         for side in (0, 1):
             way = rng.choice(["rooms", "classes", "scattered", "none"], p=[0.35, 0.2, 0.35, 0.1])
-            strip = _beside(segment, side, between(rng, 3.5, 9), area)
+            strip = strip_beside(segment, side, between(rng, 3.5, 9), area)
             if way == "rooms":
-                _uneven_row(rng, plan, strip)
+                uneven_row(rng, plan, strip)
             elif way == "classes":
                 before = int(plan.rooms.max())
                 row_of_rooms(rng, plan, strip, rng.uniform(7, 14), least_m=5)
                 plan.labs |= {n for n in range(before + 1, int(plan.rooms.max()) + 1) if chance(rng, 0.15)}
             elif way == "scattered":
-                _scattered(rng, plan, strip, (side,))
-    _halls(plan)
+                scattered(rng, plan, strip, (side,))
+    furnish_large_as_halls(plan)
     bays(rng, plan, 1.0)
     corner_rooms(rng, plan, 1.0, 1.2, 3.0)
-    _unbuilt(rng, plan, 0.1)
+    unbuilt(rng, plan, 0.1)
     plan.frayed = rng.choice([0.0, 0.15])
     plan.open_fronts = rng.choice([0.02, 0.2, 0.4])
     return plan
@@ -99,7 +99,7 @@ def depot(rng: Generator) -> Plan:
     for _ in range(rng.poisson(0.7)):
         deep = between(rng, 2.5, 5)
         strip = [(x0, y0, x0 + deep, y1), (x0, y1 - deep, x1, y1)][rng.integers(2)]
-        _uneven_row(rng, plan, strip)
+        uneven_row(rng, plan, strip)
     if chance(rng, 0.3):
         middle = x0 + round((x1 - x0) * rng.uniform(0.3, 0.7))
         plan.hall((x0, y0, middle, y1))
@@ -145,17 +145,17 @@ def arena(rng: Generator) -> Plan:
 
 def shop(rng: Generator) -> Plan:
     """A shop: one floor of shelves and islands, of L shape at times, and few rooms behind it."""
-    plan = _ground(rng, "shop", between(rng, 8, 30), between(rng, 8, 24))
+    plan = empty_building(rng, "shop", between(rng, 8, 30), between(rng, 8, 24))
     x0, y0, x1, _ = plan.inner
     if chance(rng, 0.5):
-        _uneven_row(rng, plan, (x0, y0, x1, y0 + between(rng, 2, 4.5)))
+        uneven_row(rng, plan, (x0, y0, x1, y0 + between(rng, 2, 4.5)))
     plan.hall(plan.inner)
     notches(rng, plan, 1.0)
     plan.gates = 1.0
     return plan
 
 
-def _ground(rng: Generator, kind: str, width: int, height: int) -> Plan:
+def empty_building(rng: Generator, kind: str, width: int, height: int) -> Plan:
     """Ground of a building, at times one whose outer walls let rays through."""
     glazed = chance(rng, GLAZED_SHARE)
     plan = Plan.empty(kind, width, height, margin_m=GLAZED_MARGIN_M if glazed else MARGIN_M)
@@ -163,7 +163,7 @@ def _ground(rng: Generator, kind: str, width: int, height: int) -> Plan:
     return plan
 
 
-def _beside(segment: Rectangle, side: int, deep: int, area: Rectangle) -> Rectangle:
+def strip_beside(segment: Rectangle, side: int, deep: int, area: Rectangle) -> Rectangle:
     """The strip along one side of a piece of corridor, within an area."""
     x0, y0, x1, y1 = segment
     if x1 - x0 >= y1 - y0:
@@ -174,7 +174,7 @@ def _beside(segment: Rectangle, side: int, deep: int, area: Rectangle) -> Rectan
     return max(strip[0], low_x), max(strip[1], low_y), min(strip[2], high_x), min(strip[3], high_y)
 
 
-def _uneven_row(rng: Generator, plan: Plan, strip: Rectangle) -> None:
+def uneven_row(rng: Generator, plan: Plan, strip: Rectangle) -> None:
     """Cut a strip crosswise into stores, offices, large rooms and labs."""
     x0, y0, x1, y1 = strip
     lies = x1 - x0 >= y1 - y0
@@ -193,7 +193,7 @@ def _uneven_row(rng: Generator, plan: Plan, strip: Rectangle) -> None:
         at = end
 
 
-def _scattered(rng: Generator, plan: Plan, strip: Rectangle, sides: tuple[int, ...]) -> None:
+def scattered(rng: Generator, plan: Plan, strip: Rectangle, sides: tuple[int, ...]) -> None:
     """Rooms here and there along a strip, some of which open widely: suites, stair wells, places to wait.
 
     They lie at its low side (0) or at its high one (1), of those at which there is a corridor.
@@ -215,7 +215,7 @@ def _scattered(rng: Generator, plan: Plan, strip: Rectangle, sides: tuple[int, .
         at = end + between(rng, 0, 8) * int(chance(rng, 0.6))
 
 
-def _double_doors(rng: Generator, plan: Plan, segments: list[Rectangle]) -> None:
+def double_doors(rng: Generator, plan: Plan, segments: list[Rectangle]) -> None:
     """Part corridors across, away from their ends."""
     for x0, y0, x1, y1 in segments:
         lies = x1 - x0 >= y1 - y0
@@ -239,7 +239,7 @@ def _twin(rng: Generator, plan: Plan) -> list[Rectangle]:
     left, right = x0 + ends[0], x1 - ends[1]
     segments = [(left, low, right, low + width), (left, high, right, high + width)]
     numbers = [plan.corridor(segment) for segment in segments]
-    _double_doors(rng, plan, segments)
+    double_doors(rng, plan, segments)
     for a, b, there in ((x0, left, ends[0]), (right, x1, ends[1])):
         if there:
             plan.lobbies.add(plan.paint((a, low, b, high + width)))
@@ -250,9 +250,9 @@ def _twin(rng: Generator, plan: Plan) -> list[Rectangle]:
         at = int(rng.integers(left + cells(3), right - cells(3) - width))
         plan.lobbies.add(plan.paint((at, low + width, at + between(rng, 1.5, 4.0), high)))
     if chance(rng, 0.6):
-        _uneven_row(rng, plan, (left, low + width, right, high))
+        uneven_row(rng, plan, (left, low + width, right, high))
     else:
-        _scattered(rng, plan, (left, low + width, right, high), (0, 1))
+        scattered(rng, plan, (left, low + width, right, high), (0, 1))
     if chance(rng, 0.5) and high + width + cells(4) < y1:  # a bridge to a hall
         at = int(rng.integers(left, right - cells(8)))
         reach = between(rng, 2, 5)
@@ -269,7 +269,7 @@ def _spine(rng: Generator, plan: Plan) -> list[Rectangle]:
     y = y0 + round((y1 - y0 - width) * rng.uniform(0.3, 0.7))
     segments = [(x0, y, x1, y + width)]
     plan.corridor(segments[0])
-    _double_doors(rng, plan, segments)
+    double_doors(rng, plan, segments)
     for _ in range(rng.integers(0, 3)):
         at, own = int(rng.integers(x0 + cells(4), x1 - cells(6))), between(rng, 1.5, 3.0)
         arm = (at, y + width, at + own, y1) if chance(rng, 0.5) else (at, y0, at + own, y)
@@ -286,14 +286,14 @@ def _spine(rng: Generator, plan: Plan) -> list[Rectangle]:
     return segments
 
 
-def _halls(plan: Plan) -> None:
+def furnish_large_as_halls(plan: Plan) -> None:
     """Furnish large rooms as halls."""
     numbers, size = np.unique(plan.rooms, return_counts=True)
     large = numbers[(numbers > 0) & (size * CELL_M**2 > HALL_M2)]
     plan.halls |= set(large.tolist()) - plan.corridors
 
 
-def _unbuilt(rng: Generator, plan: Plan, share: float) -> None:
+def unbuilt(rng: Generator, plan: Plan, share: float) -> None:
     """Leave out rooms that nobody enters: shafts, courts, locked rooms."""
     for room in np.unique(plan.rooms[plan.rooms > 0]).tolist():
         if room not in plan.corridors | plan.lobbies and chance(rng, share):

@@ -16,6 +16,8 @@ SCREEN_DOT_STEP_M = (0.2, 0.7)
 WAY_M = (1.2, 2.4)
 """Ways between rows of desks."""
 SEAT_STEP_M, SEAT_ROW_M = (0.5, 0.9), (0.8, 1.4)
+NICHE_STEP_M, NICHE_LONG_M = (0.9, 2.4), (0.2, 0.9)
+"""Steps and lengths of cabinets that stand out from walls like teeth."""
 SIDE_SEEN = 0.85
 """Share of the sides of boxes that are seen."""
 SMALL_M = 2.2
@@ -44,6 +46,25 @@ def furnish_workroom(rng: Generator, drawn: Mask) -> None:
         middles[kind](rng, drawn if chance(rng, 0.5) else drawn.T)
     for _ in range(rng.poisson(0.6)):
         _screen(rng, np.rot90(drawn, int(rng.integers(4))))
+    _clutter(rng, drawn, rng.choice([0.0, 0.1, 0.4]))
+
+
+def furnish_niches(rng: Generator, drawn: Mask) -> None:
+    """Put cabinets, shelves and desks at steps along all walls, so that the floor reaches between them."""
+    step, long = between(rng, *NICHE_STEP_M), between(rng, *NICHE_LONG_M)
+    deep = between(rng, 0.3, 1.0)
+    seen = rng.uniform(0.4, 0.95)
+    for turn in range(4):
+        image = np.rot90(drawn, turn)
+        if image.shape[0] < 2 * deep + cells(0.8):
+            continue
+        for at in range(between(rng, 0.0, 1.5), image.shape[1], step):
+            if chance(rng, seen):
+                start = max(0, at + int(rng.normal(0, 2)))
+                own = max(1, round(deep * rng.uniform(0.5, 1.2)))
+                image[:own, start : start + max(2, round(long * rng.uniform(0.6, 1.4)))] = 1
+    if chance(rng, 0.5):
+        _islands(rng, drawn)
     _clutter(rng, drawn, rng.choice([0.0, 0.1, 0.4]))
 
 
