@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import find_objects
 
-from fit_grouping.buildings.raster import CELL_M, Generator, Mask, between, cells, chance
+from fit_grouping.buildings.raster import CELL_M, Generator, Labels, Mask, between, cells, chance
 from fit_grouping.buildings.walls import WalledPlan
 from fit_grouping.buildings.workrooms import furnish_niches, furnish_workroom
 
@@ -73,7 +73,9 @@ def room_frame(inside: NDArray[np.bool_]) -> RoomFrame | None:
     """The slanting rectangle of a room; None where it lies along the axes."""
     if not inside.any():
         return None
-    points = cv2.findNonZero(inside.astype(np.uint8))
+    rows = np.flatnonzero(inside.any(1))  # its hull is that of the ends of its rows
+    first, last = inside[rows].argmax(1), inside.shape[1] - 1 - inside[rows, ::-1].argmax(1)
+    points = np.column_stack([np.tile(rows, 2), np.append(first, last)])[:, ::-1].astype(np.int32)
     (x, y), (width, height), angle = cv2.minAreaRect(points)
     if width * height * FRAME_GAIN > inside.size:
         return None
@@ -104,11 +106,7 @@ class Furnisher:
         if self.style == "none":
             return self.solid
         way = self.walled.plan.corridors
-        numbers, flat = np.unique(self.rooms, return_inverse=True)
-        boxes = _boxes(flat.reshape(self.rooms.shape), len(numbers))
-        for number, box in zip(numbers.tolist(), boxes, strict=True):
-            if number == 0:
-                continue
+        for number, box in _boxes(self.rooms):
             x0, y0, x1, y1 = box
             inside = self.rooms[y0:y1, x0:x1] == number
             target = self.solid[y0:y1, x0:x1]
@@ -593,10 +591,9 @@ class Furnisher:
                     put((x, y))
 
 
-def _boxes(index: NDArray[np.intp], count: int) -> list[tuple[int, int, int, int]]:
-    """x0, y0, x1, y1 of each label 0..count-1, without the walls' thickness."""
-    boxes = []
-    for part in find_objects(index + 1, count):
-        rows, columns = part
-        boxes.append((columns.start + 1, rows.start + 1, columns.stop - 1, rows.stop - 1))
-    return boxes
+def _boxes(rooms: Labels) -> Iterator[tuple[int, tuple[int, int, int, int]]]:
+    """Each room's number with the x0, y0, x1, y1 of its box, without the walls' thickness."""
+    for number, part in enumerate(find_objects(rooms), 1):
+        if part is not None:
+            rows, columns = part
+            yield number, (columns.start + 1, rows.start + 1, columns.stop - 1, rows.stop - 1)

@@ -22,7 +22,7 @@ from fit_grouping.buildings.plans import (
     united_rooms,
     unvisited,
 )
-from fit_grouping.buildings.raster import CELL_M, Generator, between, cells, chance
+from fit_grouping.buildings.raster import Generator, between, cells, chance, larger_than, numbers_in
 from fit_grouping.buildings.villas import villa
 from fit_grouping.buildings.workplaces import (
     double_doors,
@@ -66,13 +66,13 @@ def suites(rng: Generator) -> Plan:
                 uneven_row(rng, plan, strip)
     if chance(rng, 0.5):
         halved(rng, plan, area, rng.uniform(12, 50), 2.4)
-    numbers = set(np.unique(plan.rooms[plan.rooms > 0]).tolist())
+    numbers = set(numbers_in(plan.rooms))
     plan.suite = numbers - plan.corridors - plan.lobbies
     corner_rooms(rng, plan, 0.4, 1.0, 2.4)
     bays(rng, plan, 0.6)
     notches(rng, plan, 0.3)
     unbuilt(rng, plan, rng.choice([0.0, 0.06, 0.15]))
-    plan.joined = rng.choice([0.2, 0.5, 0.85])
+    plan.joined = rng.choice([0.3, 0.65, 0.95])
     plan.frayed = rng.choice([0.0, 0.0, 0.2])
     plan.open_fronts = rng.choice([0.02, 0.2, 0.6])
     return plan
@@ -167,7 +167,7 @@ def loop(rng: Generator) -> Plan:
         plan.merge(floor, plan.corridor(arm))
     if chance(rng, 0.45):
         _corner_room(rng, plan, floor, deep)
-    rooms = set(np.unique(plan.rooms[plan.rooms > 0]).tolist()) - {floor}
+    rooms = set(numbers_in(plan.rooms)) - {floor}
     plan.suite = rooms - plan.lobbies if chance(rng, 0.4) else set()
     plan.joined = rng.choice([0.1, 0.4])
     bays(rng, plan, 1.0)
@@ -261,9 +261,7 @@ def openhome(rng: Generator) -> Plan:
     united_rooms(rng, plan, rng.choice([0.0, 0.06]))
     unvisited(rng, plan, rng.choice([0.0, 0.1, 0.25]))
     alcoves(rng, plan, rng.choice([0.0, 0.3, 0.7]))
-    numbers, size = np.unique(plan.rooms, return_counts=True)
-    large = set(numbers[size * CELL_M**2 > ZONE_MIN_M2].tolist())
-    plan.zones = (zones & large) | plan.corridors
+    plan.zones = (zones & larger_than(plan.rooms, ZONE_MIN_M2)) | plan.corridors
     plan.open_fronts = rng.choice([0.05, 0.15, 0.3])
     return plan
 

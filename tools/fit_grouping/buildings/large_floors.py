@@ -16,7 +16,7 @@ from fit_grouping.buildings.plans import (
     notches,
     row_of_rooms,
 )
-from fit_grouping.buildings.raster import CELL_M, Generator, between, cells, chance
+from fit_grouping.buildings.raster import CELL_M, Generator, between, cells, chance, larger_than
 from fit_grouping.buildings.workplaces import (
     double_doors,
     furnish_large_as_halls,
@@ -59,7 +59,7 @@ def wings(rng: Generator) -> Plan:
     furnish_large_as_halls(plan)
     bays(rng, plan, 1.5)
     corner_rooms(rng, plan, 1.0, 1.2, 3.0)
-    unbuilt(rng, plan, rng.choice([0.0, 0.1, 0.25]))
+    unbuilt(rng, plan, rng.choice([0.0, 0.2, 0.5]))
     plan.frayed = rng.choice([0.0, 0.0, 0.15])
     plan.open_fronts = rng.choice([0.02, 0.2, 0.4])
     return plan
@@ -186,7 +186,7 @@ def gallery(rng: Generator) -> Plan:
     plan = Plan.empty("gallery", between(rng, 12, 56), between(rng, 10, 42))
     x0, y0, x1, y1 = plan.inner
     height, width = plan.rooms.shape
-    slant = rng.choice([0.0, 0.0, 0.08, 0.3])
+    slant = rng.choice([0.0, 0.0, 0.06, 0.2])
     y, x = np.mgrid[:height, :width].astype(np.float32)
     inside = np.zeros(plan.rooms.shape, bool)
     inside[y0:y1, x0:x1] = True
@@ -194,14 +194,13 @@ def gallery(rng: Generator) -> Plan:
         deep = between(rng, 2.5, 9)
         strip = [(x0, y0, x0 + deep, y1), (x0, y0, x1, y0 + deep), (x1 - deep, y0, x1, y1)][rng.integers(3)]
         plan.corridors.add(plan.paint(strip))
-    _cut(rng, plan, inside & (plan.rooms == 0), rng.uniform(30, 240), slant, x, y)
+    _cut(rng, plan, inside & (plan.rooms == 0), float(np.exp(rng.uniform(np.log(35), np.log(600)))), slant, x, y)
     for _ in range(rng.poisson(0.4)):  # a round hall
         center = rng.uniform(x0, x1), rng.uniform(y0, y1)
         radii = rng.uniform(2.5, 7, 2) / CELL_M
         round_hall = ((x - center[0]) / radii[0]) ** 2 + ((y - center[1]) / radii[1]) ** 2 <= 1
         plan.rooms[round_hall & inside] = int(plan.rooms.max()) + 1
-    numbers, size = np.unique(plan.rooms, return_counts=True)
-    large = set(numbers[(numbers > 0) & (size * CELL_M**2 > GALLERY_M2)].tolist())
+    large = larger_than(plan.rooms, GALLERY_M2)
     plan.galleries = {n for n in large if chance(rng, 0.9)} | plan.corridors
     plan.halls = large - plan.corridors
     corner_rooms(rng, plan, 2.0, 1.4, 4.5)

@@ -10,7 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 from skimage.measure import label
 
-from fit_grouping.buildings.raster import CELL_M, Generator, Labels, Mask, between, cells, chance
+from fit_grouping.buildings.raster import (
+    CELL_M,
+    Generator,
+    Labels,
+    Mask,
+    between,
+    cells,
+    chance,
+    larger_than,
+    numbers_in,
+)
 
 Rectangle = tuple[int, int, int, int]
 """x0, y0, x1, y1 in cells."""
@@ -145,7 +155,8 @@ class Plan:
         """Number the connected pieces of rooms; slivers go to the ground or to the room around them."""
         pieces = label(self.rooms, connectivity=1, background=0)  # type: ignore[no-untyped-call]
         count = int(pieces.max()) + 1
-        first = np.unique(pieces, return_index=True)[1]
+        first = np.zeros(count, np.intp)
+        first[pieces.ravel()[::-1]] = np.arange(pieces.size)[::-1]
         was = self.rooms.ravel()[first]
         size = np.bincount(pieces.ravel(), minlength=count) * CELL_M**2
         rows, columns = np.nonzero(pieces)
@@ -218,7 +229,7 @@ def halved(rng: Generator, plan: Plan, area: Rectangle, stop_m2: float, least_m:
 def corner_rooms(rng: Generator, plan: Plan, mean: float, low_m: float, high_m: float) -> None:
     """Cut small rooms (toilets, stores, closets) out of corners of rooms."""
     for _ in range(rng.poisson(mean)):
-        rooms = np.unique(plan.rooms[plan.rooms > 0])
+        rooms = numbers_in(plan.rooms)
         room = int(rng.choice(rooms))
         rows, columns = np.nonzero(plan.rooms == room)
         x0, x1, y0, y1 = columns.min(), columns.max() + 1, rows.min(), rows.max() + 1
@@ -252,7 +263,7 @@ def chamfers(rng: Generator, plan: Plan, outer: float, inner: float) -> None:
         across = np.abs(x - corner[0]) * rng.uniform(0.6, 1.6) + np.abs(y - corner[1])
         plan.rooms[across < deep] = 0
     for _ in range(rng.poisson(inner)):
-        rooms = np.unique(plan.rooms[plan.rooms > 0])
+        rooms = numbers_in(plan.rooms)
         room = int(rng.choice(rooms))
         inside = plan.rooms == room
         if np.count_nonzero(inside) * CELL_M**2 < 9 or room in plan.corridors:
@@ -264,7 +275,7 @@ def chamfers(rng: Generator, plan: Plan, outer: float, inner: float) -> None:
 
 def unvisited(rng: Generator, plan: Plan, share: float) -> None:
     """Leave out rooms that nobody has opened."""
-    for room in np.unique(plan.rooms[plan.rooms > 0]).tolist():
+    for room in numbers_in(plan.rooms):
         small = np.count_nonzero(plan.rooms == room) * CELL_M**2 < 12
         if small and room not in plan.corridors and chance(rng, share):
             plan.rooms[plan.rooms == room] = 0
@@ -272,7 +283,7 @@ def unvisited(rng: Generator, plan: Plan, share: float) -> None:
 
 def alcoves(rng: Generator, plan: Plan, mean: float) -> None:
     """Move parts of the borders of rooms: recesses, chimneys, built-in cupboards."""
-    for room in np.unique(plan.rooms[plan.rooms > 0]).tolist():
+    for room in numbers_in(plan.rooms):
         for _ in range(rng.poisson(mean)):
             inside = plan.rooms == room
             rim = inside & ~_shrunk(inside)
@@ -352,9 +363,8 @@ def home(rng: Generator) -> Plan:
     unvisited(rng, plan, rng.choice([0.0, 0.1, 0.25]))
     alcoves(rng, plan, rng.choice([0.0, 0.3, 0.8]))
     openness = rng.choice([0.0, 0.3, 0.7])
-    number, size = np.unique(plan.rooms, return_counts=True)
-    large = number[(number > 0) & (size * CELL_M**2 > PUBLIC_MIN_M2)]
-    plan.public = {int(n) for n in large if chance(rng, openness)}
+    large = sorted(larger_than(plan.rooms, PUBLIC_MIN_M2))
+    plan.public = {n for n in large if chance(rng, openness)}
     return plan
 
 
@@ -565,7 +575,7 @@ def campus(rng: Generator) -> Plan:
                 row_of_rooms(rng, plan, strip, rng.uniform(2.5, 7))
             elif what < 0.75:
                 row_of_rooms(rng, plan, strip, rng.uniform(8, 18), least_m=5)
-    for room in np.unique(plan.rooms[plan.rooms > 0]):
+    for room in numbers_in(plan.rooms):
         area = np.count_nonzero(plan.rooms == room) * CELL_M**2
         if room not in plan.corridors and area > 50:
             plan.halls.add(int(room))

@@ -13,6 +13,20 @@ Mask = NDArray[np.uint8]
 Generator = np.random.Generator
 
 
+def numbers_in(labels: Labels) -> list[int]:
+    """Numbers above 0 of a label image, in ascending order."""
+    sizes = np.bincount(labels.ravel())
+    sizes[:1] = 0
+    return np.flatnonzero(sizes).tolist()  # type: ignore[no-any-return]
+
+
+def larger_than(labels: Labels, area_m2: float) -> set[int]:
+    """Numbers above 0 of a label image that cover a larger area."""
+    sizes = np.bincount(labels.ravel()) * CELL_M**2
+    sizes[:1] = 0.0
+    return set(np.flatnonzero(sizes > area_m2).tolist())
+
+
 def cells(meters: float) -> int:
     """Number of cells along a length."""
     return round(meters / CELL_M)

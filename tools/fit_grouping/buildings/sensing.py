@@ -27,13 +27,8 @@ THOROUGH_HOMES, THOROUGH = 0.75, 0.45
 """Share of the maps for which robots looked into every corner."""
 HOME_DAMAGE = 0.5
 """Faint walls and gaps in homes, relative to elsewhere."""
-WORKPLACES = frozenset({"offices", "faculty", "suites", "loop", "wings"})
-"""Kinds of plans that are mapped from their corridors, often while they are still explored."""
-SEEN_FROM_DOORS = (0.0, 0.2, 0.5, 0.85)
-"""Share of the rooms of a workplace that are seen through their doors only."""
-IN_PROGRESS, PROGRESS, PROGRESS_VIEWS_MIN = 0.45, (0.25, 0.9), 6
-"""How often the exploration of a workplace is still in progress, the share of the views that it has,
-and how many at least."""
+PROGRESS, PROGRESS_VIEWS_MIN = (0.25, 0.9), 6
+"""The share of the views that an exploration in progress has, and how many at least."""
 BEAMS_APART = (1, 1, 2, 3, 4)
 """Every which ray of a view a workplace's lidar has: few leave fans of single rays in far rooms."""
 FRONT_TRANSMISSION = (0.02, 0.25)
@@ -56,6 +51,38 @@ DRAWN_SHARE = {
 """Share of drawings among the maps of a kind; 0.12 elsewhere."""
 ROOM_SEEN_MIN_M2 = 0.5
 """Rooms of which less was seen are none in the truth."""
+
+
+@dataclass(frozen=True)
+class Survey:
+    """How a kind of building is mapped from its corridors.
+
+    Attributes
+    ----------
+    from_doors : tuple of float
+        Shares of the rooms that are seen through their doors only, one of them by chance.
+    in_progress : float
+        How often the exploration is still in progress.
+    thorough : float
+        Share of the maps for which robots looked into every corner.
+    reaches : tuple of float
+        How often sensors have each reach of `REACHES_M`.
+    """
+
+    from_doors: tuple[float, ...] = (0.0, 0.2, 0.5, 0.85)
+    in_progress: float = 0.45
+    thorough: float = THOROUGH
+    reaches: tuple[float, ...] = USUAL_REACHES
+
+
+SURVEYS = {
+    "offices": Survey(),
+    "faculty": Survey(),
+    "suites": Survey((0.0, 0.0, 0.1, 0.3, 0.6), 0.3, 0.6),
+    "loop": Survey((0.0, 0.0, 0.2, 0.5), 0.3, 0.6),
+    "wings": Survey((0.0, 0.0, 0.0, 0.2), 0.12, 0.7, (0.0, 0.15, 0.3, 0.35, 0.2)),
+}
+"""Kinds of plans that are mapped from their corridors, at times while they are still explored."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,14 +212,17 @@ def _outdoors(rng: Generator, rooms: Labels) -> Mask:
 def _sensed(rng: Generator, walled: WalledPlan, solid: Mask) -> tuple[str, NDArray[np.uint8] | None]:
     """Drive through rooms that can be reached, all or the first of them, and look around."""
     rooms, neighbors = walled.plan.rooms, walled.neighbors
-    reach_m = float(rng.choice(REACHES_M, p=HOME_REACHES if walled.plan.kind in HOMES else USUAL_REACHES))
+    survey = SURVEYS.get(walled.plan.kind)
+    at_home = walled.plan.kind in HOMES
+    reaches = survey.reaches if survey else HOME_REACHES if at_home else USUAL_REACHES
+    reach_m = float(rng.choice(REACHES_M, p=reaches))
     numbers = list(neighbors)
-    if walled.plan.kind in WORKPLACES and walled.plan.corridors:
+    if survey and walled.plan.corridors:
         ways = [n for n in numbers if n in walled.plan.corridors] or numbers
         start = ways[rng.integers(len(ways))]
     else:
         start = numbers[rng.integers(len(numbers))]
-    share = 1.0 if chance(rng, 0.75 if walled.plan.kind in HOMES else 0.62) else rng.uniform(0.15, 0.9)
+    share = 1.0 if chance(rng, 0.75 if at_home else 0.62) else rng.uniform(0.15, 0.9)
     order, queue, met = [], [start], {start}
     while queue:
         room = queue.pop(int(rng.integers(len(queue))))
@@ -211,12 +241,11 @@ def _sensed(rng: Generator, walled: WalledPlan, solid: Mask) -> tuple[str, NDArr
     rows, columns = rows[place], columns[place]
     bounds = np.searchsorted(rooms[rows, columns], [*order, *[n + 1 for n in order]])
     # Share of the rooms that are seen through their doors only.
-    work = walled.plan.kind in WORKPLACES
-    usual = [0.7, 0.24, 0.06, 0.0] if walled.plan.kind in HOMES else None
-    skip = rng.choice(SEEN_FROM_DOORS) if work else rng.choice([0.0, 0.06, 0.3, 0.6], p=usual)
+    usual = [0.7, 0.24, 0.06, 0.0] if at_home else None
+    skip = rng.choice(survey.from_doors) if survey else rng.choice([0.0, 0.06, 0.3, 0.6], p=usual)
     views = []
     per_view_m2 = rng.uniform(6, 16)
-    thorough = chance(rng, THOROUGH_HOMES if walled.plan.kind in HOMES else THOROUGH)
+    thorough = chance(rng, survey.thorough if survey else THOROUGH_HOMES if at_home else THOROUGH)
     apart = 0.25 if thorough else 0.6
     for low, high, room in zip(bounds[: len(order)], bounds[len(order) :], order, strict=True):
         inside = room in walled.plan.corridors or room in walled.plan.halls or len(order) == 1
@@ -232,7 +261,7 @@ def _sensed(rng: Generator, walled: WalledPlan, solid: Mask) -> tuple[str, NDArr
         return kind, None
     if len(views) > VIEWS_MAX:
         views = [views[i] for i in rng.choice(len(views), VIEWS_MAX, replace=False)]
-    if work and chance(rng, IN_PROGRESS):
+    if survey and chance(rng, survey.in_progress):
         count = max(PROGRESS_VIEWS_MIN, round(len(views) * rng.uniform(*PROGRESS)))
         kind, views = "progress", _nearest(rng, views, count)
     if walled.plan.yard is not None:
@@ -240,7 +269,7 @@ def _sensed(rng: Generator, walled: WalledPlan, solid: Mask) -> tuple[str, NDArr
         if len(at_yard):
             chosen = rng.integers(0, len(at_yard), rng.integers(*YARD_VIEWS))
             views += [(int(row), int(column)) for row, column in at_yard[chosen]]
-    every = int(rng.choice(BEAMS_APART)) if work else 1
+    every = int(rng.choice(BEAMS_APART)) if survey else 1
     sensor = Sensor(rng, solid, walled.glass, cells(reach_m), every)
     if walled.plan.glazed:
         sensor.transmission = rng.uniform(*FRONT_TRANSMISSION)

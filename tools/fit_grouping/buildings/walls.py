@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fit_grouping.buildings.plans import Plan
-from fit_grouping.buildings.raster import Generator, Labels, Mask, between, cells, chance
+from fit_grouping.buildings.raster import Generator, Labels, Mask, between, cells, chance, numbers_in
 
 HOMES = frozenset({"home", "villa", "openhome"})
 """Kinds of plans that people live in."""
@@ -339,7 +339,7 @@ def build_walls(rng: Generator, plan: Plan) -> WalledPlan:
     )
     inner_side = (walls * outer).astype(np.uint8)
     runs = border_runs(rooms)
-    neighbors: dict[int, list[int]] = {int(n): [] for n in np.unique(rooms[rooms > 0])}
+    neighbors: dict[int, list[int]] = {n: [] for n in numbers_in(rooms)}
     reached, taste = _Groups(neighbors), _Groups(neighbors)
     place_min = cells(DOOR_PLACE_MIN_M)
     pairs = [p for p, parts in runs.items() if p[0] > 0 and sum(r.length for r in parts) >= place_min]

@@ -20,7 +20,7 @@ from fit_grouping.buildings.plans import (
     row_of_rooms,
     unite_touching,
 )
-from fit_grouping.buildings.raster import CELL_M, Generator, Mask, between, cells, chance
+from fit_grouping.buildings.raster import CELL_M, Generator, Mask, between, cells, chance, larger_than, numbers_in
 
 WIDTHS_M = {
     "store": (1.0, 1.8),
@@ -122,7 +122,7 @@ def arena(rng: Generator) -> Plan:
     plan = Plan.empty("arena", between(rng, 6, 17), between(rng, 5, 13), margin_m=rng.uniform(3, 7))
     halved(rng, plan, plan.inner, rng.uniform(10, 34), 2.2)
     notches(rng, plan, 0.7)
-    numbers = np.unique(plan.rooms[plan.rooms > 0]).tolist()
+    numbers = numbers_in(plan.rooms)
     plan.public = {number for number in numbers if chance(rng, 0.8)}
     plan.gates = rng.uniform(1, 4)
     ground = (plan.rooms == 0).astype(np.uint8)
@@ -288,14 +288,12 @@ def _spine(rng: Generator, plan: Plan) -> list[Rectangle]:
 
 def furnish_large_as_halls(plan: Plan) -> None:
     """Furnish large rooms as halls."""
-    numbers, size = np.unique(plan.rooms, return_counts=True)
-    large = numbers[(numbers > 0) & (size * CELL_M**2 > HALL_M2)]
-    plan.halls |= set(large.tolist()) - plan.corridors
+    plan.halls |= larger_than(plan.rooms, HALL_M2) - plan.corridors
 
 
 def unbuilt(rng: Generator, plan: Plan, share: float) -> None:
     """Leave out rooms that nobody enters: shafts, courts, locked rooms."""
-    for room in np.unique(plan.rooms[plan.rooms > 0]).tolist():
+    for room in numbers_in(plan.rooms):
         if room not in plan.corridors | plan.lobbies and chance(rng, share):
             plan.rooms[plan.rooms == room] = 0
 
