@@ -205,7 +205,6 @@ def gallery(rng: Generator) -> Plan:
     plan.halls = large - plan.corridors
     corner_rooms(rng, plan, 2.0, 1.4, 4.5)
     notches(rng, plan, 0.8)
-    unbuilt(rng, plan, rng.choice([0.0, 0.12]))
     plan.gates = 0.7
     return plan
 

@@ -29,8 +29,6 @@ HOME_DAMAGE = 0.5
 """Faint walls and gaps in homes, relative to elsewhere."""
 PROGRESS, PROGRESS_VIEWS_MIN = (0.25, 0.9), 6
 """The share of the views that an exploration in progress has, and how many at least."""
-BEAMS_APART = (1, 1, 2, 3, 4)
-"""Every which ray of a view a workplace's lidar has: few leave fans of single rays in far rooms."""
 FRONT_TRANSMISSION = (0.02, 0.25)
 """Share of the rays that pass whole fronts: single ones, as through blinds and between posts."""
 YARD_VIEWS = (3, 12)
@@ -55,7 +53,7 @@ ROOM_SEEN_MIN_M2 = 0.5
 
 @dataclass(frozen=True)
 class Survey:
-    """How a kind of building is mapped from its corridors.
+    """How a kind of building is mapped, from its corridors where it has some.
 
     Attributes
     ----------
@@ -67,12 +65,15 @@ class Survey:
         Share of the maps for which robots looked into every corner.
     reaches : tuple of float
         How often sensors have each reach of `REACHES_M`.
+    beams_apart : tuple of int
+        Every which ray of a view the lidar has, one of them by chance.
     """
 
     from_doors: tuple[float, ...] = (0.0, 0.2, 0.5, 0.85)
     in_progress: float = 0.45
     thorough: float = THOROUGH
     reaches: tuple[float, ...] = USUAL_REACHES
+    beams_apart: tuple[int, ...] = (1, 1, 2, 3, 4)
 
 
 SURVEYS = {
@@ -80,9 +81,10 @@ SURVEYS = {
     "faculty": Survey(),
     "suites": Survey((0.0, 0.0, 0.1, 0.3, 0.6), 0.3, 0.6),
     "loop": Survey((0.0, 0.0, 0.2, 0.5), 0.3, 0.6),
-    "wings": Survey((0.0, 0.0, 0.0, 0.2), 0.12, 0.7, (0.0, 0.15, 0.3, 0.35, 0.2)),
+    "wings": Survey((0.0, 0.0, 0.0, 0.2), 0.12, 0.7, (0.0, 0.15, 0.3, 0.35, 0.2), (1, 1, 2)),
+    "gallery": Survey((0.0, 0.0, 0.1), 0.1, 0.75, (0.05, 0.2, 0.3, 0.3, 0.15), (1, 1, 2)),
 }
-"""Kinds of plans that are mapped from their corridors, at times while they are still explored."""
+"""Kinds of plans that are mapped so; few beams leave fans of single rays in far rooms."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -269,7 +271,7 @@ def _sensed(rng: Generator, walled: WalledPlan, solid: Mask) -> tuple[str, NDArr
         if len(at_yard):
             chosen = rng.integers(0, len(at_yard), rng.integers(*YARD_VIEWS))
             views += [(int(row), int(column)) for row, column in at_yard[chosen]]
-    every = int(rng.choice(BEAMS_APART)) if survey else 1
+    every = int(rng.choice(survey.beams_apart)) if survey else 1
     sensor = Sensor(rng, solid, walled.glass, cells(reach_m), every)
     if walled.plan.glazed:
         sensor.transmission = rng.uniform(*FRONT_TRANSMISSION)
