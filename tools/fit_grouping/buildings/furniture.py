@@ -256,12 +256,12 @@ class Furnisher:
                 x = np.linspace(low, end, 9)
                 sag = bow * (x - width / 2) ** 2 / max(width, 1)
                 front_line = np.column_stack([x, y + sag])
-                outline = np.vstack([front_line, front_line[::-1] + (0, deep)]).astype(np.int32)
+                outline = np.vstack([front_line, front_line[::-1] + np.array([0.0, deep])]).astype(np.int32)
                 if hollow:
                     cv2.polylines(drawn_rows, [outline], True, 1, 1)
                 else:
                     cv2.fillPoly(drawn_rows, [outline], 1)
-        image |= drawn_rows
+        image[drawn_rows > 0] = 1
         if chance(rng, 0.6):  # a lectern
             x = int(width * rng.uniform(0.2, 0.7))
             image[front // 3 : front // 3 + cells(0.6), x : x + between(rng, 0.8, 3.0)] = 1

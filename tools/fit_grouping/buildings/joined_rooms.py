@@ -1,4 +1,4 @@
-"""Plans in which rooms meet widely: suites of offices, floors around a ring corridor, open floors of homes."""
+"""Plans in which rooms meet widely: suites of offices, floors around a ring, open homes."""
 
 from __future__ import annotations
 
@@ -42,7 +42,9 @@ CONNECTOR_M = (1.0, 2.4)
 
 def suites(rng: Generator) -> Plan:
     """Offices along corridors with wide gaps in the walls between them, behind which stand cabinets."""
-    plan = empty_building(rng, "suites", between(rng, 14, 56), between(rng, 9, 34 if chance(rng, 0.3) else 20))
+    plan = empty_building(
+        rng, "suites", between(rng, 14, 56), between(rng, 9, 34 if chance(rng, 0.3) else 20)
+    )
     area = plan.inner
     width, depth = between(rng, 1.3, 4.0), between(rng, 3.2, 8.0)
     segments = corridor_segments(rng, area, width, depth)
@@ -287,7 +289,7 @@ def _unite_one_pair(rng: Generator, plan: Plan, numbers: set[int]) -> None:
 
 
 def _private(rng: Generator, plan: Plan, area: Rectangle) -> set[int]:
-    """Bedrooms, baths and closets off a hallway that widens, turns or is in pieces; the hallway's numbers."""
+    """Bedrooms, baths and closets off a hallway that widens, turns or is in pieces; its numbers."""
     x0, y0, x1, y1 = area
     broad = between(rng, 0.95, 1.9)
     y = y0 + round((y1 - y0 - broad) * rng.uniform(0.2, 0.8))

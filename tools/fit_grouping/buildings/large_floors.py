@@ -150,7 +150,7 @@ def _turned(plan: Plan, degrees: float) -> Plan:
     turn = cv2.getRotationMatrix2D((width / 2, height / 2), degrees, 1.0)
     sine, cosine = abs(turn[0, 1]), abs(turn[0, 0])
     size = (int(width * cosine + height * sine) + 1, int(width * sine + height * cosine) + 1)
-    turn[:, 2] += (np.array(size) - (width, height)) / 2
+    turn[:, 2] = turn[:, 2] + (np.array(size) - np.array([width, height])) / 2
     rooms = cv2.warpAffine(plan.rooms.astype(np.float32), turn, size, flags=cv2.INTER_NEAREST)
     plan.rooms = rooms.astype(np.int32)
     return plan
@@ -174,7 +174,9 @@ def _link(rng: Generator, plan: Plan, upper: Rectangle, lower: Rectangle) -> Non
     for number, (a, b) in enumerate(pairwise(stops)):
         if len(stops) == 4 and number == 1:
             aside = between(rng, 0, 6)
-            plan.halls.add(plan.paint((at - int(chance(rng, 0.5)) * aside, a, at + broad + aside, b), over=True))
+            plan.halls.add(
+                plan.paint((at - int(chance(rng, 0.5)) * aside, a, at + broad + aside, b), over=True)
+            )
         elif chance(rng, 0.5):
             plan.corridor((at, a, at + broad, b))
         else:
@@ -194,7 +196,15 @@ def gallery(rng: Generator) -> Plan:
         deep = between(rng, 2.5, 9)
         strip = [(x0, y0, x0 + deep, y1), (x0, y0, x1, y0 + deep), (x1 - deep, y0, x1, y1)][rng.integers(3)]
         plan.corridors.add(plan.paint(strip))
-    _cut(rng, plan, inside & (plan.rooms == 0), float(np.exp(rng.uniform(np.log(35), np.log(600)))), slant, x, y)
+    _cut(
+        rng,
+        plan,
+        inside & (plan.rooms == 0),
+        float(np.exp(rng.uniform(np.log(35), np.log(600)))),
+        slant,
+        x,
+        y,
+    )
     for _ in range(rng.poisson(0.4)):  # a round hall
         center = rng.uniform(x0, x1), rng.uniform(y0, y1)
         radii = rng.uniform(2.5, 7, 2) / CELL_M

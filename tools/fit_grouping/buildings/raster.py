@@ -17,7 +17,7 @@ def numbers_in(labels: Labels) -> list[int]:
     """Numbers above 0 of a label image, in ascending order."""
     sizes = np.bincount(labels.ravel())
     sizes[:1] = 0
-    return np.flatnonzero(sizes).tolist()  # type: ignore[no-any-return]
+    return np.flatnonzero(sizes).tolist()
 
 
 def larger_than(labels: Labels, area_m2: float) -> set[int]:

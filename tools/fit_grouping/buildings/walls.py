@@ -31,7 +31,7 @@ DOUBLE_DOOR_M, DOUBLE_LEAF_SHARE = (1.5, 2.6), 0.6
 CABINET_M, CABINET_GAP_M, CABINET_DEEP_M = (1.0, 3.2), (0.6, 2.4), (0.25, 0.6)
 """Cabinets and pieces of wall between a lab and a corridor, and the gaps between them."""
 GAP_SHARE, LARGE_GAP_SHARE = (0.25, 0.67), (0.5, 0.9)
-"""Share of a wall that a gap takes which leaves a stub at each end: between offices, between halls and zones."""
+"""Share of a wall that a gap with a stub at each end takes: between offices, between halls and zones."""
 SUITE_PIECE_M, SUITE_GAP_M, SUITE_DEEP_M = (0.4, 1.8), (0.8, 2.2), (0.2, 0.6)
 """Pieces of a wall between offices, the gaps between them, and the depth of cabinets in their place."""
 PIER_M, PIER_GAP_M, PIER_DEEP_M = (0.3, 2.5), (1.0, 4.5), (0.3, 2.5)
@@ -41,7 +41,14 @@ CABINET_AT_STUB = 0.35
 COUNTER_SHARE, COUNTER_DEEP_M = (0.25, 0.65), (0.4, 0.7)
 """Share of an opening that a counter reaches into, and how deep it is."""
 SUITE_OPENINGS = {"gap": 0.42, "pieces": 0.28, "one side": 0.15, "stub": 0.15}
-GALLERY_OPENINGS = {"large gap": 0.25, "piers": 0.25, "stub": 0.15, "one side": 0.1, "open": 0.05, "door": 0.2}
+GALLERY_OPENINGS = {
+    "large gap": 0.25,
+    "piers": 0.25,
+    "stub": 0.15,
+    "one side": 0.1,
+    "open": 0.05,
+    "door": 0.2,
+}
 ZONE_OPENINGS = {
     "large gap": 0.24,
     "counter": 0.2,

@@ -20,7 +20,16 @@ from fit_grouping.buildings.plans import (
     row_of_rooms,
     unite_touching,
 )
-from fit_grouping.buildings.raster import CELL_M, Generator, Mask, between, cells, chance, larger_than, numbers_in
+from fit_grouping.buildings.raster import (
+    CELL_M,
+    Generator,
+    Mask,
+    between,
+    cells,
+    chance,
+    larger_than,
+    numbers_in,
+)
 
 WIDTHS_M = {
     "store": (1.0, 1.8),
@@ -42,7 +51,9 @@ HALL_M2 = 60.0
 
 def offices(rng: Generator) -> Plan:
     """Rooms of very different width along corridors that double doors part, labs open among them."""
-    plan = empty_building(rng, "offices", between(rng, 20, 58), between(rng, 11, 38 if chance(rng, 0.5) else 18))
+    plan = empty_building(
+        rng, "offices", between(rng, 20, 58), between(rng, 11, 38 if chance(rng, 0.5) else 18)
+    )
     area = plan.inner
     width, depth = between(rng, 1.4, 3.2), between(rng, 3.6, 7.0)
     segments = corridor_segments(rng, area, width, depth)
