@@ -263,8 +263,8 @@ class Furnisher:
                     cv2.fillPoly(drawn_rows, [outline], 1)
         image[drawn_rows > 0] = 1
         if chance(rng, 0.6):  # a lectern
-            x = int(width * rng.uniform(0.2, 0.7))
-            image[front // 3 : front // 3 + cells(0.6), x : x + between(rng, 0.8, 3.0)] = 1
+            left = int(width * rng.uniform(0.2, 0.7))
+            image[front // 3 : front // 3 + cells(0.6), left : left + between(rng, 0.8, 3.0)] = 1
 
     def _study(self, drawn: Mask) -> None:
         """Blocks of tables in a grid, each with chairs around it that fray its outline."""

@@ -242,7 +242,7 @@ def _corner_room(rng: Generator, plan: Plan, floor: int, deep: list[int]) -> Non
 
 
 def openhome(rng: Generator) -> Plan:
-    """A home whose living rooms, kitchen and hallways are zones of one floor, parted by stubs and counters."""
+    """A home whose living rooms, kitchen and hallways are zones of one floor, parted by stubs or counters."""
     if chance(rng, 0.4):
         plan = villa(rng)
         plan.kind = "openhome"
@@ -271,7 +271,7 @@ def openhome(rng: Generator) -> Plan:
 def _zones(rng: Generator, plan: Plan, area: Rectangle) -> set[int]:
     """Cut the open part of a home into its zones, some of L shape; their numbers."""
     before = int(plan.rooms.max())
-    halved(rng, plan, area, rng.uniform(9, 32), rng.uniform(2.0, 3.2))
+    halved(rng, plan, area, rng.uniform(9, 55), rng.uniform(2.0, 3.4))
     numbers = list(range(before + 1, int(plan.rooms.max()) + 1))
     if len(numbers) > 2 and chance(rng, 0.45):  # a living room around a corner
         _unite_one_pair(rng, plan, set(numbers))
@@ -289,7 +289,7 @@ def _unite_one_pair(rng: Generator, plan: Plan, numbers: set[int]) -> None:
 
 
 def _private(rng: Generator, plan: Plan, area: Rectangle) -> set[int]:
-    """Bedrooms, baths and closets off a hallway that widens, turns or is in pieces; its numbers."""
+    """Bedrooms, baths and closets off a hallway that widens or turns; its numbers."""
     x0, y0, x1, y1 = area
     broad = between(rng, 0.95, 1.9)
     y = y0 + round((y1 - y0 - broad) * rng.uniform(0.2, 0.8))
@@ -304,14 +304,14 @@ def _private(rng: Generator, plan: Plan, area: Rectangle) -> set[int]:
     if reach < x1 and chance(rng, 0.6):  # around a corner
         across = (reach, y, reach + broad, min(y1, y + between(rng, 2.5, 6.0)))
         ways.add(plan.corridor(across if chance(rng, 0.5) else (reach, max(y0, y - cells(4)), *across[2:])))
-    usual_m = rng.uniform(2.2, 4.2)
+    usual_m, stop_m2 = rng.uniform(2.4, 5.0), rng.uniform(6, 22)
     for strip in ((x0, y0, x1, y), (x0, y + broad, x1, y1)):
         if min(strip[2] - strip[0], strip[3] - strip[1]) < cells(1.0):
             continue
         for low, high in pairwise(cuts_along(rng, x1 - x0, usual_m, 1.1, regular=False)):
             cell = (x0 + low, strip[1], x0 + high, strip[3])
             if strip[3] - strip[1] > cells(4.5) and chance(rng, 0.5):
-                halved(rng, plan, cell, 9, 1.2)
+                halved(rng, plan, cell, stop_m2, 1.2)
             else:
                 plan.paint(cell)
     return ways

@@ -26,6 +26,8 @@ from fit_grouping.buildings.workplaces import (
     uneven_row,
 )
 
+LONGEST_WING_M = {1: 78.0, 2: 64.0, 3: 44.0}
+"""Longest wing of a building with as many."""
 GALLERY_M2 = 14.0
 """Smaller rooms of a gallery are closed by doors."""
 YARD_M = (2.0, 6.0)
@@ -36,8 +38,8 @@ def wings(rng: Generator) -> Plan:
     """One to three wings of a university, each with one corridor or two around a core, and links between."""
     count = int(rng.choice([1, 2, 3], p=[0.4, 0.45, 0.15]))
     tilt = rng.choice([0.0, 1.0, 3.0])
-    parts = [_turned(_wing(rng), rng.normal(0, tilt)) for _ in range(count)]
-    apart = [between(rng, 4, 22) for _ in range(count)]
+    parts = [_turned(_wing(rng, LONGEST_WING_M[count]), rng.normal(0, tilt)) for _ in range(count)]
+    apart = [between(rng, 4, 18) for _ in range(count)]
     width = max(part.rooms.shape[1] for part in parts)
     height = sum(part.rooms.shape[0] for part in parts) + sum(apart[1:])
     plan = Plan.empty("wings", width, height)
@@ -65,9 +67,9 @@ def wings(rng: Generator) -> Plan:
     return plan
 
 
-def _wing(rng: Generator) -> Plan:
+def _wing(rng: Generator, longest_m: float) -> Plan:
     """One wing, without ground around it."""
-    long = between(rng, 26, 78)
+    long = between(rng, 22, longest_m)
     if chance(rng, 0.5):
         return _ring_wing(rng, long)
     deep = between(rng, 4, 14)

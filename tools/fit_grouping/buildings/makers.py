@@ -30,8 +30,8 @@ MAKERS: tuple[tuple[Callable[[Generator], Plan], float], ...] = (
     (loop, 0.07),
     (openhome, 0.14),
     (wings, 0.08),
-    (gallery, 0.05),
-    (warehouse, 0.04),
+    (gallery, 0.06),
+    (warehouse, 0.05),
 )
 """Makers of plans and their shares, relative to each other."""
 KINDS = tuple(maker.__name__ for maker, _ in MAKERS)
@@ -44,7 +44,7 @@ TIDY_CORNERS = {
     "shop": (0.5, 0.0),
     "arena": (0.1, 0.1),
     "loop": (0.1, 0.1),
-    "openhome": (0.2, 0.08),
+    "openhome": (0.25, 0.35),
     "wings": (0.1, 0.1),
     "gallery": (0.4, 0.1),
     "warehouse": (0.2, 0.0),

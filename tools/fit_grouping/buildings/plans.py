@@ -270,7 +270,11 @@ def chamfers(rng: Generator, plan: Plan, outer: float, inner: float) -> None:
             continue
         angle = rng.uniform(0.3, 1.25) * rng.choice([-1, 1])
         beyond = np.cos(angle) * (x - x[inside].mean()) + np.sin(angle) * (y - y[inside].mean()) > 0
-        plan.rooms[inside & beyond] = int(plan.rooms.max()) + 1
+        new = int(plan.rooms.max()) + 1
+        plan.rooms[inside & beyond] = new
+        for kinds in (plan.zones, plan.galleries):
+            if room in kinds:
+                kinds.add(new)
 
 
 def unvisited(rng: Generator, plan: Plan, share: float) -> None:
