@@ -224,7 +224,8 @@ def test_ground_that_is_driven_on_is_free_and_no_room():
 
 
 @pytest.mark.parametrize(
-    "kind", ["cabinets", "double", "gap", "large gap", "pieces", "piers", "counter", "stub", "one side"]
+    "kind",
+    ["cabinets", "double", "gap", "large gap", "pieces", "piers", "counter", "stub", "one side", "end gap"],
 )
 def test_wide_openings_part_and_let_through(kind, monkeypatch):
     from fit_grouping.buildings import walls

@@ -40,7 +40,7 @@ CABINET_AT_STUB = 0.35
 """How often a cabinet stands at what is left of a wall beside a gap."""
 COUNTER_SHARE, COUNTER_DEEP_M = (0.25, 0.65), (0.4, 0.7)
 """Share of an opening that a counter reaches into, and how deep it is."""
-SUITE_OPENINGS = {"gap": 0.42, "pieces": 0.28, "one side": 0.15, "stub": 0.15}
+SUITE_OPENINGS = {"gap": 0.42, "pieces": 0.25, "end gap": 0.18, "stub": 0.15}
 GALLERY_OPENINGS = {
     "large gap": 0.25,
     "piers": 0.25,
@@ -286,8 +286,8 @@ def _opening(rng: Generator, kind: str, stretch: Stretch, thickness: int, usual_
         stub = cells(STUB_MIN_M)
         width = min(max(round(room_for * share), cells(0.8)), room_for - 2 * stub)
         low = thickness + int(rng.integers(stub, room_for - width - stub + 1))
-    elif kind == "one side":
-        width = round(room_for * rng.uniform(0.45, 0.9))
+    elif kind in ("one side", "end gap"):
+        width = round(room_for * rng.uniform(*(GAP_SHARE if kind == "end gap" else (0.45, 0.9))))
         low = thickness // 2 if chance(rng, 0.5) else stretch.length - width - thickness // 2
     elif kind == "stub":
         width = max(cells(0.8), room_for - 2 * cells(STUB_MIN_M) - between(rng, 0, 0.6))
