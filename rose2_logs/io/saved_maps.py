@@ -273,14 +273,15 @@ def cells_of_image(path: Path, gray: NDArray[np.uint8], values: str = "auto") ->
     values : str
         As the parameter ``occupancy.values``: whether the thresholds may be decided.
     """
-    shade = gray.astype(np.float32) / np.float32(LEVELS - 1)
     reading = None
     if values == "auto":
-        counts = np.bincount(LEVELS - 1 - gray.ravel(), minlength=LEVELS)
+        counts = np.bincount(gray.ravel(), minlength=LEVELS)[::-1]
         reading = _decided(counts, FREE_THRESH, OCCUPIED_THRESH)
         if reading is not None:
             log_warning(logger, "values", f"{path}: {reading.why}; {OVERRULED}", file=path)
-    return _cells(path, {}, shade, None, reading, [])
+    # By the thresholds of no description, what a pixel is follows from its level alone.
+    shade = np.arange(LEVELS, dtype=np.float32)[None] / np.float32(LEVELS - 1)
+    return _cells(path, {}, shade, None, reading, [])[0].take(gray)
 
 
 def read_map(
