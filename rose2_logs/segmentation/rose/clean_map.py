@@ -44,23 +44,17 @@ def structure_score(
     score : (H, W) float32
         The best score over the directions on occupied cells, 0 elsewhere.
     """
-    score = np.zeros(occupied.shape, np.float32)
-    sigma_along = parameters.structure_length_m / 4
+    row, column = np.nonzero(occupied)
+    best = np.zeros(len(row), np.float32)
     for direction in directions_rad:
-        along = spectrum.frequency_x * np.float32(np.cos(direction)) + spectrum.frequency_y * np.float32(
-            np.sin(direction)
-        )
-        # In place, for these are the largest arrays of the analysis.
-        along *= np.pi * sigma_along
-        np.square(along, out=along)
-        along *= -2
-        gain = np.exp(along, out=along)
-        np.maximum(score, spectrum.filtered(gain, occupied.shape), out=score)
-    score[~occupied] = 0
-    np.clip(score, 0, 1, out=score)
-    score *= np.float32(SCORE_STEPS)
-    np.rint(score, out=score)
-    score /= np.float32(SCORE_STEPS)
+        blurred = spectrum.blurred_along(direction, parameters.structure_length_m / 4, occupied.shape)
+        np.maximum(best, blurred[row, column], out=best)
+    np.minimum(best, 1, out=best)
+    best *= np.float32(SCORE_STEPS)
+    np.rint(best, out=best)
+    best /= np.float32(SCORE_STEPS)
+    score = np.zeros(occupied.shape, np.float32)
+    score[row, column] = best
     return score
 
 

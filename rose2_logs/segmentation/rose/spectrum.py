@@ -18,6 +18,8 @@ PICTURE_SIDE = 160
 DIRECTION_STEPS = 36_000
 """Directions are rounded to this many steps of half a turn, 0.005 degrees: Whatever
 instructions a CPU has, they are the same, and upright is upright."""
+NO_GAIN = 1e-12
+"""A gain below this is none: what it leaves is lost in single precision, and the smallest numbers are slow."""
 STRENGTH_STEPS = 10_000
 """Strengths are rounded to this many steps: of equal ones the first direction is the strongest."""
 
@@ -41,11 +43,37 @@ class Spectrum:
     frequency_y: NDArray[np.float32]
     shape: tuple[int, int]
 
-    def filtered(self, gain: NDArray[np.float32], size: tuple[int, int]) -> NDArray[np.float32]:
-        """Transform back what a gain of the half plane's shape leaves, cut to `size` cells."""
+    def blurred_along(
+        self, direction_rad: float, sigma_m: float, size: tuple[int, ...]
+    ) -> NDArray[np.float32]:
+        """Keep the ridge of one direction and transform it back: the walls blurred along it.
+
+        Parameters
+        ----------
+        direction_rad : float
+            The blur's direction.
+        sigma_m : float
+            Its standard deviation.
+        size : (int, int)
+            Rows and columns that are returned.
+        """
+        cos, sin = np.float32(np.cos(direction_rad)), np.float32(np.sin(direction_rad))
+        x, y = self.frequency_x, self.frequency_y
+        # Most of the plane lies beside the ridge; of one along an axis, all but a few rows or columns.
+        reach = np.sqrt(-np.log(NO_GAIN) / 2) / (np.pi * sigma_m)
+        columns = np.count_nonzero(np.abs(x * cos) <= reach + np.abs(y * sin).max())
+        rows = np.flatnonzero(np.abs(y * sin) <= reach + np.abs(x * cos).max())
+        along = x[:, :columns] * cos + y[rows] * sin
+        along *= np.pi * sigma_m
+        np.square(along, out=along)
+        along *= -2
+        gain = np.exp(along, out=along)
+        gain[gain < NO_GAIN] = 0
+        ridge = np.zeros((self.shape[0], columns), np.complex64)
+        ridge[rows] = self.values[rows, :columns] * gain
         # One axis after the other, so that rows that are cut off are not transformed.
-        columns = fft.ifft(self.values * gain, axis=0, overwrite_x=True)[: size[0]]
-        image: NDArray[np.float32] = fft.irfft(columns, self.shape[1], axis=1, overwrite_x=True)
+        of_rows = fft.ifft(ridge, axis=0, overwrite_x=True)[: size[0]]
+        image: NDArray[np.float32] = fft.irfft(of_rows, self.shape[1], axis=1, overwrite_x=True)
         return image[:, : size[1]]
 
 
@@ -120,11 +148,18 @@ def angular_energy(spectrum: Spectrum, parameters: SpectrumParameters) -> FloatA
         return np.zeros(bins)
     radius = np.arange(lowest, highest, min(step_x, step_y))
     across = np.arange(bins) * np.pi / bins - np.pi / 2
-    magnitude = np.fft.fftshift(np.abs(spectrum.values), axes=0)
+    height, width = spectrum.values.shape
+    middle = height // 2
+    # Only so much of the plane is looked at; what lies beyond stays empty.
+    columns, rows = (int(highest / step) + 2 for step in (step_x, step_y))
+    below, above = min(rows, middle), min(rows, height - middle)
+    magnitude = np.zeros((height, min(columns, width)), np.float32)
+    magnitude[middle - below : middle] = np.abs(spectrum.values[height - below :, :columns])
+    magnitude[middle : middle + above] = np.abs(spectrum.values[:above, :columns])
     polar = cv2.remap(
         magnitude,
         (np.outer(np.cos(across), radius) / step_x).astype(np.float32),
-        (np.outer(np.sin(across), radius) / step_y + len(magnitude) // 2).astype(np.float32),
+        (np.outer(np.sin(across), radius) / step_y + middle).astype(np.float32),
         cv2.INTER_LINEAR,
         borderMode=cv2.BORDER_REPLICATE,
     )
