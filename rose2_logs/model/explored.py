@@ -134,8 +134,7 @@ class ExploredPart:
             for down, right in NEIGHBORS:
                 beside = padded[1 + down : 1 + down + height, 1 + right : 1 + right + width]
                 np.copyto(labels, beside, where=labels == 0)
-        part = full[self.window]
-        part[self.known_free] = self._unblocked(labels)[self.known_free]
+        np.copyto(full[self.window], self._unblocked(labels), where=self.known_free)
         return full
 
     def _unblocked(self, values: NDArray[Scalar]) -> NDArray[Scalar]:

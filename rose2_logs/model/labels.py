@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rose2_logs.model.occupancy import BoolArray, Scalar
+
+Label = TypeVar("Label", bound=np.integer)
 
 COUNTED_AT_ONCE = 2**16
 """Cells whose labels are counted at once."""
@@ -55,6 +58,11 @@ def cells_where(values: NDArray[Scalar], which: Callable[[NDArray[Scalar]], Bool
     return np.concatenate([np.zeros(0, np.intp), *found])
 
 
+def run_starts(values: NDArray[Any]) -> NDArray[np.intp]:
+    """Index (K,) of the first of each run of equal values (N,): of labels there are few, and many cells."""
+    return np.flatnonzero(np.append(len(values) > 0, values[1:] != values[:-1])[: len(values)])
+
+
 def distinct_labels(labels: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDArray[np.intp]]:
     """Find the distinct values of a label image and where each comes first in reading order.
 
@@ -68,7 +76,7 @@ def distinct_labels(labels: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDA
         Index into the flattened image.
     """
     flat = labels.ravel()
-    starts = np.flatnonzero(np.concatenate([[True], flat[1:] != flat[:-1]])[: flat.size])
+    starts = run_starts(flat)
     values, index = np.unique(flat[starts], return_index=True)
     return values.astype(np.int64), starts[index]
 
@@ -78,9 +86,18 @@ def numbered(values: NDArray[Scalar]) -> tuple[NDArray[Scalar], NDArray[np.intp]
 
     The same as ``numpy.unique`` with ``return_inverse``, but it sorts the runs of equal values only.
     """
-    starts = np.flatnonzero(np.append(len(values) > 0, values[1:] != values[:-1]))
+    starts = run_starts(values)
     distinct, index = np.unique(values[starts], return_inverse=True)
     return distinct, np.repeat(index, np.diff(starts, append=len(values)))
+
+
+def narrow(labels: NDArray[np.int32]) -> NDArray[np.integer]:
+    """Return labels from 0 on in the narrowest type that holds them and one more: a byte is read fastest."""
+    highest = int(labels.max(initial=0)) + 1
+    for kind in (np.uint8, np.uint16):
+        if highest <= np.iinfo(kind).max:
+            return labels.astype(kind)
+    return labels
 
 
 def renumber_in_place(labels: NDArray[np.int32], number: NDArray[np.int32]) -> NDArray[np.int32]:
@@ -93,20 +110,22 @@ def renumber_in_place(labels: NDArray[np.int32], number: NDArray[np.int32]) -> N
 def label_sizes(labels: NDArray[np.integer], count: int) -> NDArray[np.int64]:
     """Number of cells (count + 1,) of each label 0..count of an image.
 
-    The same as ``numpy.bincount``, which would make a copy of the image in its own type.
+    The same as ``numpy.bincount``, which would make a copy of the image in its own type and count every cell.
     """
-    sizes = np.zeros(count + 1, np.int64)
+    sizes = np.zeros(count + 1)
     for rows in np.array_split(labels, max(1, labels.size // COUNTED_AT_ONCE)):
-        sizes += np.bincount(rows.ravel(), minlength=count + 1)
-    return sizes
+        flat = rows.ravel()
+        starts = run_starts(flat)
+        sizes += np.bincount(flat[starts], np.diff(starts, append=flat.size), minlength=count + 1)
+    return sizes.astype(np.int64)
 
 
-def labels_near(labels: NDArray[np.int32], cells: NDArray[np.intp], reach_cells: float) -> NDArray[np.int32]:
+def labels_near(labels: NDArray[Label], cells: NDArray[np.intp], reach_cells: float) -> NDArray[Label]:
     """Label (N,) nearest to each of some cells of an image, 0 where none is within reach.
 
     Parameters
     ----------
-    labels : (H, W) int32
+    labels : (H, W) int
         0 for none.
     cells : (N,) int
         Index into the flattened image.
@@ -116,13 +135,13 @@ def labels_near(labels: NDArray[np.int32], cells: NDArray[np.intp], reach_cells:
     import cv2
 
     if not labels.any():
-        return np.zeros(len(cells), np.int32)
+        return np.zeros(len(cells), labels.dtype)
     distance, nearest = cv2.distanceTransformWithLabels(
         (labels == 0).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
     )
     # OpenCV numbers the cells that have a label in reading order, from 1 on.
-    label = np.concatenate([np.zeros(1, np.int32), labels[labels > 0]])
-    near: NDArray[np.int32] = label.take(nearest.take(cells))
+    label = np.concatenate([np.zeros(1, labels.dtype), labels[labels > 0]])
+    near: NDArray[Label] = label.take(nearest.take(cells))
     near[distance.take(cells) > reach_cells] = 0
     return near
 
@@ -258,12 +277,17 @@ def number_rooms(
     number : (N,) int32
         Number of each label: ``number[labels]`` is the image with new numbers.
     """
-    size = label_sizes(labels, highest)
+    flat = labels.ravel()
+    starts = run_starts(flat)
+    label = flat[starts]
+    size = np.bincount(label, np.diff(starts, append=flat.size), minlength=highest + 1)
     keep = size * resolution_m**2 >= minimum_m2
     keep[0] = False
-    present, first = distinct_labels(labels)
-    order = present[np.argsort(first)]
-    order = order[keep[order]]
+    first = np.full(len(size), flat.size)
+    # Assigned from the last to the first, so that the first stays.
+    first[label[::-1]] = starts[::-1]
+    order = np.argsort(first, kind="stable")
+    order = order[keep[order] & (size[order] > 0)]
     number = np.zeros(len(size), np.int32)
     number[order] = np.arange(1, len(order) + 1)
     return number

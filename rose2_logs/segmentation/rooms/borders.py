@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from rose2_logs.config.parameters import FloorPlanParameters
-from rose2_logs.model.labels import contacts
+from rose2_logs.model.labels import narrow
 from rose2_logs.model.occupancy import BoolArray
 
 
@@ -31,17 +29,24 @@ def adopt_left_out(
     width = 2 * round(parameters.leak_max_width_m / resolution_m / 2) + 1
     wide = cv2.morphologyEx(free.astype(np.uint8), cv2.MORPH_OPEN, np.ones((width, width), np.uint8))
     left_out = (wide > 0) & (labels == 0)
-    count, piece = cv2.connectedComponents(left_out.astype(np.uint8), connectivity=4)
-    # Pieces have negative labels, so that their contacts with rooms are those of two signs.
-    meet = contacts(np.where(left_out, -piece, labels))
-    meet = meet.chosen((meet.low < 0) & (meet.high > 0))
+    cells = np.flatnonzero(left_out)
+    if len(cells) == 0:
+        return labels
+    count, piece = cv2.connectedComponents(left_out.view(np.uint8), connectivity=4)
+    number = piece.take(cells).astype(np.int64)
     rooms = int(labels.max(initial=0)) + 1
-    sides = np.bincount(-meet.low.astype(np.int64) * rooms + meet.high, minlength=count * rooms)
+    sides = np.zeros(count * rooms, np.int64)
+    around = np.pad(labels, 1)
+    in_around = np.flatnonzero(np.pad(left_out, 1))
+    for step in (-around.shape[1], -1, 1, around.shape[1]):
+        beside = around.take(in_around + step)
+        sides += np.bincount(number * rooms + beside, minlength=count * rooms)
     sides = sides.reshape(count, rooms)
+    sides[:, 0] = 0
     room = sides.argmax(1).astype(np.int32)
     room[sides.max(1) * resolution_m < parameters.join_min_open_m] = 0
     adopted = labels.copy()
-    adopted[left_out] = room[piece[left_out]]
+    np.put(adopted, cells, room.take(number))
     return adopted
 
 
@@ -59,26 +64,22 @@ def settle_borders(labels: NDArray[np.int32], resolution_m: float, strip_m: floa
     """
     radius = max(1, round(strip_m / resolution_m / 2))
     kernel = np.ones((2 * radius + 1, 2 * radius + 1), np.uint8)
-    grown = labels.astype(_narrowest_type(int(labels.max(initial=0))))
+    grown = narrow(labels)
+    if grown.dtype == np.int32:
+        grown = grown.astype(np.float32)  # OpenCV's morphology knows no other type for so many labels
     core = cv2.erode(grown, kernel) == grown
     core &= cv2.dilate(grown, kernel) == grown
     grown[~core] = 0
     open_cells = labels > 0
     cross = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
+    left = 0
     # Every step reaches one cell further; twice the width of the strip also restores corners.
     for _ in range(4 * radius):
         empty = (grown == 0) & open_cells
-        if not empty.any():
+        before, left = left, np.count_nonzero(empty)
+        if left in (0, before):
             break
         cv2.copyTo(cv2.dilate(grown, cross), empty.view(np.uint8), grown)
     settled = labels.copy()
     np.copyto(settled, grown, where=grown > 0, casting="unsafe")
     return settled
-
-
-def _narrowest_type(highest: int) -> np.dtype[Any]:
-    """Type that holds labels up to the highest and that OpenCV's morphology knows: narrow ones are fast."""
-    for narrow in (np.uint8, np.uint16):
-        if highest <= np.iinfo(narrow).max:
-            return np.dtype(narrow)
-    return np.dtype(np.float32)

@@ -13,9 +13,12 @@ from scipy.spatial import cKDTree
 
 from rose2_logs.config.parameters import TopologyParameters
 from rose2_logs.model.borders import Border
-from rose2_logs.model.labels import contacts
+from rose2_logs.model.labels import contacts, narrow
 from rose2_logs.model.occupancy import FloatArray
 from rose2_logs.model.rooms import Doorway
+
+ROUNDING_M = 1e-9
+"""Numerical: more than the lengths of doorways are rounded off."""
 
 
 def find_doorways(
@@ -37,7 +40,7 @@ def find_doorways(
     doorways : list of ((int, int), (2, 2) float)
         The two rooms, smaller first, and the ends of the passage in the grid frame, meters; sorted.
     """
-    meet = contacts(labels)
+    meet = contacts(narrow(labels))
     meet = meet.chosen(meet.low > 0)
     if len(meet.low) == 0:
         return []
@@ -52,10 +55,14 @@ def find_doorways(
     order = np.argsort(component, kind="stable")
     bounds = np.searchsorted(component[order], np.arange(count + 1))
     doorways = []
+    least_m = parameters.doorway_min_width_m
     for first, last in itertools.pairwise(bounds):
         members = order[first:last]
-        ends = _extremes(points[members]) * resolution_m
-        if np.linalg.norm(ends[1] - ends[0]) + resolution_m >= parameters.doorway_min_width_m:
+        of_doorway = points[members]
+        if (np.hypot(*np.ptp(of_doorway, axis=0)) + 1) * resolution_m < least_m - ROUNDING_M:
+            continue  # not even their box is wide enough
+        ends = _extremes(of_doorway) * resolution_m
+        if np.linalg.norm(ends[1] - ends[0]) + resolution_m >= least_m:
             doorways.append((pairs[pair[members[0]]], ends))
     return sorted(doorways, key=lambda item: (item[0], item[1].tolist()))
 

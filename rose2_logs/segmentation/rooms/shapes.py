@@ -11,13 +11,15 @@ from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from rose2_logs.config.parameters import FloorPlanParameters
-from rose2_logs.model.labels import distinct_labels, labels_near
+from rose2_logs.model.labels import Label, distinct_labels, label_sizes, labels_near, narrow
 from rose2_logs.model.occupancy import BoolArray
 from rose2_logs.model.outlines import room_outlines
 from rose2_logs.segmentation.floor_plan.stage import FloorPlanResult
 
 
-def rooms_of_faces(labels: NDArray[np.int32], plan: FloorPlanResult) -> NDArray[np.int32]:
+def rooms_of_faces(
+    labels: NDArray[np.int32], number: NDArray[np.int32], plan: FloorPlanResult
+) -> NDArray[np.int32]:
     """Room (F,) of each face, 0 for none.
 
     A group of faces that was split, or lost cells to a split, has no faces of its own any more.
@@ -25,7 +27,9 @@ def rooms_of_faces(labels: NDArray[np.int32], plan: FloorPlanResult) -> NDArray[
     Parameters
     ----------
     labels : (H, W) int32
-        Rooms 1.. of the free cells.
+        Labels of the free cells.
+    number : (N,) int32
+        Room 1.. of each label, 0 for none.
     plan : FloorPlanResult
         The faces, their groups and the group of each cell.
     """
@@ -35,6 +39,7 @@ def rooms_of_faces(labels: NDArray[np.int32], plan: FloorPlanResult) -> NDArray[
     pair_of_cell += plan.labels
     pairs, _ = distinct_labels(pair_of_cell)
     rooms, groups = np.divmod(pairs, group_count)
+    rooms = number[rooms]
     rooms, groups = rooms[rooms > 0], groups[rooms > 0]
     rooms_in_group = np.bincount(groups, minlength=group_count)
     room_of_group = np.zeros(len(rooms_in_group), np.int32)
@@ -68,11 +73,11 @@ def seen_cells(
         of no room.
     """
     kinds = int(labels.max(initial=0)) + 2
-    key = face_of_cell.astype(np.int64)
-    key *= kinds
+    fits = (face_count + 1) * kinds < 2**31
+    key = face_of_cell * (np.int32(kinds) if fits else np.int64(kinds))
     key += labels
     key[free & (labels == 0)] += kinds - 1
-    return np.bincount(key.ravel(), minlength=(face_count + 1) * kinds).reshape(-1, kinds)
+    return label_sizes(key, (face_count + 1) * kinds - 1).reshape(-1, kinds)
 
 
 def most_seen_rooms(cells: NDArray[np.int64]) -> NDArray[np.int32]:
@@ -132,43 +137,46 @@ def predicted_cells(
     room_of_face: NDArray[np.int32],
     resolution_m: float,
     parameters: FloorPlanParameters,
-) -> NDArray[np.int32]:
-    """Cells of the rooms' shapes: (H, W) int32 with rooms 1.., 0 for none.
+) -> NDArray[np.integer]:
+    """Cells of the rooms' shapes: (H, W) with rooms 1.., 0 for none, in the narrowest type.
 
     Each unseen cell is claimed by one room at most. The unseen cells of a room that hang together are a
     pocket; it is the room's if it is open to what was seen of the room rather than walled off, or small. Of
     the walls around, the room takes the side that is its own.
     """
-    claim = _claims(labels, free, face_of_cell, cells_of_face, room_of_face, resolution_m, parameters)
+    seen = narrow(labels)
+    claim = _claims(seen, free, face_of_cell, cells_of_face, room_of_face, resolution_m, parameters)
     gap = round(parameters.shape_gap_m / resolution_m / 2)
     wall = _dilated(occupied, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * gap + 1, 2 * gap + 1)))
-    wall &= labels == 0
+    wall &= seen == 0
     pocket = _parts(claim, (claim > 0) & ~wall)
-    is_room = _open_pockets(labels, claim, pocket, wall, resolution_m, parameters)
-    cells = labels.copy()
-    np.copyto(cells, claim, where=is_room.take(pocket))
+    inside = np.flatnonzero(pocket)
+    is_room = _open_pockets(seen, claim, pocket, inside, wall, resolution_m, parameters)
+    taken = inside[is_room.take(pocket.take(inside))]
+    cells = seen.copy()
+    np.put(cells, taken, claim.take(taken))
     reach = gap + max(1, round(parameters.shape_wall_m / resolution_m))
     beside = _dilated(cells > 0, np.ones((2 * reach + 1, 2 * reach + 1), np.uint8))
     beside &= (claim > 0) & (pocket == 0)
     np.copyto(cells, claim, where=beside)
     part = _parts(cells, cells > 0)
     was_seen = np.zeros(part.max() + 1, bool)
-    was_seen[part[labels > 0]] = True
-    predicted = np.flatnonzero((cells > 0) & (labels == 0))
+    was_seen[part.take(np.flatnonzero(seen))] = True
+    predicted = np.flatnonzero((cells > 0) & (seen == 0))
     np.put(cells, predicted[~was_seen.take(part.take(predicted))], 0)
     _fill_small_holes(cells, resolution_m, parameters.shape_fill_max_m2)
     return cells
 
 
 def _claims(
-    labels: NDArray[np.int32],
+    labels: NDArray[Label],
     free: BoolArray,
     face_of_cell: NDArray[np.int32],
     cells_of_face: NDArray[np.int64],
     room_of_face: NDArray[np.int32],
     resolution_m: float,
     parameters: FloorPlanParameters,
-) -> NDArray[np.int32]:
+) -> NDArray[Label]:
     """Room (H, W) that may be predicted in each cell that is not free, 0 for none.
 
     The room that was seen nearest, if it has a part of the face, else the room of the face.
@@ -190,20 +198,20 @@ def _claims(
 
 
 def _open_pockets(
-    labels: NDArray[np.int32],
-    claim: NDArray[np.int32],
+    labels: NDArray[Label],
+    claim: NDArray[Label],
     pocket: NDArray[np.int32],
+    inside: NDArray[np.intp],
     wall: BoolArray,
     resolution_m: float,
     parameters: FloorPlanParameters,
 ) -> BoolArray:
-    """Which pockets (N,) are their rooms', by what is around them."""
-    inside = pocket > 0
-    number, room = pocket[inside], claim[inside]
+    """Which pockets (N,) are their rooms', by what is around the cells inside them."""
+    number, room = pocket.take(inside), claim.take(inside)
     count = int(number.max(initial=0)) + 1
-    is_wall = int(labels.max(initial=0)) + 1
-    around = np.pad(np.where(wall, np.int32(is_wall), labels), 1)
-    beside = _beside(around, np.flatnonzero(np.pad(inside, 1)))
+    is_wall = labels.dtype.type(labels.max(initial=0) + 1)
+    around = np.pad(np.where(wall, is_wall, labels), 1)
+    beside = _beside(around, np.flatnonzero(np.pad(pocket > 0, 1)))
     opening = np.bincount(number, (beside == room).sum(0), count)
     walled = np.bincount(number, (beside == is_wall).sum(0), count)
     small = np.bincount(number, minlength=count) * resolution_m**2 <= parameters.shape_fill_max_m2
@@ -212,7 +220,7 @@ def _open_pockets(
     return is_room
 
 
-def _fill_small_holes(cells: NDArray[np.int32], resolution_m: float, largest_m2: float) -> None:
+def _fill_small_holes(cells: NDArray[np.integer], resolution_m: float, largest_m2: float) -> None:
     """Give holes up to some size to the one room that surrounds them, in place."""
     empty = np.pad(cells == 0, 1, constant_values=True).astype(np.uint8)
     count, hole = cv2.connectedComponents(empty, connectivity=4)
@@ -229,13 +237,13 @@ def _fill_small_holes(cells: NDArray[np.int32], resolution_m: float, largest_m2:
     cells[...] = filled[1:-1, 1:-1]
 
 
-def _beside(padded: NDArray[np.int32], inside: NDArray[np.intp]) -> NDArray[np.int32]:
+def _beside(padded: NDArray[Label], inside: NDArray[np.intp]) -> NDArray[Label]:
     """Values (4, N) beside each of some cells, numbered in reading order, of an image that has a margin."""
     width = padded.shape[1]
     return np.stack([padded.take(inside + step) for step in (-width, -1, 1, width)])
 
 
-def _parts(values: NDArray[np.int32], mask: BoolArray) -> NDArray[np.int32]:
+def _parts(values: NDArray[np.integer], mask: BoolArray) -> NDArray[np.int32]:
     """Number the parts of a mask in which a value hangs together; cells along a border of two get 0."""
     inside = mask.copy()
     inside[:, :-1] &= ~mask[:, 1:] | (values[:, :-1] == values[:, 1:])

@@ -64,7 +64,7 @@ def make_rooms(
     number = number_rooms(settled, int(whole.max(initial=0)), parameters.room_min_area_m2, resolution_m)
     settled = renumber_in_place(settled, number)
     # Faces belong to the rooms whose labels they had before borders settled.
-    room_of_face = rooms_of_faces(renumber_in_place(whole, number), plan)
+    room_of_face = rooms_of_faces(whole, number, plan)
     cells_of_face = seen_cells(settled, free, plan.face_of_cell, len(room_of_face))
     shapes = room_shapes(
         settled, free, occupied, plan.face_of_cell, cells_of_face, room_of_face, resolution_m, parameters
