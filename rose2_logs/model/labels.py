@@ -100,11 +100,52 @@ def narrow(labels: NDArray[np.int32]) -> NDArray[np.integer]:
     return labels
 
 
-def renumber_in_place(labels: NDArray[np.int32], number: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Return ``number[labels]``, the image with new numbers, written over the old ones to save memory."""
-    for rows in np.array_split(labels, max(1, labels.size // COUNTED_AT_ONCE)):
-        rows[...] = number[rows]
-    return labels
+@dataclass(frozen=True, eq=False)
+class LabelRuns:
+    """A label image as runs of equal labels in reading order: there are few of them, and many cells.
+
+    Attributes
+    ----------
+    shape : (int, int)
+        Of the image.
+    start : (K,) int
+        Index into the flattened image of the first cell of each run.
+    label, cells : (K,) int
+        Its label and number of cells.
+    """
+
+    shape: tuple[int, ...]
+    start: NDArray[np.intp]
+    label: NDArray[np.integer]
+    cells: NDArray[np.intp]
+
+    @classmethod
+    def of(cls, labels: NDArray[np.integer]) -> LabelRuns:
+        """Find the runs of an image (H, W)."""
+        flat = labels.ravel()
+        start = run_starts(flat)
+        return cls(labels.shape, start, flat[start], np.diff(start, append=flat.size))
+
+    def sizes(self, count: int) -> NDArray[np.int64]:
+        """Number of cells (count + 1,) of each label 0..count."""
+        return np.bincount(self.label, self.cells, minlength=count + 1).astype(np.int64)
+
+    def firsts(self, count: int) -> NDArray[np.intp]:
+        """First cell (count + 1,) of each label 0..count; behind the last cell for those without one."""
+        first = np.full(count + 1, int(np.prod(self.shape)))
+        # Assigned from the last to the first, so that the first stays.
+        first[self.label[::-1]] = self.start[::-1]
+        return first
+
+    def greatest(self, values: NDArray[np.float32], count: int) -> NDArray[np.float32]:
+        """Greatest of some values (H, W), 0 or more, among the cells of each label 0..count."""
+        found = np.zeros(count + 1, np.float32)
+        np.maximum.at(found, self.label, np.maximum.reduceat(values.ravel(), self.start))
+        return found
+
+    def renumbered(self, number: NDArray[Label]) -> NDArray[Label]:
+        """Return the image ``number[labels]``."""
+        return np.repeat(number[self.label], self.cells).reshape(self.shape)
 
 
 def label_sizes(labels: NDArray[np.integer], count: int) -> NDArray[np.int64]:
@@ -268,26 +309,20 @@ def straight_runs(
 
 
 def number_rooms(
-    labels: NDArray[np.int32], highest: int, minimum_m2: float, resolution_m: float
+    runs: LabelRuns, highest: int, minimum_m2: float, resolution_m: float
 ) -> NDArray[np.int32]:
-    """Number the labels up to `highest` by their first cell; those of less area than `minimum_m2` get 0.
+    """Number the labels of an image up to `highest` by their first cell; those of less area get 0.
 
     Returns
     -------
     number : (N,) int32
-        Number of each label: ``number[labels]`` is the image with new numbers.
+        Number of each label: `runs.renumbered` gives the image with new numbers.
     """
-    flat = labels.ravel()
-    starts = run_starts(flat)
-    label = flat[starts]
-    size = np.bincount(label, np.diff(starts, append=flat.size), minlength=highest + 1)
-    keep = size * resolution_m**2 >= minimum_m2
+    size = runs.sizes(highest)
+    keep = (size * resolution_m**2 >= minimum_m2) & (size > 0)
     keep[0] = False
-    first = np.full(len(size), flat.size)
-    # Assigned from the last to the first, so that the first stays.
-    first[label[::-1]] = starts[::-1]
-    order = np.argsort(first, kind="stable")
-    order = order[keep[order] & (size[order] > 0)]
+    order = np.argsort(runs.firsts(highest), kind="stable")
+    order = order[keep[order]]
     number = np.zeros(len(size), np.int32)
     number[order] = np.arange(1, len(order) + 1)
     return number

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rose2_logs.config.parameters import Parameters
-from rose2_logs.model.labels import number_rooms
+from rose2_logs.model.labels import LabelRuns, number_rooms
 from rose2_logs.model.occupancy import BoolArray
 
 Labels = NDArray[np.int32]
@@ -62,4 +62,5 @@ def segment_by_baseline(
         Rooms 1.. by their first cell, 0 for none; so are free cells from which no room can be reached.
     """
     labels = BASELINES[method](free, resolution_m, parameters)
-    return number_rooms(labels, int(labels.max(initial=0)), 0.0, resolution_m)[labels]
+    runs = LabelRuns.of(labels)
+    return runs.renumbered(number_rooms(runs, int(labels.max(initial=0)), 0.0, resolution_m))

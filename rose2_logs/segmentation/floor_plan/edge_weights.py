@@ -256,7 +256,8 @@ class _Image(Generic[Number]):
         cell = place_m / self._resolution_m
         np.floor(cell, out=cell)
         cell += 1
-        return np.clip(cell, 0, count + 1, out=cell)
+        np.maximum(cell, 0, out=cell)
+        return np.minimum(cell, count + 1, out=cell)
 
 
 def _place_edges(edges_m: FloatArray, lines_m: FloatArray) -> tuple[NDArray[np.intp], FloatArray, FloatArray]:

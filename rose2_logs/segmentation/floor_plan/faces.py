@@ -102,24 +102,3 @@ def label_faces(graph: FaceGraph, shape: tuple[int, int], resolution_m: float) -
     return rasterize(
         graph.polygons, np.arange(1, len(graph.polygons) + 1, dtype=np.int32), shape, resolution_m
     )
-
-
-def free_area(
-    face_of_cell: NDArray[np.int32], free: BoolArray, count: int, resolution_m: float
-) -> FloatArray:
-    """Free area (F,) of each face in square meters."""
-    cells = np.bincount(face_of_cell[free], minlength=count + 1)[1:]
-    return cells.astype(float) * resolution_m**2
-
-
-def clearance(
-    face_of_cell: NDArray[np.int32],
-    free: BoolArray,
-    distance: NDArray[np.float32],
-    count: int,
-    resolution_m: float,
-) -> FloatArray:
-    """Greatest distance (F,) in meters of a free cell of each face from a wall; `distance` is in cells."""
-    greatest = np.zeros(count + 1, np.float32)
-    np.maximum.at(greatest, face_of_cell[free], distance[free])
-    return greatest[1:].astype(float) * resolution_m

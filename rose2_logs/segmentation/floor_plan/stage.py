@@ -10,16 +10,10 @@ from numpy.typing import NDArray
 from shapely.affinity import rotate
 
 from rose2_logs.config.parameters import FloorPlanParameters
-from rose2_logs.model.labels import distance_from, row_ends
+from rose2_logs.model.labels import LabelRuns, distance_from, label_sizes, row_ends
 from rose2_logs.model.occupancy import BoolArray, FloatArray
 from rose2_logs.segmentation.floor_plan.edge_weights import EdgeEvidence, edge_evidence
-from rose2_logs.segmentation.floor_plan.faces import (
-    FaceGraph,
-    build_faces,
-    clearance,
-    free_area,
-    label_faces,
-)
+from rose2_logs.segmentation.floor_plan.faces import FaceGraph, build_faces, label_faces
 from rose2_logs.segmentation.floor_plan.grouping import group_faces
 
 
@@ -75,16 +69,16 @@ def make_floor_plan(
     parameters : FloorPlanParameters
     """
     plan = cut_by_lines(lines_m, walls, free, direction_rad, resolution_m, parameters, distance)
-    graph, face_of_cell, seen = plan.graph, plan.face_of_cell, plan.seen
+    graph, seen = plan.graph, plan.seen
     count = len(graph.polygons)
-    area = free_area(face_of_cell, free, count, resolution_m)
     # Without any line the map is one face, however little of it was seen.
     inside = (seen >= parameters.face_min_seen) | (count == 1)
-    widest = clearance(face_of_cell, free, distance, count, resolution_m)
+    runs = LabelRuns.of(np.where(free, plan.face_of_cell, 0))
+    area = runs.sizes(count)[1:].astype(float) * resolution_m**2
     area[~inside] = 0
+    widest = runs.greatest(distance, count)[1:].astype(float) * resolution_m
     group = 1 + group_faces(graph.edge_faces, plan.evidence, area, seen, widest, parameters)
-    labels = np.concatenate([np.zeros(1, np.int32), group])[face_of_cell]
-    labels[~free] = 0
+    labels = runs.renumbered(np.concatenate([np.zeros(1, np.int32), group]))
     return replace(plan, group=group, labels=labels)
 
 
@@ -109,7 +103,7 @@ def cut_by_lines(
         distance = distance_from(walls)
     evidence = edge_evidence(graph.edges_m, lines_m, walls, distance, free, resolution_m, parameters)
     face_of_cell = label_faces(graph, (free.shape[0], free.shape[1]), resolution_m)
-    area = free_area(face_of_cell, free, count, resolution_m)
+    area = label_sizes(np.where(free, face_of_cell, 0), count)[1:].astype(float) * resolution_m**2
     seen = area / np.maximum(shapely.area(graph.polygons), 1e-12)
     no_group, no_labels = np.zeros(count, np.int32), np.zeros(free.shape, np.int32)
     return FloorPlanResult(graph, face_of_cell, evidence, seen, no_group, no_labels)

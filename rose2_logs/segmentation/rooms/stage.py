@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from rose2_logs.config.parameters import FloorPlanParameters, Parameters
-from rose2_logs.model.labels import number_rooms, renumber_in_place
+from rose2_logs.model.labels import LabelRuns, number_rooms
 from rose2_logs.model.occupancy import BoolArray
 from rose2_logs.segmentation.floor_plan.stage import FloorPlanResult
 from rose2_logs.segmentation.regions.stage import RegionsResult
@@ -61,8 +61,9 @@ def make_rooms(
     """
     whole = adopt_left_out(labels, free, resolution_m, parameters)
     settled = settle_borders(whole, resolution_m, parameters.border_strip_m)
-    number = number_rooms(settled, int(whole.max(initial=0)), parameters.room_min_area_m2, resolution_m)
-    settled = renumber_in_place(settled, number)
+    runs = LabelRuns.of(settled)
+    number = number_rooms(runs, int(whole.max(initial=0)), parameters.room_min_area_m2, resolution_m)
+    settled = runs.renumbered(number)
     # Faces belong to the rooms whose labels they had before borders settled.
     room_of_face = rooms_of_faces(whole, number, plan)
     cells_of_face = seen_cells(settled, free, plan.face_of_cell, len(room_of_face))
@@ -105,8 +106,9 @@ def finish_rooms(
     pieces, room_of_piece = rooms_in_one_piece(
         settled, occupied, resolution_m, of_regions.room_min_area_m2, of_regions
     )
-    number = number_rooms(pieces, len(room_of_piece) - 1, of_regions.room_min_area_m2, resolution_m)
-    labels = renumber_in_place(pieces, number)
+    runs = LabelRuns.of(pieces)
+    number = number_rooms(runs, len(room_of_piece) - 1, of_regions.room_min_area_m2, resolution_m)
+    labels = runs.renumbered(number)
     faces = plan.face_of_cell
     cells_of_face = seen_cells(labels, free, faces, len(plan.graph.polygons))
     room_of_face = most_seen_rooms(cells_of_face)
