@@ -117,8 +117,10 @@ class ExploredPart:
 
     def values_at(self, cells: NDArray[np.int32], values: NDArray[Scalar]) -> CellValues[Scalar]:
         """Values of blocks (H, W) as values of cells (N, 2) of the canvas."""
-        row, column = (cells - (self.window[0].start, self.window[1].start)).T // self.factor
-        return CellValues(self.geometry.shape, cells, values[row, column])
+        row, column = (cells[:, axis] - self.window[axis].start for axis in (0, 1))
+        if self.factor > 1:
+            row, column = row // self.factor, column // self.factor
+        return CellValues(self.geometry.shape, cells, values.ravel().take(row * values.shape[1] + column))
 
     def labels(self, labels: NDArray[np.int32]) -> NDArray[np.int32]:
         """Labels of blocks as labels of the canvas's free cells.

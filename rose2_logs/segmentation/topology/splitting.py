@@ -87,7 +87,7 @@ class _Lines:
     def of(cls, ends_m: FloatArray) -> _Lines:
         return cls(*_as_normals(ends_m), STRtree(linestrings(ends_m.reshape(-1, 2, 2))))
 
-    def near(self, points: NDArray[np.float32]) -> tuple[FloatArray, FloatArray]:
+    def near(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Normals and offsets of the lines that meet the box around some points."""
         x, y = points.T  # each by itself: NumPy is slow at the minimum of rows of two
         near = np.sort(self.tree.query(box(x.min(), y.min(), x.max(), y.max()), predicate="intersects"))
@@ -105,16 +105,19 @@ def _beyond_cut(
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]] | None:
     """Rows and columns of the cells beyond the cut through a room, in its window; None if it stays whole."""
     part = parts_of_room(inside, clear[window], resolution_m, parameters)
+    if part is None:
+        return None
     size = np.bincount(part.ravel())[1:] * resolution_m**2
     # The two largest parts are divided first; the rest follow in later rounds.
     largest = np.argsort(-size, kind="stable")[:2]
     if len(largest) < 2 or size[largest[1]] < parameters.split_min_area_m2:
         return None
     row, column = np.nonzero(inside)
-    points = np.empty((len(row), 2), np.float32)
-    points[:, 0], points[:, 1] = column, row
-    points += np.array([window[1].start, window[0].start], np.float32) + 0.5
-    points *= resolution_m
+    in_cells = np.empty((len(row), 2), np.float32)
+    in_cells[:, 0], in_cells[:, 1] = column, row
+    in_cells += np.array([window[1].start, window[0].start], np.float32) + 0.5
+    in_cells *= resolution_m
+    points = in_cells.astype(float)  # once, not for every line
     of_cell = part[row, column]
     one, two = points[of_cell == largest[0] + 1], points[of_cell == largest[1] + 1]
     normals, offsets = lines.near(points)
@@ -126,15 +129,15 @@ def _beyond_cut(
 
 
 def _cut(
-    points: NDArray[np.float32],
-    one: NDArray[np.float32],
-    two: NDArray[np.float32],
+    points: FloatArray,
+    one: FloatArray,
+    two: FloatArray,
     normals: FloatArray,
     offsets: FloatArray,
     min_purity: float,
 ) -> BoolArray | None:
     """Find which points (P,) are on the second part's side of the best line; None if none divides."""
-    purity = np.array([_purity(one, two, n, d) for n, d in zip(normals, offsets, strict=True)])
+    purity = np.array([_purity(one, two, n, d, min_purity) for n, d in zip(normals, offsets, strict=True)])
     best = int(purity.argmax()) if len(purity) else -1
     if best < 0 or purity[best] < min_purity:
         return None
@@ -143,10 +146,13 @@ def _cut(
     return beyond
 
 
-def _purity(one: NDArray[np.float32], two: NDArray[np.float32], normal: FloatArray, offset: float) -> float:
-    """Share of the worse part that is on its own side of a line."""
-    a, b = (one @ normal > offset).mean(), (two @ normal > offset).mean()
-    return float(max(min(a, 1 - b), min(1 - a, b)))
+def _purity(one: FloatArray, two: FloatArray, normal: FloatArray, offset: float, least: float) -> float:
+    """Share of the worse part that is on its own side of a line; 0 where that of one part is too low."""
+    a = np.count_nonzero(one @ normal > offset) / len(one)
+    if max(a, 1 - a) < least:
+        return 0.0
+    b = np.count_nonzero(two @ normal > offset) / len(two)
+    return max(min(a, 1 - b), min(1 - a, b))
 
 
 def _as_normals(lines_m: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -158,7 +164,7 @@ def _as_normals(lines_m: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _between(
-    one: NDArray[np.float32], two: NDArray[np.float32], directions_rad: FloatArray, tail_share: float
+    one: FloatArray, two: FloatArray, directions_rad: FloatArray, tail_share: float
 ) -> tuple[FloatArray, FloatArray]:
     """Lines along the dominant directions, each at the offset that best divides two sets of points."""
     normals = np.column_stack([-np.sin(directions_rad), np.cos(directions_rad)])

@@ -22,7 +22,7 @@ ROUNDED_UP = 1 + 1e-6
 
 def parts_of_room(
     inside: BoolArray, clear: NDArray[np.float32], resolution_m: float, parameters: TopologyParameters
-) -> NDArray[np.int32]:
+) -> NDArray[np.int32] | None:
     """Find the parts of a room that only narrow passages connect.
 
     A passage is a point of the Voronoi graph where the clearance, the distance from walls, is least between
@@ -39,11 +39,12 @@ def parts_of_room(
 
     Returns
     -------
-    part : (H, W) int32
-        Parts 1.., 0 outside the room. Pieces too small for a part need not have a number of their own.
+    part : (H, W) int32, optional
+        Parts 1.., 0 outside the room. Pieces too small for a part need not have a number of their own. None
+        if the room has only one part.
     """
     if _is_one_part(inside, clear, parameters) or _will_join(inside, clear, resolution_m, parameters):
-        return inside.astype(np.int32)
+        return None
     basin = _basins(inside, clear, resolution_m, parameters.summit_reach_m)
     count = int(basin.max()) + 1
     summit = np.zeros(count)
@@ -62,9 +63,9 @@ def _is_one_part(inside: BoolArray, clear: NDArray[np.float32], parameters: Topo
     and those that are clearer than a narrow passage can be do too, some way between the two is no passage.
     """
     least = parameters.split_min_clearance_m
-    widest = float(clear[inside].max(initial=0.0))
+    widest = cv2.minMaxLoc(clear, inside.view(np.uint8))[1]
     for level in {least, max(least, parameters.passage_min_ratio * widest)}:
-        pieces, _ = cv2.connectedComponents((inside & (clear >= level)).astype(np.uint8), connectivity=8)
+        pieces, _ = cv2.connectedComponents((inside & (clear >= level)).view(np.uint8), connectivity=8)
         if pieces > 2:
             return False
     return True
@@ -101,8 +102,9 @@ def _will_join(
         narrowest = 0.0 if is_niche else parameters.passage_min_ratio * float(high[first]) * ROUNDED_UP
         wide = (height >= narrowest).view(np.uint8)
         group = cv2.connectedComponents(wide, connectivity=4)[1].ravel()[place]
-        is_highest = group == 0
-        is_highest[np.unique(group, return_index=True)[1]] = True
+        highest = np.zeros(int(group.max()) + 1, np.intp)
+        highest[group[::-1]] = np.arange(len(group))[::-1]  # the first of each group stays
+        is_highest = (group == 0) | (highest[group] == np.arange(len(group)))
         if is_highest[first]:
             return False
         waiting &= is_highest
