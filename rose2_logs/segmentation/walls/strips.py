@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 from rose2_logs.config.parameters import WallParameters
 from rose2_logs.model.occupancy import BoolArray, FloatArray
 
-SORTED_AT_ONCE = 2**21
-"""Cells times directions that are sorted at once, and kept if that is all of them: 100 MB."""
+SORTED_AT_ONCE = 2**16
+"""Cells times directions that are sorted at once: what this takes stays in a CPU's cache."""
+KEPT_SORTED = 2**21
+"""Cells times directions that are kept sorted: 100 MB."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,21 +86,24 @@ class SortedCells:
         c, s = np.cos(directions_rad)[:, None], np.sin(directions_rad)[:, None]
         along, across = x * c + y * s, y * c - x * s
         cell = np.floor(across / resolution_m).astype(np.int32)
-        number = np.arange(len(directions_rad))[:, None]
-        columns: list[tuple[NDArray[np.intp], NDArray[np.int32], FloatArray]] = []
-        spans, lowest = [], []
-        for shift in (0, 1):
-            strip = (cell + shift) >> 1
-            low = strip.min(1, keepdims=True)
+        strips = [(cell + shift) >> 1 for shift in (0, 1)]
+        lowest = [strip.min(1, keepdims=True) for strip in strips]
+        for strip, low in zip(strips, lowest, strict=True):
             strip -= low
-            span = int(strip.max()) + 1
-            slot, place = _in_order(strip, along)
+        spans = [int(strip.max()) + 1 for strip in strips]
+        order = _Order.of(along, max(spans))
+        number = np.arange(len(directions_rad))[:, None]
+        slots, keys, alongs = [], [], []
+        for strip, span in zip(strips, spans, strict=True):
+            slot, place = order.by_strip(strip)
             strip += (number * span).astype(np.int32)
-            columns.append((slot.ravel(), strip.take(slot).ravel(), place.ravel()))
-            spans.append(span)
-            lowest.append(low[:, 0])
-        slots, keys, alongs = zip(*columns, strict=True)
-        return cls(resolution_m, across.ravel(), slots, keys, alongs, tuple(spans), tuple(lowest))
+            slots.append(slot.ravel())
+            keys.append(strip.take(slot).ravel())
+            alongs.append(place.ravel())
+        first_strip = tuple(low[:, 0] for low in lowest)
+        return cls(
+            resolution_m, across.ravel(), tuple(slots), tuple(keys), tuple(alongs), tuple(spans), first_strip
+        )
 
     def runs(self, chosen: BoolArray, parameters: WallParameters) -> Iterator[Runs]:
         """Cut the chosen (D, P) of the cells, set by set, where the gaps along a strip are too long."""
@@ -116,14 +121,13 @@ class SortedCells:
             new = np.ones(len(slot), bool)
             np.greater(gap, parameters.segment_max_gap_m + cell_m, out=new[1:])
             new[1:] |= key[1:] != key[:-1]
-            run = np.cumsum(new)
-            run -= 1
             first = np.flatnonzero(new)
-            last = np.append(first[1:], len(slot)) - 1
+            cells = np.diff(first, append=len(slot))
+            run = np.repeat(np.arange(len(first)), cells)
             cover = np.empty(len(slot))
             np.minimum(gap, parameters.segment_cover_cells * cell_m, out=cover[1:])
             cover[first] = cell_m
-            start, end = position[first] - cell_m / 2, position[last] + cell_m / 2
+            start, end = position[first] - cell_m / 2, position[first + cells - 1] + cell_m / 2
             covered = np.bincount(run, weights=cover) >= parameters.segment_min_fill * (end - start)
             yield Runs(shift, slot, run, key[first], start, end, covered)
 
@@ -135,35 +139,57 @@ class SortedCells:
         return direction, 2 * strip - runs.shift, total / np.bincount(runs.of_cell)
 
 
-def _in_order(strip: NDArray[np.int32], along: FloatArray) -> tuple[NDArray[np.intp], FloatArray]:
-    """Sort cells (D, P) by their strip and then by their place along it; equal ones stay as they come.
+@dataclass(frozen=True, eq=False)
+class _Order:
+    """Sorts cells by their strip and then by their place along it; equal ones stay as they come.
 
     Each cell becomes one number, from high to low bits its strip, its place in small steps, and its index:
     NumPy sorts numbers several times as fast as it finds the order of values.
 
-    Returns
-    -------
-    slot : (D, P) int
-        Place of each cell in the flattened array, in order.
-    place : (D, P) float
-        ``along`` in this order.
+    Attributes
+    ----------
+    along : (D, P) float
+        Places of the cells along each direction.
+    step : (D, P) int64
+        Their places in steps, and their indices.
+    index_bits, place_bits : int
+        How many bits each of the two takes.
     """
-    count = strip.shape[1]
-    index_bits = count.bit_length()
-    place_bits = 63 - int(strip.max()).bit_length() - index_bits
-    per_step = 2.0**place_bits / (float(np.ptp(along)) + 1.0)
-    step = ((along - along.min()) * per_step).astype(np.int64)
-    packed = (strip.astype(np.int64) << place_bits | step) << index_bits | np.arange(count)
-    packed.sort(axis=1)
-    row = np.arange(len(strip))[:, None] * count
-    slot: NDArray[np.intp] = (packed & ((1 << index_bits) - 1)) + row
-    place = along.take(slot)
-    packed >>= index_bits
-    too_close = (packed[:, 1:] == packed[:, :-1]) & (place[:, 1:] < place[:, :-1])
-    if too_close.any():
-        slot = np.lexsort((along, strip)) + row
-        place = along.take(slot)
-    return slot, place
+
+    along: FloatArray
+    step: NDArray[np.int64]
+    index_bits: int
+    place_bits: int
+
+    @classmethod
+    def of(cls, along: FloatArray, strips: int) -> _Order:
+        """Prepare places for the order within so many strips."""
+        count = along.shape[1]
+        index_bits = count.bit_length()
+        place_bits = 63 - (strips - 1).bit_length() - index_bits
+        step = along - along.min()
+        step *= 2.0**place_bits / (float(np.ptp(along)) + 1.0)
+        whole = step.astype(np.int64)
+        whole <<= index_bits
+        whole |= np.arange(count)
+        return cls(along, whole, index_bits, place_bits)
+
+    def by_strip(self, strip: NDArray[np.int32]) -> tuple[NDArray[np.intp], FloatArray]:
+        """Place (D, P) of each cell in the flattened array, in order, and `along` in this order."""
+        count = strip.shape[1]
+        row = np.arange(len(strip))[:, None] * count
+        packed = strip.astype(np.int64)
+        packed <<= self.place_bits + self.index_bits
+        packed |= self.step
+        packed.sort(axis=1)
+        slot: NDArray[np.intp] = packed & ((1 << self.index_bits) - 1)
+        slot += row
+        place = self.along.take(slot)
+        one_step = packed[:, 1:] ^ packed[:, :-1] < 1 << self.index_bits
+        if (one_step & (place[:, 1:] < place[:, :-1])).any():
+            slot = np.lexsort((self.along, strip)) + row
+            place = self.along.take(slot)
+        return slot, place
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,21 +212,23 @@ class WallCells:
         """Index (P,) of the cells into the flattened map."""
         return np.flatnonzero(self.cells)
 
-    def sorted_parts(self) -> Iterator[tuple[slice, SortedCells]]:
+    def sorted_parts(self) -> Iterable[tuple[slice, SortedCells]]:
         """Some of the directions after the other, with the cells sorted along them."""
-        if len(self.index) == 0 or len(self.directions_rad) == 0:
+        if len(self.index) * len(self.directions_rad) <= KEPT_SORTED:
+            return self._kept_parts
+        return self._sorted()
+
+    @cached_property
+    def _kept_parts(self) -> tuple[tuple[slice, SortedCells], ...]:
+        return tuple(self._sorted())
+
+    def _sorted(self) -> Iterator[tuple[slice, SortedCells]]:
+        if len(self.index) == 0:
             return
         at_once = max(1, SORTED_AT_ONCE // len(self.index))
-        if at_once >= len(self.directions_rad):
-            yield slice(0, len(self.directions_rad)), self._all_sorted
-            return
         for begin in range(0, len(self.directions_rad), at_once):
             part = slice(begin, begin + at_once)
             yield part, SortedCells.of(self._points_m, self.directions_rad[part], self.resolution_m)
-
-    @cached_property
-    def _all_sorted(self) -> SortedCells:
-        return SortedCells.of(self._points_m, self.directions_rad, self.resolution_m)
 
     @cached_property
     def _points_m(self) -> FloatArray:
