@@ -83,10 +83,13 @@ def detect_segments(
     chosen = clean.ravel()[among.index]
     count = len(chosen)
     longest, best = np.zeros(count), np.zeros(count, np.int32)
+    # What is shorter than this decides nothing: each direction moves the longest run by half a cell at most
+    # without taking its place.
+    least_m = min_length_m - (len(among.directions_rad) + 1) * among.resolution_m / 2
     for part, cells in among.sorted_parts():
         directions = range(len(among.directions_rad))[part]
         reached = np.zeros(len(directions) * count)
-        for runs in cells.runs(np.tile(chosen, len(directions)), parameters):
+        for runs in cells.runs(np.tile(chosen, len(directions)), least_m, parameters):
             length = np.where(runs.covered, runs.end - runs.start, 0.0)
             of_slot = np.zeros(len(reached))
             of_slot[runs.slot] = length.take(runs.of_cell)
@@ -100,8 +103,8 @@ def detect_segments(
     rows = [np.zeros((0, 5))]
     for part, cells in among.sorted_parts():
         own = chosen & (best == np.arange(len(among.directions_rad))[part, None])
-        for runs in cells.runs(own, parameters):
-            keep = runs.covered & (runs.end - runs.start >= min_length_m)
+        for runs in cells.runs(own, min_length_m, parameters):
+            keep = runs.covered
             direction, strip, offset = cells.lines(runs)
             rows.append(np.column_stack([direction + part.start, strip, offset, runs.start, runs.end])[keep])
             on_segment = runs.slot[keep.take(runs.of_cell)]

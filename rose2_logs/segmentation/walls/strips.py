@@ -105,8 +105,11 @@ class SortedCells:
             resolution_m, across.ravel(), tuple(slots), tuple(keys), tuple(alongs), tuple(spans), first_strip
         )
 
-    def runs(self, chosen: BoolArray, parameters: WallParameters) -> Iterator[Runs]:
-        """Cut the chosen (D, P) of the cells, set by set, where the gaps along a strip are too long."""
+    def runs(self, chosen: BoolArray, least_m: float, parameters: WallParameters) -> Iterator[Runs]:
+        """Cut the chosen (D, P) of the cells, set by set, where the gaps along a strip are too long.
+
+        Runs shorter than `least_m` are left out: nearly all are, since few walls are along a direction.
+        """
         flat = chosen.ravel()
         every = bool(flat.all())
         cell_m = self.resolution_m
@@ -117,19 +120,24 @@ class SortedCells:
                 slot, position, key = slot.take(place), position.take(place), key.take(place)
             if len(slot) == 0:
                 continue
-            gap = position[1:] - position[:-1]
-            new = np.ones(len(slot), bool)
-            np.greater(gap, parameters.segment_max_gap_m + cell_m, out=new[1:])
+            gap = np.empty(len(slot))
+            gap[0] = np.inf
+            np.subtract(position[1:], position[:-1], out=gap[1:])
+            new = gap > parameters.segment_max_gap_m + cell_m
             new[1:] |= key[1:] != key[:-1]
             first = np.flatnonzero(new)
             cells = np.diff(first, append=len(slot))
-            run = np.repeat(np.arange(len(first)), cells)
-            cover = np.empty(len(slot))
-            np.minimum(gap, parameters.segment_cover_cells * cell_m, out=cover[1:])
-            cover[first] = cell_m
             start, end = position[first] - cell_m / 2, position[first + cells - 1] + cell_m / 2
-            covered = np.bincount(run, weights=cover) >= parameters.segment_min_fill * (end - start)
-            yield Runs(shift, slot, run, key[first], start, end, covered)
+            long = np.flatnonzero(end - start >= least_m)
+            first, cells, start, end = first[long], cells[long], start[long], end[long]
+            begin = np.cumsum(cells) - cells
+            run = np.repeat(np.arange(len(long)), cells)
+            place = np.arange(len(run)) + (first - begin).take(run)
+            cover = np.minimum(gap.take(place), parameters.segment_cover_cells * cell_m)
+            cover[begin] = cell_m
+            total = np.bincount(run, weights=cover, minlength=len(long))
+            covered = total >= parameters.segment_min_fill * (end - start)
+            yield Runs(shift, slot.take(place), run, key[first], start, end, covered)
 
     def lines(self, runs: Runs) -> tuple[NDArray[np.intp], NDArray[np.intp], FloatArray]:
         """Direction of each run (R,), by index, and its place across: in cells, and the mean in meters."""
