@@ -110,7 +110,7 @@ class ExploredPart:
 
     def occupied_cells(self) -> NDArray[np.int32]:
         """Row and column (N, 2) on the canvas of its occupied cells."""
-        row, column = np.nonzero(self.known_occupied)
+        row, column = np.divmod(np.flatnonzero(self.known_occupied), self.known_occupied.shape[1])
         cells = np.empty((len(row), 2), np.int32)
         cells[:, 0], cells[:, 1] = row + self.window[0].start, column + self.window[1].start
         return cells

@@ -137,6 +137,22 @@ class LabelRuns:
         first[self.label[::-1]] = self.start[::-1]
         return first
 
+    def windows(self) -> list[tuple[slice, slice] | None]:
+        """Rows and columns that hold the cells of each label 1.., None for one without cells."""
+        count, width = int(self.label.max(initial=0)) + 1, self.shape[1]
+        last = self.start + self.cells - 1
+        (top, left), (bottom, right) = np.divmod(self.start, width), np.divmod(last, width)
+        # A run that goes on in the next row has cells at both sides.
+        left, right = np.where(top < bottom, 0, left), np.where(top < bottom, width - 1, right)
+        lows, highs = np.full((2, count), self.shape[0] + width), np.full((2, count), -1)
+        for low, high, first, end in zip(lows, highs, (top, left), (bottom, right), strict=True):
+            np.minimum.at(low, self.label, first)
+            np.maximum.at(high, self.label, end)
+        return [
+            (slice(low[0], high[0] + 1), slice(low[1], high[1] + 1)) if high[0] >= 0 else None
+            for low, high in zip(lows.T.tolist()[1:], highs.T.tolist()[1:], strict=True)
+        ]
+
     def greatest(self, values: NDArray[np.float32], count: int) -> NDArray[np.float32]:
         """Greatest of some values (H, W), 0 or more, among the cells of each label 0..count."""
         found = np.zeros(count + 1, np.float32)

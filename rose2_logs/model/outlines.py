@@ -100,6 +100,8 @@ def _rings(
     order: list[int] = []
     length = []
     for start in range(len(beside)):
+        if not is_left[start]:
+            continue
         # A ring's first vertex is its uppermost: around a hole, the room is on the left going down.
         first, then = (beside, below) if is_outer[start] else (below, beside)
         vertex = start
@@ -121,8 +123,7 @@ def _rings(
                     del ring[back + 1 :]
             vertex = then[other]
         order += ring
-        if ring:
-            length.append(len(ring))
+        length.append(len(ring))
     return np.array(order, np.int64), np.array(length, np.int64)
 
 

@@ -12,7 +12,7 @@ from shapely.geometry.base import BaseGeometry
 
 from rose2_logs.config.tracking import QualityParameters
 from rose2_logs.model.explored import ExploredPart
-from rose2_logs.model.labels import contacts, distance_from
+from rose2_logs.model.labels import distance_from, narrow
 from rose2_logs.model.occupancy import UNKNOWN, BoolArray, FloatArray, OccupancySnapshot
 from rose2_logs.model.rooms import RoomMap
 
@@ -126,12 +126,16 @@ def _frontiers(snapshot: OccupancySnapshot, explored: ExploredPart, rooms: RoomM
     """Length (R,) in meters of the sides that cells of each room share with unknown ones."""
     known = explored.window
     window = tuple(slice(max(part.start - 1, 0), part.stop + 1) for part in known)
-    marked = np.where(snapshot.cells[window] == UNKNOWN, np.int32(UNKNOWN), rooms.labels[window])
+    unknown, labels = snapshot.cells[window] == UNKNOWN, narrow(rooms.labels[window])
     # A map may be cropped to its known cells, or grow only when something is seen.
     margins = [
         (int(part.start == 0), int(part.stop == size))
         for part, size in zip(known, rooms.labels.shape, strict=True)
     ]
-    meet = contacts(np.pad(marked, margins, constant_values=UNKNOWN))
-    sides = np.bincount(meet.high[(meet.low == UNKNOWN) & (meet.high > 0)], minlength=len(rooms) + 1)
+    unknown, labels = np.pad(unknown, margins, constant_values=True), np.pad(labels, margins)
+    in_room = labels > 0
+    sides = np.zeros(len(rooms) + 1, np.int64)
+    left, right, upper, lower = np.s_[:, :-1], np.s_[:, 1:], np.s_[:-1], np.s_[1:]
+    for here, beside in ((left, right), (right, left), (upper, lower), (lower, upper)):
+        sides += np.bincount(labels[here][in_room[here] & unknown[beside]], minlength=len(rooms) + 1)
     return sides[1:].astype(np.float64) * snapshot.geometry.resolution_m

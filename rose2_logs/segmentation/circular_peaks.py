@@ -49,11 +49,12 @@ def _maxima(values: FloatArray) -> IntArray:
 
 
 def _apart(peaks: IntArray, values: FloatArray, min_gap: int) -> IntArray:
-    kept: list[int] = []
-    for peak in peaks[np.argsort(-values[peaks], kind="stable")]:
-        steps = np.abs(np.array(kept, np.intp) - peak)
-        if np.all(np.minimum(steps, len(values) - steps) >= min_gap):
-            kept.append(int(peak))
+    kept = []
+    is_free = np.ones(len(values), bool)
+    for peak in peaks[np.argsort(-values[peaks], kind="stable")].tolist():
+        if is_free[peak]:
+            kept.append(peak)
+            is_free[np.arange(peak - min_gap + 1, peak + min_gap) % len(values)] = False
     return np.sort(np.array(kept, np.intp))
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -70,16 +72,15 @@ def settle_borders(labels: NDArray[np.int32], resolution_m: float, strip_m: floa
     core = cv2.erode(grown, kernel) == grown
     core &= cv2.dilate(grown, kernel) == grown
     grown[~core] = 0
-    open_cells = labels > 0
-    cross = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
-    left = 0
+    grown = np.pad(grown, 1)
+    values, width = grown.ravel(), grown.shape[1]
+    empty = np.flatnonzero((grown == 0) & np.pad(labels > 0, 1))
     # Every step reaches one cell further; twice the width of the strip also restores corners.
     for _ in range(4 * radius):
-        empty = (grown == 0) & open_cells
-        before, left = left, np.count_nonzero(empty)
-        if left in (0, before):
-            break
-        cv2.copyTo(cv2.dilate(grown, cross), empty.view(np.uint8), grown)
+        reached = functools.reduce(np.maximum, (values.take(empty + k) for k in (-width, -1, 1, width)))
+        values[empty] = reached
+        empty = empty[reached == 0]
     settled = labels.copy()
+    grown = grown[1:-1, 1:-1]
     np.copyto(settled, grown, where=grown > 0, casting="unsafe")
     return settled

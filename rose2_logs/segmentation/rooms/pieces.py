@@ -5,9 +5,9 @@ from __future__ import annotations
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from rose2_logs.config.regions import RegionParameters
+from rose2_logs.model.labels import LabelRuns
 from rose2_logs.model.occupancy import BoolArray
 
 
@@ -43,11 +43,10 @@ def rooms_in_one_piece(
     room_of_piece : (P,) int32
         Room of each of these numbers, 0 first.
     """
-    count = int(labels.max(initial=0))
     pieces = labels.copy()
-    rooms = list(range(count + 1))
+    rooms = list(range(int(labels.max(initial=0)) + 1))
     kernel = _square(parameters.piece_gap_m / resolution_m / 2)
-    for room, box in enumerate(ndimage.find_objects(labels, max_label=count), start=1):
+    for room, box in enumerate(LabelRuns.of(labels).windows(), start=1):
         if box is None:
             continue
         inside = labels[box] == room

@@ -6,11 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import find_objects
 from shapely import STRtree, box, linestrings
 
 from rose2_logs.config.parameters import TopologyParameters
-from rose2_logs.model.labels import known_window
+from rose2_logs.model.labels import LabelRuns, known_window
 from rose2_logs.model.occupancy import BoolArray, FloatArray
 from rose2_logs.segmentation.topology.voronoi import clearance_m, parts_of_room
 
@@ -52,7 +51,9 @@ def split_rooms(
     lines = _Lines.of(lines_m)
     number = int(labels.max(initial=0))
     pending = [
-        (room, window, 0) for room, window in enumerate(find_objects(labels), start=1) if window is not None
+        (room, window, 0)
+        for room, window in enumerate(LabelRuns.of(labels).windows(), start=1)
+        if window is not None
     ]
     while pending:
         room, window, rounds = pending.pop()
