@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from shapely.affinity import rotate
 
 from rose2_logs.config.parameters import FloorPlanParameters
-from rose2_logs.model.labels import LabelRuns, distance_from, label_sizes, row_ends
+from rose2_logs.model.labels import LabelRuns, distance_from, row_ends
 from rose2_logs.model.occupancy import BoolArray, FloatArray
 from rose2_logs.segmentation.floor_plan.edge_weights import EdgeEvidence, edge_evidence
 from rose2_logs.segmentation.floor_plan.faces import FaceGraph, build_faces, label_faces
@@ -26,6 +26,8 @@ class FloorPlanResult:
     graph : FaceGraph
     face_of_cell : (H, W) int32
         1 + index of the face that holds each cell.
+    free_faces : LabelRuns
+        The same of the free cells, 0 elsewhere.
     evidence : EdgeEvidence
     seen : (F,) float
         Share of each face that is known to be free.
@@ -37,6 +39,7 @@ class FloorPlanResult:
 
     graph: FaceGraph
     face_of_cell: NDArray[np.int32]
+    free_faces: LabelRuns
     evidence: EdgeEvidence
     seen: FloatArray
     group: NDArray[np.int32]
@@ -73,7 +76,7 @@ def make_floor_plan(
     count = len(graph.polygons)
     # Without any line the map is one face, however little of it was seen.
     inside = (seen >= parameters.face_min_seen) | (count == 1)
-    runs = LabelRuns.of(np.where(free, plan.face_of_cell, 0))
+    runs = plan.free_faces
     area = runs.sizes(count)[1:].astype(float) * resolution_m**2
     area[~inside] = 0
     widest = runs.greatest(distance, count)[1:].astype(float) * resolution_m
@@ -103,10 +106,11 @@ def cut_by_lines(
         distance = distance_from(walls)
     evidence = edge_evidence(graph.edges_m, lines_m, walls, distance, free, resolution_m, parameters)
     face_of_cell = label_faces(graph, (free.shape[0], free.shape[1]), resolution_m)
-    area = label_sizes(np.where(free, face_of_cell, 0), count)[1:].astype(float) * resolution_m**2
+    free_faces = LabelRuns.of(np.where(free, face_of_cell, 0))
+    area = free_faces.sizes(count)[1:].astype(float) * resolution_m**2
     seen = area / np.maximum(shapely.area(graph.polygons), 1e-12)
     no_group, no_labels = np.zeros(count, np.int32), np.zeros(free.shape, np.int32)
-    return FloorPlanResult(graph, face_of_cell, evidence, seen, no_group, no_labels)
+    return FloorPlanResult(graph, face_of_cell, free_faces, evidence, seen, no_group, no_labels)
 
 
 def frame_along(

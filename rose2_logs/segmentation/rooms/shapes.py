@@ -150,7 +150,7 @@ def predicted_cells(
     wall = _dilated(occupied, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * gap + 1, 2 * gap + 1)))
     wall &= seen == 0
     pocket = _parts(claim, (claim > 0) & ~wall)
-    inside = np.flatnonzero(pocket)
+    inside = np.flatnonzero(pocket > 0)
     is_room = _open_pockets(seen, claim, pocket, inside, wall, resolution_m, parameters)
     taken = inside[is_room.take(pocket.take(inside))]
     cells = seen.copy()
@@ -161,7 +161,7 @@ def predicted_cells(
     np.copyto(cells, claim, where=beside)
     part = _parts(cells, cells > 0)
     was_seen = np.zeros(part.max() + 1, bool)
-    was_seen[part.take(np.flatnonzero(seen))] = True
+    was_seen[part.take(np.flatnonzero(seen > 0))] = True
     predicted = np.flatnonzero((cells > 0) & (seen == 0))
     np.put(cells, predicted[~was_seen.take(part.take(predicted))], 0)
     _fill_small_holes(cells, resolution_m, parameters.shape_fill_max_m2)

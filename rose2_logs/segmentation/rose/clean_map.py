@@ -138,9 +138,12 @@ def attached_cells(clean: BoolArray, candidates: BoolArray) -> BoolArray:
 
     Jambs and ends of walls have a low score, for half of their neighborhood is open.
     """
-    _, part = cv2.connectedComponents((clean | candidates).astype(np.uint8), connectivity=8)
-    touched = np.zeros(int(part.max()) + 1, bool)
-    touched[part[clean]] = True
-    touched[0] = False
-    attached: BoolArray = touched[part]
+    either = clean | candidates
+    _, part = cv2.connectedComponents(either.view(np.uint8), connectivity=8)
+    cells = np.flatnonzero(either)
+    number = part.take(cells)
+    touched = np.zeros(int(number.max(initial=0)) + 1, bool)
+    touched[number[clean.take(cells)]] = True
+    attached = np.zeros(clean.shape, bool)
+    np.put(attached, cells[touched.take(number)], True)
     return attached

@@ -10,7 +10,7 @@ from skimage.morphology import skeletonize
 from skimage.segmentation import watershed
 
 from rose2_logs.config.parameters import TopologyParameters
-from rose2_logs.model.labels import contacts, distance_from, straight_runs
+from rose2_logs.model.labels import contacts, distance_from, label_sizes, straight_runs
 from rose2_logs.model.occupancy import BoolArray, FloatArray
 from rose2_logs.model.regions import RegionGraph, best_first
 
@@ -86,7 +86,8 @@ def _will_join(
     high = height.ravel()[place]
     order = np.argsort(-high, kind="stable")
     place, high = place[order], high[order]
-    piece = cv2.connectedComponents(inside.view(np.uint8), connectivity=4)[1].ravel()
+    pieces, image = cv2.connectedComponents(inside.view(np.uint8), connectivity=4)
+    piece = image.ravel()
     for corner in (inside.shape[1] - 1, inside.shape[1] + 1):
         # Cells of one height that touch by a corner are one summit, and so may hold two pieces together.
         other = np.minimum(place + corner, inside.size - 1)
@@ -94,7 +95,8 @@ def _will_join(
         if touch.any():
             return False
     # The first has none to join, nor have those of pieces too small for a part.
-    waiting = (np.bincount(piece) * resolution_m**2 >= parameters.split_min_area_m2)[piece[place]]
+    large = label_sizes(image, pieces - 1) * resolution_m**2 >= parameters.split_min_area_m2
+    waiting = large[piece[place]]
     waiting[: int(waiting.argmax()) + 1] = False
     while waiting.any():
         first = int(waiting.argmax())
