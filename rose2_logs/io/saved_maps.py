@@ -35,6 +35,7 @@ from rose2_logs.io.cell_values import (
 from rose2_logs.io.discovery import IMAGE_ENDINGS, load_strings, load_yaml
 from rose2_logs.io.grids import MOST_CELLS, Cells, Grid, MapWarning, check_cells, make_grid
 from rose2_logs.io.source import LoggedMap, LogInfo, MessageSource, TopicInfo
+from rose2_logs.model.labels import label_sizes
 from rose2_logs.model.occupancy import HIGHEST_PERCENT, UNKNOWN
 from rose2_logs.system.text import percent as as_percent
 from rose2_logs.system.warnings import log_warning
@@ -275,7 +276,7 @@ def cells_of_image(path: Path, gray: NDArray[np.uint8], values: str = "auto") ->
     """
     reading = None
     if values == "auto":
-        counts = np.bincount(gray.ravel(), minlength=LEVELS)[::-1]
+        counts = label_sizes(gray, LEVELS - 1)[::-1]
         reading = _decided(counts, FREE_THRESH, OCCUPIED_THRESH)
         if reading is not None:
             log_warning(logger, "values", f"{path}: {reading.why}; {OVERRULED}", file=path)

@@ -218,20 +218,16 @@ def _read_lines(
     across_x, across_y = across[0][line], across[1][line]
     # Both masks are looked up at once, one in each bit.
     kinds = _Image(walls * np.uint8(WALL) | free * np.uint8(FREE), resolution_m)
-    met = np.zeros(len(line), np.uint8)
     reach = round(parameters.wall_tolerance_m / resolution_m)
-    for step in range(-reach, reach + 1):
-        met |= kinds.at(x + across_x * (step * resolution_m), y + across_y * (step * resolution_m))
+    steps = np.arange(-reach, reach + 1)[:, None] * resolution_m
+    met = np.bitwise_or.reduce(kinds.at(x + across_x * steps, y + across_y * steps), axis=0)
     is_wall = (met & WALL) > 0
     is_blind = np.zeros(len(line), bool)
     wall_x, wall_y, across_x, across_y = (values[is_wall] for values in (x, y, across_x, across_y))
-    steps = np.arange(1, round(parameters.blind_look_m / resolution_m) + 1) * resolution_m
+    steps = np.arange(1, round(parameters.blind_look_m / resolution_m) + 1)[:, None] * resolution_m
     for side in (1, -1):
-        any_of, all_of = np.zeros(len(wall_x), np.uint8), np.full(len(wall_x), WALL | FREE, np.uint8)
-        for at_m in side * steps:
-            found = kinds.at(wall_x + across_x * at_m, wall_y + across_y * at_m)
-            any_of |= found
-            all_of &= found
+        found = kinds.at(wall_x + across_x * (side * steps), wall_y + across_y * (side * steps))
+        any_of, all_of = np.bitwise_or.reduce(found, axis=0), np.bitwise_and.reduce(found, axis=0)
         is_blind[is_wall] |= ((any_of & FREE) == 0) & ((all_of & WALL) == 0)
     return line, length / count, is_wall, is_blind, (kinds.at(x, y) & FREE) > 0
 
