@@ -282,7 +282,8 @@ def cells_of_image(path: Path, gray: NDArray[np.uint8], values: str = "auto") ->
             log_warning(logger, "values", f"{path}: {reading.why}; {OVERRULED}", file=path)
     # By the thresholds of no description, what a pixel is follows from its level alone.
     shade = np.arange(LEVELS, dtype=np.float32)[None] / np.float32(LEVELS - 1)
-    return _cells(path, {}, shade, None, reading, [])[0].take(gray)
+    of_level = _cells(path, {}, shade, None, reading, [])[0]
+    return np.asarray(of_level.take(gray))
 
 
 def read_map(

@@ -324,9 +324,7 @@ def straight_runs(
     return cells[is_first], cells[is_last]
 
 
-def number_rooms(
-    runs: LabelRuns, highest: int, minimum_m2: float, resolution_m: float
-) -> NDArray[np.int32]:
+def number_rooms(runs: LabelRuns, highest: int, minimum_m2: float, resolution_m: float) -> NDArray[np.int32]:
     """Number the labels of an image up to `highest` by their first cell; those of less area get 0.
 
     Returns

@@ -19,7 +19,7 @@ def outline(mask: BoolArray, resolution_m: float) -> BaseGeometry:
     return shapes[0] if shapes else shapely.Polygon()
 
 
-def room_outlines(labels: NDArray[np.int32], resolution_m: float) -> list[BaseGeometry]:
+def room_outlines(labels: NDArray[np.integer], resolution_m: float) -> list[BaseGeometry]:
     """Outlines of the cells of rooms 1.. in the grid frame, meters; empty for numbers without cells.
 
     Where three rooms meet, each has a vertex, so that the outlines are a coverage in the sense of shapely.
@@ -37,7 +37,7 @@ def room_outlines(labels: NDArray[np.int32], resolution_m: float) -> list[BaseGe
     )
 
 
-def _vertices(padded: NDArray[np.int32]) -> tuple[NDArray[np.int64], ...]:
+def _vertices(padded: NDArray[np.integer]) -> tuple[NDArray[np.int64], ...]:
     """Find where the outlines of rooms turn, meet a third room, or touch themselves.
 
     Returns

@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from rose2_logs.model.occupancy import BoolArray, FloatArray
+from rose2_logs.model.occupancy import FloatArray
 
 SNAP_M = 1e-3
 """Numerical: vertices are snapped to a lattice of 1 mm, far below a cell and far above rounding errors."""

@@ -141,7 +141,7 @@ def attached_cells(clean: BoolArray, candidates: BoolArray) -> BoolArray:
     either = clean | candidates
     _, part = cv2.connectedComponents(either.view(np.uint8), connectivity=8)
     cells = np.flatnonzero(either)
-    number = part.take(cells)
+    number = part.ravel()[cells].astype(np.intp)
     touched = np.zeros(int(number.max(initial=0)) + 1, bool)
     touched[number[clean.take(cells)]] = True
     attached = np.zeros(clean.shape, bool)

@@ -19,7 +19,7 @@ DIRECTION_STEPS = 36_000
 """Directions are rounded to this many steps of half a turn, 0.005 degrees: Whatever
 instructions a CPU has, they are the same, and upright is upright."""
 NO_GAIN = 1e-12
-"""A gain below this is none: what it leaves is lost in single precision, and the smallest numbers are slow."""
+"""A gain below this is none: what it leaves is lost in single precision, whose smallest numbers are slow."""
 STRENGTH_STEPS = 10_000
 """Strengths are rounded to this many steps: of equal ones the first direction is the strongest."""
 

@@ -87,7 +87,7 @@ def _will_join(
     order = np.argsort(-high, kind="stable")
     place, high = place[order], high[order]
     pieces, image = cv2.connectedComponents(inside.view(np.uint8), connectivity=4)
-    piece = image.ravel()
+    piece = image.ravel().astype(np.int32, copy=False)
     for corner in (inside.shape[1] - 1, inside.shape[1] + 1):
         # Cells of one height that touch by a corner are one summit, and so may hold two pieces together.
         other = np.minimum(place + corner, inside.size - 1)
@@ -95,7 +95,7 @@ def _will_join(
         if touch.any():
             return False
     # The first has none to join, nor have those of pieces too small for a part.
-    large = label_sizes(image, pieces - 1) * resolution_m**2 >= parameters.split_min_area_m2
+    large = label_sizes(piece, pieces - 1) * resolution_m**2 >= parameters.split_min_area_m2
     waiting = large[piece[place]]
     waiting[: int(waiting.argmax()) + 1] = False
     while waiting.any():

@@ -88,17 +88,15 @@ class SortedCells:
         cell = np.floor(across / resolution_m).astype(np.int32)
         strips = [(cell + shift) >> 1 for shift in (0, 1)]
         lowest = [strip.min(1, keepdims=True) for strip in strips]
-        for strip, low in zip(strips, lowest, strict=True):
-            strip -= low
+        strips = [strip - low for strip, low in zip(strips, lowest, strict=True)]
         spans = [int(strip.max()) + 1 for strip in strips]
         order = _Order.of(along, max(spans))
         number = np.arange(len(directions_rad))[:, None]
         slots, keys, alongs = [], [], []
         for strip, span in zip(strips, spans, strict=True):
             slot, place = order.by_strip(strip)
-            strip += (number * span).astype(np.int32)
             slots.append(slot.ravel())
-            keys.append(strip.take(slot).ravel())
+            keys.append((strip + (number * span).astype(np.int32)).take(slot).ravel())
             alongs.append(place.ravel())
         first_strip = tuple(low[:, 0] for low in lowest)
         return cls(
@@ -193,7 +191,7 @@ class _Order:
         slot: NDArray[np.intp] = packed & ((1 << self.index_bits) - 1)
         slot += row
         place = self.along.take(slot)
-        one_step = packed[:, 1:] ^ packed[:, :-1] < 1 << self.index_bits
+        one_step = (packed[:, 1:] ^ packed[:, :-1]) < (1 << self.index_bits)
         if (one_step & (place[:, 1:] < place[:, :-1])).any():
             slot = np.lexsort((self.along, strip)) + row
             place = self.along.take(slot)
