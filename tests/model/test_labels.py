@@ -8,8 +8,18 @@ from drawn_rooms import rows
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
+from scipy import ndimage
 
-from rose2_logs.model.labels import contacts, distinct_labels, labels_near, numbered, straight_runs
+from rose2_logs.model.labels import (
+    LabelRuns,
+    contacts,
+    distinct_labels,
+    label_sizes,
+    labels_near,
+    narrow,
+    numbered,
+    straight_runs,
+)
 
 
 @pytest.mark.parametrize("step", [(0, 1), (1, 0), (1, 1), (1, -1)])
@@ -101,3 +111,30 @@ def test_distinct_labels_are_those_of_numpy_also_of_an_image_without_cells(label
     expected_values, expected_first = np.unique(labels, return_index=True)
     assert values.tolist() == expected_values.tolist()
     assert first.tolist() == expected_first.tolist()
+
+
+@given(arrays.arrays(np.int32, st.tuples(st.integers(1, 6), st.integers(1, 6)), elements=st.integers(0, 3)))
+def test_runs_of_labels_tell_what_their_cells_do(labels: np.ndarray):
+    """Windows as SciPy finds them, sizes as NumPy counts; a run may go on in the next row."""
+    runs, count = LabelRuns.of(labels), int(labels.max())
+    sizes = np.bincount(labels.ravel(), minlength=count + 1)
+    assert runs.sizes(count).tolist() == label_sizes(labels, count).tolist() == sizes.tolist()
+    assert runs.windows() == ndimage.find_objects(labels)
+    number = np.arange(count + 1, dtype=np.int32)[::-1] * 7
+    assert np.array_equal(runs.renumbered(number), number[labels])
+    firsts = [
+        int(np.argmax(labels.ravel() == label)) if sizes[label] else labels.size for label in range(count + 1)
+    ]
+    assert runs.firsts(count).tolist() == firsts
+    values = np.random.default_rng(0).random(labels.shape, np.float32)
+    greatest = [values[labels == label].max(initial=0) for label in range(count + 1)]
+    assert runs.greatest(values, count).tolist() == greatest
+
+
+@pytest.mark.parametrize(
+    ("highest", "kind"), [(0, np.uint8), (254, np.uint8), (255, np.uint16), (65535, np.int32)]
+)
+def test_narrow_labels_have_room_for_one_more(highest, kind):
+    labels = np.array([[0, highest]], np.int32)
+    assert narrow(labels).dtype == kind
+    assert np.array_equal(narrow(labels), labels)

@@ -114,3 +114,16 @@ def test_the_picture_of_the_spectrum_has_a_ridge_across_the_walls(turn_deg):
 def test_the_picture_of_an_empty_map_is_black():
     empty = compute_spectrum(np.zeros((50, 50), bool), 0.05, PARAMETERS)
     assert not spectrum_picture(empty, PARAMETERS).any()
+
+
+@pytest.mark.parametrize("direction_deg", [0.0, 0.1, 30.0, 90.0, 135.0, 179.9])
+def test_a_ridge_alone_gives_what_the_whole_plane_with_its_gain_gives(direction_deg):
+    """Frequencies beside the ridge are left out, and so are their rows and columns."""
+    occupied = np.random.default_rng(1).random((90, 140)) < 0.1
+    spectrum = compute_spectrum(occupied, 0.05, SpectrumParameters())
+    direction, sigma_m = np.radians(direction_deg), 1.0
+    along = spectrum.frequency_x * np.cos(direction) + spectrum.frequency_y * np.sin(direction)
+    gain = np.exp(-2 * (np.pi * sigma_m * along.astype(float)) ** 2)
+    expected = np.fft.irfft2(spectrum.values * gain, spectrum.shape)[:90, :140]
+    blurred = spectrum.blurred_along(direction, sigma_m, occupied.shape)
+    assert np.abs(blurred - expected).max() < 1e-5
