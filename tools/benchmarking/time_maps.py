@@ -9,6 +9,7 @@ import importlib
 import json
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +35,8 @@ def main() -> None:
         "rose2_logs.config.parameters:load_parameters", "rose2_logs.parameters:load_parameters"
     )
     load_cases = found("rose2_logs.evaluation.cases:load_cases")
+    with suppress(SystemExit):  # a version whose commands do this measures with it
+        found("rose2_logs.system.workers:keep_freed_memory")()
     cv2.setNumThreads(1)
     at = sys.argv.index("--set")
     cases = [case for path in sys.argv[1:at] for case in load_cases(Path(path))]
