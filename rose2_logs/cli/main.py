@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import atexit
+import gc
 import importlib
 import re
 import sys
@@ -51,6 +53,10 @@ COMMANDS = {
 }
 """Each command: its module in the folder ``commands``, and what it does, told without importing it."""
 
+
+# Python looks for garbage once more when it ends; in all that was imported, that takes longer than most of what
+# `info` does.
+atexit.register(gc.freeze)
 
 NO_THREAD = re.compile("can't start new thread|Failed to launch worker thread")
 """What Python and Arrow say where memory, addresses or processes are limited."""

@@ -272,7 +272,7 @@ def _open_storage(
     """Open MCAP files, bags or databases; compressed ones are first decompressed into a temporary folder."""
     from rose2_logs.io.file_log import FileLog
 
-    open_file, name, bag_name = _formats()[kind]
+    open_file, name, bag_name = _format(kind)
     size = sum(each.stat().st_size for each in (log.iterdir() if log.is_dir() else files) if each.is_file())
     scratch = tempfile.TemporaryDirectory(prefix="rose2_logs_") if any(map(_is_packed, files)) else None
     clean_up = (lambda: None) if scratch is None else scratch.cleanup
@@ -293,17 +293,21 @@ def _open_storage(
         )
 
 
-def _formats() -> dict[str, tuple[OpenFile, str, str]]:
-    """How each kind of file is opened, and its name, alone and as a ROS 2 bag."""
-    from rose2_logs.io.mcap.index import McapFile
-    from rose2_logs.io.rosbag1.index import BagFile
-    from rose2_logs.io.rosbag2.index import SqliteFile
+def _format(kind: str) -> tuple[OpenFile, str, str]:
+    """How a kind of file is opened, and its name, alone and as a ROS 2 bag; no other kind is imported."""
+    match kind:
+        case ".mcap":
+            from rose2_logs.io.mcap.index import McapFile
 
-    return {
-        ".mcap": (McapFile, "MCAP", "ROS 2 bag (mcap)"),
-        ".bag": (BagFile, "ROS 1 bag", "ROS 1 bag"),
-        ".db3": (SqliteFile, "ROS 2 database (sqlite3)", "ROS 2 bag (sqlite3)"),
-    }
+            return McapFile, "MCAP", "ROS 2 bag (mcap)"
+        case ".bag":
+            from rose2_logs.io.rosbag1.index import BagFile
+
+            return BagFile, "ROS 1 bag", "ROS 1 bag"
+        case _:
+            from rose2_logs.io.rosbag2.index import SqliteFile
+
+            return SqliteFile, "ROS 2 database (sqlite3)", "ROS 2 bag (sqlite3)"
 
 
 def _kinds(files: list[Path]) -> set[str]:

@@ -22,7 +22,6 @@ from rose2_logs.config.tracking import TrackingParameters
 from rose2_logs.io.grids import Grid
 from rose2_logs.model.occupancy import UNKNOWN, BoolArray, FloatArray, GridGeometry, classify
 from rose2_logs.system.text import counted, listed
-from rose2_logs.tracking.registration import WallFit, wall_faces
 
 LOOKED_AT = 64
 """Maps, evenly spread, that are looked at: where a map is begun anew, all maps around are looked at, too."""
@@ -358,10 +357,11 @@ def _floor(name: str) -> str:
 
 def _walls_kept(before: _Seen, now: Grid, occupancy: OccupancyParameters) -> float:
     """Share of the walls of another map that a map has; 0 if it does not know its floor, 1 without walls."""
-    floor = _around(now, before.floor_m, 0.0)
+    there = _around(now, np.concatenate([before.floor_m, before.walls_m]), 0.0)[:, 0]
+    floor, walls = np.split(there, [len(before.floor_m)])
     if np.count_nonzero(floor != UNKNOWN) < FALLEN_SHARE * len(floor):
         return 0.0
-    free, near = (each[:, 0] for each in classify(_around(now, before.walls_m, 0.0), occupancy))
+    free, near = classify(walls, occupancy)
     # Most walls are where they were: only around the others is more to look at.
     away = np.flatnonzero(~near)
     near[away] = classify(_around(now, before.walls_m[away], WALL_REACH_M), occupancy)[1].any(axis=1)
@@ -395,6 +395,8 @@ def _around(grid: Grid, points_m: FloatArray, reach_m: float) -> NDArray[np.int8
 
 def _has_moved(before: Grid, now: Grid, occupancy: OccupancyParameters) -> bool:
     """Whether a map shows the walls of another one elsewhere, as after a loop closure."""
+    from rose2_logs.tracking.registration import WallFit, wall_faces
+
     tracking = TrackingParameters()
     then, there = (wall_faces(*classify(each.cells, occupancy), each.geometry) for each in (before, now))
     if min(len(then), len(there)) < tracking.fit_min_points:

@@ -266,8 +266,9 @@ def classify(cells: NDArray[np.int8], parameters: OccupancyParameters) -> tuple[
     free, occupied : (H, W) bool
         Cells between the two thresholds are in neither.
     """
-    free = (cells >= 0) & (cells < parameters.free_max_percent)
-    occupied = cells > parameters.occupied_min_percent
+    # Compared with whole numbers, as they are themselves: with others, each cell becomes a float first.
+    free = (cells >= 0) & (cells < math.ceil(parameters.free_max_percent))
+    occupied = cells > math.floor(parameters.occupied_min_percent)
     return free, occupied
 
 
