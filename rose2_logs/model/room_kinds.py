@@ -3,74 +3,96 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
+import numpy as np
 import shapely
+from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from rose2_logs.config.kinds import KindParameters
+from rose2_logs.model.occupancy import BoolArray
+
+Shapes = NDArray[np.object_]
+"""Polygons or MultiPolygons (N,), meters. All rooms of a map go through GEOS together: one by one, the calls take
+longer than what they do."""
 
 
-def guess_kind(shape: BaseGeometry, parameters: KindParameters) -> str:
-    """Guess the kind of a room: a plain rule, no more.
+def guess_kinds(shapes: Sequence[BaseGeometry], parameters: KindParameters) -> list[str]:
+    """Guess the kinds of rooms: a plain rule, no more.
 
     Parameters
     ----------
-    shape : shapely Polygon or MultiPolygon
-        With the predicted part, meters.
+    shapes : sequence of N shapely Polygon or MultiPolygon
+        With the predicted parts, meters.
     parameters : KindParameters
 
     Returns
     -------
-    str
-        One of `KINDS`; empty for a shape without area.
+    list of N str
+        One of `KINDS` each; empty for a shape without area.
 
     Examples
     --------
     >>> import shapely
-    >>> guess_kind(shapely.box(0, 0, 20, 2), KindParameters())
-    'corridor'
+    >>> guess_kinds([shapely.box(0, 0, 20, 2), shapely.box(0, 0, 5, 4)], KindParameters())
+    ['corridor', 'room']
     """
-    if shape.area == 0:
-        return ""
-    if not _is_compact(shape, parameters.corridor_min_elongation) and _is_corridor(shape, parameters):
-        return "corridor"
-    if shape.area >= parameters.hall_min_m2:
-        return "hall"
-    return "closet" if shape.area <= parameters.closet_max_m2 else "room"
+    rooms = np.array(shapes, object)
+    area_m2 = shapely.area(rooms)
+    kinds = np.full(len(rooms), "room", object)
+    kinds[area_m2 <= parameters.closet_max_m2] = "closet"
+    kinds[area_m2 >= parameters.hall_min_m2] = "hall"
+    elongated = np.flatnonzero((area_m2 > 0) & ~_are_compact(rooms, parameters.corridor_min_elongation))
+    kinds[elongated[_are_corridors(rooms[elongated], parameters)]] = "corridor"
+    kinds[area_m2 == 0] = ""
+    found: list[str] = kinds.tolist()
+    return found
 
 
-def _is_compact(shape: BaseGeometry, elongation: float) -> bool:
-    """Whether a shape has more area for its perimeter than any that is so elongated, as most rooms have.
+def _are_compact(shapes: Shapes, elongation: float) -> BoolArray:
+    """Whether shapes have more area for their perimeter than any that is so elongated, as most rooms have.
 
     An area A around a largest circle of width w has a perimeter of at least 2 A / w + pi w / 2 (Bonnesen).
     """
     least = (2 * elongation + math.pi / 2) ** 2 / elongation
-    return bool(shape.length**2 < least * shape.area)
+    are_compact: BoolArray = shapely.length(shapes) ** 2 < least * shapely.area(shapes)
+    return are_compact
 
 
-def _is_corridor(shape: BaseGeometry, parameters: KindParameters) -> bool:
-    filled = _filled(shape, parameters)
-    if _is_compact(filled, parameters.corridor_min_elongation):
-        return False
-    smooth = _cut_back(filled, parameters.detail_m)
-    width_m = 2 * shapely.maximum_inscribed_circle(smooth, tolerance=parameters.detail_m / 10).length
-    is_long = smooth.area >= parameters.corridor_min_elongation * width_m**2
-    return bool(is_long and parameters.corridor_min_width_m <= width_m <= parameters.corridor_max_width_m)
+def _are_corridors(shapes: Shapes, parameters: KindParameters) -> BoolArray:
+    filled = _filled(shapes, parameters)
+    are_corridors = ~_are_compact(filled, parameters.corridor_min_elongation)
+    smooth = _cut_back(filled[are_corridors], parameters.detail_m)
+    circles = shapely.maximum_inscribed_circle(smooth, tolerance=parameters.detail_m / 10)
+    width_m = 2 * shapely.length(circles)
+    are_long = shapely.area(smooth) >= parameters.corridor_min_elongation * width_m**2
+    are_wide = (width_m >= parameters.corridor_min_width_m) & (width_m <= parameters.corridor_max_width_m)
+    are_corridors[are_corridors] = are_long & are_wide
+    return are_corridors
 
 
-def _filled(shape: BaseGeometry, parameters: KindParameters) -> BaseGeometry:
+def _filled(shapes: Shapes, parameters: KindParameters) -> Shapes:
     """Fill furniture, pillars and notches, up to twice a detail in width.
 
     Of a shape in many pieces, specks that are smaller than a detail do not count.
     """
     detail_m = parameters.detail_m
-    parts = shapely.get_parts(shape)
-    areas = shapely.area(parts)
-    large = parts[areas >= min(detail_m**2, areas.max())]
-    for number in shapely.get_num_interior_rings(large).nonzero()[0]:
-        large[number] = _without_islands(large[number], parameters.island_max_m2)
-    grown = shapely.union_all(large).buffer(detail_m, join_style="mitre")
-    return grown.buffer(-detail_m, join_style="mitre")
+    parts, shape = shapely.get_parts(shapes, return_index=True)
+    area_m2, largest_m2 = shapely.area(parts), np.zeros(len(shapes))
+    np.maximum.at(largest_m2, shape, area_m2)
+    is_large = area_m2 >= np.minimum(detail_m**2, largest_m2)[shape]
+    parts, shape = parts[is_large], shape[is_large]
+    for number in shapely.get_num_interior_rings(parts).nonzero()[0]:
+        parts[number] = _without_islands(parts[number], parameters.island_max_m2)
+    pieces = np.full((len(shapes), np.bincount(shape).max(initial=0)), None)
+    pieces[shape, np.arange(len(shape)) - np.searchsorted(shape, shape)] = parts
+    return _grown(_grown(shapely.union_all(pieces, axis=1), detail_m), -detail_m)
+
+
+def _grown(shapes: Shapes, by_m: float) -> Shapes:
+    grown: Shapes = shapely.buffer(shapes, by_m, join_style="mitre")
+    return grown
 
 
 def _without_islands(part: shapely.Polygon, most_m2: float) -> shapely.Polygon:
@@ -79,7 +101,8 @@ def _without_islands(part: shapely.Polygon, most_m2: float) -> shapely.Polygon:
     return shapely.Polygon(part.exterior, holes)
 
 
-def _cut_back(filled: BaseGeometry, detail_m: float) -> BaseGeometry:
-    """Take away what juts out, up to twice a detail in width; a shape that is nowhere wider stays."""
-    smooth = filled.buffer(-detail_m, join_style="mitre").buffer(detail_m, join_style="mitre")
-    return smooth.simplify(detail_m) if smooth.area > filled.area / 2 else filled
+def _cut_back(filled: Shapes, detail_m: float) -> Shapes:
+    """Take away what juts out, up to twice a detail in width; shapes that are nowhere wider stay."""
+    smooth = _grown(_grown(filled, -detail_m), detail_m)
+    are_wider = shapely.area(smooth) > shapely.area(filled) / 2
+    return np.where(are_wider, shapely.simplify(smooth, detail_m), filled)

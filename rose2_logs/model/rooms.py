@@ -106,10 +106,13 @@ class RoomMap:
     def __len__(self) -> int:
         return len(self.polygons)
 
-    @property
+    @cached_property
     def predicted_areas_m2(self) -> FloatArray:
         """Area (R,) of each room's polygon in square meters."""
-        return np.array([polygon.area for polygon in self.polygons], float)
+        import shapely
+
+        areas: FloatArray = shapely.area(np.array(self.polygons, object)).astype(float)
+        return areas
 
     @cached_property
     def windows(self) -> tuple[tuple[slice, slice] | None, ...]:
@@ -134,7 +137,8 @@ class RoomMap:
                 framed = cv2.copyMakeBorder(inside, 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=0)
                 depth = cv2.distanceTransform(framed, cv2.DIST_L2, cv2.DIST_MASK_3)[1:-1, 1:-1]
                 row, column = np.nonzero(depth >= LABEL_DEPTH_SHARE * depth.max())
-                down, right = (np.arange(len(n)) @ n / n.sum() for n in (inside.sum(1), inside.sum(0)))
+                sums = cv2.moments(inside, binaryImage=True)
+                down, right = sums["m01"] / sums["m00"], sums["m10"] / sums["m00"]
                 middle = np.argmin((row - down) ** 2 + (column - right) ** 2)
                 points[number] = self.geometry.cell_centers(
                     window[0].start + row[middle], window[1].start + column[middle]
@@ -163,4 +167,13 @@ class RoomMap:
 
     def neighbors(self, room: int) -> tuple[int, ...]:
         """Rooms that a doorway connects with `room`, ascending."""
-        return tuple(sorted({a + b - room for a, b in self.adjacency if room in (a, b)}))
+        return self._neighbors.get(room, ())
+
+    @cached_property
+    def _neighbors(self) -> dict[int, tuple[int, ...]]:
+        """For each room that has some, those that a doorway connects with it."""
+        found: dict[int, list[int]] = {}
+        for a, b in self.adjacency:
+            found.setdefault(a, []).append(b)
+            found.setdefault(b, []).append(a)
+        return {room: tuple(sorted(others)) for room, others in found.items()}

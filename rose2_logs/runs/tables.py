@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+import shapely
 import zstandard
 from numpy.typing import NDArray
 
@@ -13,7 +14,7 @@ from rose2_logs.config.kinds import KindParameters
 from rose2_logs.config.parameters import OccupancyParameters
 from rose2_logs.model.labels import known_window
 from rose2_logs.model.occupancy import UNKNOWN, classify
-from rose2_logs.model.room_kinds import guess_kind
+from rose2_logs.model.room_kinds import guess_kinds
 from rose2_logs.tracking.back_projection import BackProjectedSnapshot
 from rose2_logs.tracking.convergence import Convergence
 from rose2_logs.tracking.track_history import SnapshotRef, TrackHistory, quality_of
@@ -89,24 +90,33 @@ def room_rows(step: TrackedSnapshot, kinds: KindParameters) -> list[Row]:
     """Give a row per room, by track."""
     rooms, tracks = step.analysis.rooms, step.track_ids
     rows = []
-    points = rooms.label_points_m.tolist()
-    for number, (track, polygon) in enumerate(zip(tracks, rooms.polygons, strict=True), start=1):
-        x, y = (None, None) if polygon.is_empty else points[number - 1]
+    of_rooms = zip(
+        tracks,
+        rooms.label_points_m.tolist(),
+        guess_kinds(rooms.polygons, kinds),
+        rooms.areas_m2.tolist(),
+        rooms.predicted_areas_m2.tolist(),
+        shapely.is_empty(rooms.polygons),
+        shapely.to_wkb(np.array(rooms.polygons, object)),
+        strict=True,
+    )
+    for number, (track, point, kind, area_m2, predicted_m2, is_empty, wkb) in enumerate(of_rooms, start=1):
+        x, y = (None, None) if is_empty else point
         wall_share, frontier_m = quality_of(step, number - 1)
         rows.append(
             {
                 "track": track,
                 "room": number,
                 "name": step.given_name(number - 1) or None,
-                "kind_guess": guess_kind(polygon, kinds) or None,
-                "area_m2": float(rooms.areas_m2[number - 1]),
-                "predicted_area_m2": polygon.area,
+                "kind_guess": kind or None,
+                "area_m2": area_m2,
+                "predicted_area_m2": predicted_m2,
                 "label_x_m": x,
                 "label_y_m": y,
                 "neighbors": sorted(tracks[other - 1] for other in rooms.neighbors(number)),
                 "wall_support": wall_share,
                 "frontier_m": frontier_m,
-                "polygon_wkb": polygon.wkb,
+                "polygon_wkb": wkb,
             }
         )
     return sorted(rows, key=lambda row: row["track"])
@@ -269,7 +279,7 @@ def track_row(
     return {
         "track": track,
         "name": history.name or None,
-        "kind_guess": guess_kind(history.polygon, kinds) or None,
+        "kind_guess": guess_kinds([history.polygon], kinds)[0] or None,
         **_snapshot_ref_columns("first", history.first),
         **_snapshot_ref_columns("last", history.last),
         "maps": history.maps,

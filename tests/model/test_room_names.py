@@ -6,7 +6,7 @@ import pytest
 import shapely
 
 from rose2_logs.config.kinds import KindParameters
-from rose2_logs.model.room_kinds import guess_kind
+from rose2_logs.model.room_kinds import guess_kinds
 from rose2_logs.model.room_names import RoomNames
 
 LEFT, RIGHT = shapely.box(0, 0, 4, 3), shapely.box(4, 0, 8, 3)
@@ -52,7 +52,9 @@ def test_an_outline_that_reaches_a_little_into_a_room_does_not_name_it():
 )
 def test_kinds_are_guessed_from_shapes(shape, kind):
     """Whatever the turn of the map, and however ragged the outline is by furniture."""
-    assert guess_kind(shapely.affinity.rotate(shape, 33, origin=(0, 0)), KindParameters()) == kind
+    turned = shapely.affinity.rotate(shape, 33, origin=(0, 0))
+    beside = shapely.box(0, 0, 3, 3), shapely.Polygon()
+    assert guess_kinds([beside[0], turned, beside[1]], KindParameters()) == ["room", kind, ""]
     if kind == "room":
         teeth = shapely.union_all([shapely.box(x, 3.4, x + 0.3, 4) for x in (0.5, 1.3, 2.1, 2.9, 3.7)])
-        assert guess_kind(shapely.difference(shape, teeth), KindParameters()) == kind
+        assert guess_kinds([shapely.difference(shape, teeth)], KindParameters()) == [kind]
