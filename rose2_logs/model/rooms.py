@@ -130,6 +130,7 @@ class RoomMap:
         import cv2
 
         points = np.full((len(self), 2), np.nan)
+        cells: dict[int, tuple[int, int]] = {}
         for number, window in enumerate(self.windows):
             shape = self.polygons[number]
             if window is not None:
@@ -140,11 +141,12 @@ class RoomMap:
                 sums = cv2.moments(inside, binaryImage=True)
                 down, right = sums["m01"] / sums["m00"], sums["m10"] / sums["m00"]
                 middle = np.argmin((row - down) ** 2 + (column - right) ** 2)
-                points[number] = self.geometry.cell_centers(
-                    window[0].start + row[middle], window[1].start + column[middle]
-                )
+                cells[number] = window[0].start + row[middle], window[1].start + column[middle]
             elif not shape.is_empty:
                 points[number] = shape.representative_point().coords[0]
+        # As (R, 1, 2): so that the rounding of a point does not depend on the others.
+        row, column = np.array([*cells.values()], np.intp).reshape(-1, 1, 2).T
+        points[[*cells]] = self.geometry.cell_centers(row.T, column.T)[:, 0]
         return points
 
     @cached_property

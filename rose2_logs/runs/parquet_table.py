@@ -6,6 +6,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
+from numpy.typing import NDArray
+
 from rose2_logs.system.files import part_of, writing
 
 if TYPE_CHECKING:
@@ -21,6 +23,8 @@ BYTES_PER_GROUP = 1 << 24
 COMPRESSION = "zstd"
 
 Row = dict[str, Any]
+Columns = dict[str, NDArray[Any]]
+"""Values (N,) of all columns by name."""
 
 
 class ParquetTable:
@@ -49,7 +53,7 @@ class ParquetTable:
         self._schema = schema
         self._binary = [field.name for field in schema if pa.types.is_binary(field.type)]
         self._rows: list[Row] = []
-        self._held_bytes = 0
+        self._new_rows = self._held_rows = self._held_bytes = 0
         self._batches: list[pa.RecordBatch] = []
         self._writer: pq.ParquetWriter | None = None
 
@@ -71,10 +75,33 @@ class ParquetTable:
         """
         self._rows += rows
         self._held_bytes += sum(len(row[name] or b"") for name in self._binary for row in rows)
-        if len(self._rows) >= ROWS_PER_BATCH:
+        self._take(len(rows))
+
+    def add_columns(self, columns: Columns) -> None:
+        """Take rows as columns, which is faster where a map has many.
+
+        Raises
+        ------
+        OutputError
+            If the file cannot be written.
+        """
+        import pyarrow as pa
+
+        if self._rows:
             self._pack()
-        held = sum(batch.num_rows for batch in self._batches)
-        if held >= ROWS_PER_GROUP or self._held_bytes >= BYTES_PER_GROUP:
+        batch = pa.RecordBatch.from_pydict(columns, self._schema)
+        self._batches.append(batch)
+        self._take(batch.num_rows)
+
+    def _take(self, rows: int) -> None:
+        """Count further rows, and write what is held once it is enough."""
+        self._new_rows += rows
+        if self._new_rows >= ROWS_PER_BATCH:
+            if self._rows:
+                self._pack()
+            self._held_rows += self._new_rows
+            self._new_rows = 0
+        if self._held_rows >= ROWS_PER_GROUP or self._held_bytes >= BYTES_PER_GROUP:
             self._flush()
 
     def _pack(self) -> None:
@@ -92,7 +119,7 @@ class ParquetTable:
             with writing(self._path):
                 self._writer.write_table(pa.Table.from_batches(self._batches).combine_chunks())
             self._batches = []
-        self._held_bytes = 0
+        self._new_rows = self._held_rows = self._held_bytes = 0
 
     def close(self) -> None:
         """Write the last rows; the part can be read from now on.

@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 
 from rose2_logs.model.occupancy import UNKNOWN, GridGeometry
 from rose2_logs.model.room_plan import PlanMap, RoomPlan
+from rose2_logs.runs.parquet_table import Row
 from rose2_logs.runs.stored_run import StoredRun
 from rose2_logs.runs.table import Table
-from rose2_logs.runs.tables import BACK_PROJECTED, Row
+from rose2_logs.runs.tables import BACK_PROJECTED
 from rose2_logs.system.text import counted, percent
 
 if TYPE_CHECKING:

@@ -14,8 +14,8 @@ from rose2_logs.config.kinds import KindParameters
 from rose2_logs.config.parameters import OccupancyParameters
 from rose2_logs.runs import tables
 from rose2_logs.runs.history import RunHistory, RunSummary
-from rose2_logs.runs.parquet_table import ParquetTable
-from rose2_logs.runs.tables import BACK_PROJECTED, TABLES, Row, snapshot_key
+from rose2_logs.runs.parquet_table import ParquetTable, Row
+from rose2_logs.runs.tables import BACK_PROJECTED, TABLES, snapshot_key
 from rose2_logs.system.files import writing
 from rose2_logs.tracking.back_projection import BackProjectedSnapshot
 from rose2_logs.tracking.convergence import RoomRows
@@ -91,12 +91,16 @@ class RunStore:
             "events": tables.event_rows(step),
             "doorways": tables.doorway_rows(step),
             "borders": tables.border_rows(step),
-            "walls": tables.wall_rows(step),
-            "lines": tables.line_rows(step),
             "maps": [tables.map_row(step, self._parameters)],
         }
         for name, of_table in rows.items():
             self._tables[name].add([key | row for row in of_table])
+        if (walls := step.analysis.walls) is not None:
+            columns = {"walls": tables.wall_columns(walls), "lines": tables.line_columns(walls)}
+            for name, of_walls in columns.items():
+                count = len(of_walls["direction"])
+                of_map = {each: np.full(count, value) for each, value in key.items()}
+                self._tables[name].add_columns(of_map | of_walls)
 
     def write_back_projected(self, found: BackProjectedSnapshot) -> None:
         """Take what a map shows of the last map's rooms.

@@ -26,9 +26,10 @@ from rose2_logs.model.room_names import room_name
 from rose2_logs.model.room_plan import PlanMap, PlanRoom, RoomPlan
 from rose2_logs.model.rooms import Doorway
 from rose2_logs.runs.names import names_in, tell_unused
+from rose2_logs.runs.parquet_table import Row
 from rose2_logs.runs.summary import RESULTS_FORMAT, SUMMARY
 from rose2_logs.runs.summary_schema import what_it_lacks
-from rose2_logs.runs.tables import BACK_PROJECTED, ONLY_PART, TABLES, Row, unpack_image
+from rose2_logs.runs.tables import BACK_PROJECTED, ONLY_PART, TABLES, unpack_image
 from rose2_logs.system.files import reason_of, require_utf8
 from rose2_logs.system.text import counted, percent
 from rose2_logs.tracking.registration import RigidMotion

@@ -12,9 +12,11 @@ from numpy.typing import NDArray
 
 from rose2_logs.config.kinds import KindParameters
 from rose2_logs.config.parameters import OccupancyParameters
+from rose2_logs.model.analysis import Walls
 from rose2_logs.model.labels import known_window
-from rose2_logs.model.occupancy import UNKNOWN, classify
+from rose2_logs.model.occupancy import UNKNOWN, FloatArray, classify
 from rose2_logs.model.room_kinds import guess_kinds
+from rose2_logs.runs.parquet_table import Columns, Row
 from rose2_logs.tracking.back_projection import BackProjectedSnapshot
 from rose2_logs.tracking.convergence import Convergence
 from rose2_logs.tracking.track_history import SnapshotRef, TrackHistory, quality_of
@@ -34,8 +36,6 @@ ONLY_PART = 1
 or select by part lose none of them."""
 CELLS_AT_ONCE = 2**20
 """Cells of an image that are converted and compressed at once."""
-
-Row = dict[str, Any]
 
 
 def snapshot_key(step: TrackedSnapshot | BackProjectedSnapshot) -> Row:
@@ -179,32 +179,19 @@ def border_rows(step: TrackedSnapshot) -> list[Row]:
     return sorted(rows, key=lambda row: (row["track_a"], row["track_b"]))
 
 
-def wall_rows(step: TrackedSnapshot) -> list[Row]:
-    """Give a row per wall segment."""
-    walls = step.analysis.walls
-    if walls is None:
-        return []
-    rows = zip(
-        walls.segments_m.tolist(),
-        walls.segment_direction.tolist(),
-        walls.segment_cluster.tolist(),
-        strict=True,
-    )
-    return [ends_of(ends) | {"direction": direction, "line": line} for ends, direction, line in rows]
+def wall_columns(walls: Walls) -> Columns:
+    """Give the columns of the wall segments."""
+    return _ends_of(walls.segments_m) | {"direction": walls.segment_direction, "line": walls.segment_cluster}
 
 
-def line_rows(step: TrackedSnapshot) -> list[Row]:
-    """Give a row per representative line."""
-    walls = step.analysis.walls
-    if walls is None:
-        return []
-    rows = zip(walls.lines_m.tolist(), walls.line_direction.tolist(), walls.line_weight.tolist(), strict=True)
-    return [ends_of(ends) | {"direction": direction, "weight": weight} for ends, direction, weight in rows]
+def line_columns(walls: Walls) -> Columns:
+    """Give the columns of the representative lines."""
+    return _ends_of(walls.lines_m) | {"direction": walls.line_direction, "weight": walls.line_weight}
 
 
-def ends_of(ends_m: list[float]) -> Row:
-    """Columns for the ends x0, y0, x1, y1 of a line."""
-    return dict(zip(("x0_m", "y0_m", "x1_m", "y1_m"), ends_m, strict=True))
+def _ends_of(ends_m: FloatArray) -> Columns:
+    """Columns for the ends x0, y0, x1, y1 (N, 4) of lines."""
+    return dict(zip(("x0_m", "y0_m", "x1_m", "y1_m"), ends_m.T, strict=True))
 
 
 def map_row(step: TrackedSnapshot, parameters: OccupancyParameters) -> Row:
