@@ -54,8 +54,8 @@ COMMANDS = {
 """Each command: its module in the folder ``commands``, and what it does, told without importing it."""
 
 
-# Python looks for garbage once more when it ends; in all that was imported, that takes longer than most of what
-# `info` does.
+# Python looks for garbage once more when it ends: in all that was imported, which takes longer than most of
+# what `info` does.
 atexit.register(gc.freeze)
 
 NO_THREAD = re.compile("can't start new thread|Failed to launch worker thread")

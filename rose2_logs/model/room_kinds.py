@@ -14,8 +14,8 @@ from rose2_logs.config.kinds import KindParameters
 from rose2_logs.model.occupancy import BoolArray
 
 Shapes = NDArray[np.object_]
-"""Polygons or MultiPolygons (N,), meters. All rooms of a map go through GEOS together: one by one, the calls take
-longer than what they do."""
+"""Polygons or MultiPolygons (N,), meters. All rooms of a map go through GEOS together: one by one, the calls
+take longer than what they do."""
 
 
 def guess_kinds(shapes: Sequence[BaseGeometry], parameters: KindParameters) -> list[str]:

@@ -30,7 +30,7 @@ from rose2_logs.outputs.mcap.input import (
     CopiedMessage,
     copied_log,
 )
-from rose2_logs.outputs.mcap.ros_messages import ROOMS_TYPE, MarkerSizes, MessageMaker
+from rose2_logs.outputs.mcap.ros_messages import ROOMS_TYPE, MarkerSizes, MessageMaker, definition
 from rose2_logs.outputs.mcap.viewer_layouts import MapScene, bag_metadata_path, view_height_m, write_layouts
 from rose2_logs.outputs.mcap.writer import McapWriter
 from rose2_logs.runs.history import RunSummary
@@ -308,7 +308,7 @@ class AnnotatedMcap(Sink):
         return self._schemas[key]
 
     def _add_channel(self, topic: str, kind: str) -> int:
-        schema = self._schema(kind, "ros2msg", self._maker.definition(kind))
+        schema = self._schema(kind, "ros2msg", definition(kind))
         return self._writer.register_channel(topic, "cdr", schema, {"offered_qos_profiles": self._qos})
 
     def _add(self, channel: int, time_ns: int, data: bytearray) -> None:

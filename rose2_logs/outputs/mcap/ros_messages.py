@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import cv2
@@ -40,7 +41,8 @@ geometry_msgs/Point label_point
 geometry_msgs/Polygon[] outline   # outer rings of its shape
 uint32[] neighbors         # tracks of the rooms that a doorway connects it with
 """
-WRITTEN_TYPES = ("nav_msgs/msg/OccupancyGrid", "visualization_msgs/msg/MarkerArray", ROOMS_TYPE)
+DEFINITIONS = Path(__file__).parent / "definitions"
+"""Schemas of the written types: what `ros2_typestore` says of them, without loading all types of ROS 2."""
 HIGHEST_VALUE = 98
 """Rooms have the values 1..98 in `/rose2/segmented_map`: between free, 0, and occupied, 100."""
 VALUE_STEP = 37
@@ -62,6 +64,11 @@ LINE_STRIP, LINE_LIST, TEXT, TRIANGLES = 4, 5, 9, 11
 PATH_COLOR = (0.0, 0.35, 0.75, 1.0)
 NO_TURN = (0.0, 0.0, 0.0, 1.0)
 """Quaternion x, y, z, w."""
+
+
+def definition(message_type: str) -> bytes:
+    """Text of a written type's definition with the types that it uses, as a ros2msg schema of MCAP."""
+    return (DEFINITIONS / f"{PurePosixPath(message_type).name}.msg").read_bytes()
 
 
 def ros2_typestore(extra: Mapping[str, Any] | None = None, wanted: Iterable[str] | None = None) -> Typestore:
@@ -152,16 +159,11 @@ class MessageMaker:
     """
 
     def __init__(self, occupancy: OccupancyParameters = DEFAULT_OCCUPANCY) -> None:
-        self._store = ros2_typestore(wanted=WRITTEN_TYPES)
         self._triangles = Triangles()
         # Value of the segmented map outside of rooms, indexed by the cell's value as an unsigned byte.
         values = np.arange(256, dtype=np.uint8).view(np.int8)
         free, occupied = classify(values, occupancy)
         self._unroomed = np.where(occupied, np.int8(100), np.where(free, np.int8(0), np.int8(UNKNOWN)))
-
-    def definition(self, message_type: str) -> bytes:
-        """Text of a type's definition with the types that it uses, as a ros2msg schema of MCAP."""
-        return self._store.generate_msgdef(message_type, ros_version=2)[0].encode()
 
     def source_map(self, step: TrackedSnapshot) -> bytearray:
         """Make the map itself, for saved maps, which are not messages yet."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -293,6 +294,7 @@ def _rviz_topic(topic: str, qos: str) -> dict[str, Any]:
     }
 
 
+@lru_cache(maxsize=2)
 def offered(qos: str) -> tuple[str, str]:
     """Durability and reliability of a topic, in RViz's notation, from rosbag2's list of its publishers.
 

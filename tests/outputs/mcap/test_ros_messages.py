@@ -19,6 +19,7 @@ from rose2_logs.outputs.mcap.ros_messages import (
     MarkerSizes,
     MessageMaker,
     Triangles,
+    definition,
     ring_segments,
     room_value,
     ros2_typestore,
@@ -48,6 +49,11 @@ def step(request) -> TrackedSnapshot:
     assert len(ids) >= 2
     names = ("Küche", *[""] * (len(ids) - 1))
     return TrackedSnapshot(taken, analysis, 0.5, ids, events, names=names)
+
+
+@pytest.mark.parametrize("kind", sorted(set(KINDS.values())))
+def test_the_written_definitions_are_those_of_ros_2(kind: str):
+    assert definition(kind).decode() == ros2_typestore(wanted=[kind]).generate_msgdef(kind, ros_version=2)[0]
 
 
 @pytest.mark.parametrize("name", KINDS)
