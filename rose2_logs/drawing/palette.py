@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import colorsys
+from functools import lru_cache
 
 from rose2_logs.drawing.shapes import Color
 
@@ -33,6 +34,7 @@ def state_colors(track: int) -> dict[str, Color]:
     return tints | {TEMPORARY: TEMPORARY_COLOR}
 
 
+@lru_cache(maxsize=4096)
 def track_color(track: int) -> Color:
     """Red, green, blue in 0..255 of a track; it depends on the track's number alone."""
     hue = (FIRST_HUE + track * GOLDEN_RATIO) % 1.0
