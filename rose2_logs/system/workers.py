@@ -319,18 +319,28 @@ def _context(function: Callable[..., Any], started: list[WorkerProcess]) -> Base
         return started[-1]
 
     context = copy.copy(_CONTEXT)
-    if START_METHOD == "forkserver":
-        work = getattr(function, "func", function).__module__
-        context.set_forkserver_preload([work, "rose2_logs.system.fork_server"])
-        _start_fork_server()
+    start_importing(getattr(function, "func", function).__module__)
     context.Process = process
     chosen: BaseContext = context
     return chosen
 
 
-def _start_fork_server() -> None:
-    """Start the process that workers are forked from, unless it runs; it imports with signals blocked."""
+def start_importing(module: str) -> None:
+    """Start the process that workers are forked from, unless it runs, and let it import what they need.
+
+    Whoever knows early that there will be workers calls this before importing anything large, so that both
+    processes import at the same time. The new process imports with signals blocked.
+
+    Parameters
+    ----------
+    module : str
+        The module of the function that the workers will call.
+    """
+    if START_METHOD != "forkserver":
+        return
     from multiprocessing import forkserver, resource_tracker
+
+    _CONTEXT.set_forkserver_preload([module, "rose2_logs.system.fork_server"])
 
     _keep_socket_names_short()
     with held_back():
