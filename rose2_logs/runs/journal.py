@@ -194,7 +194,7 @@ class JournaledWorkers:
         snapshots: Iterable[OccupancySnapshot],
         is_same: Callable[[OccupancySnapshot, OccupancySnapshot], bool] | None = None,
     ) -> Iterator[tuple[OccupancySnapshot, Found]]:
-        """Yield each map with what was found in it, in their order, as `Workers.map` does."""
+        """Return each map with what was found in it, in their order, as `Workers.map` does."""
         replayed = -1
 
         def known(snapshot: OccupancySnapshot) -> Found | None:
@@ -204,12 +204,16 @@ class JournaledWorkers:
                 replayed = snapshot.index
             return found
 
-        before: Found | None = None
-        for snapshot, found in self._workers.map(snapshots, is_same, known):
-            if found is not before and snapshot.index > replayed:
-                self._journal.add(snapshot, found)
-            before = found
-            yield snapshot, found
+        def journaled() -> Iterator[tuple[OccupancySnapshot, Found]]:
+            before: Found | None = None
+            for snapshot, found in results:
+                if found is not before and snapshot.index > replayed:
+                    self._journal.add(snapshot, found)
+                before = found
+                yield snapshot, found
+
+        results = self._workers.map(snapshots, is_same, known)
+        return journaled()
 
 
 def _read_frame(file: IO[bytes]) -> bytes | None:

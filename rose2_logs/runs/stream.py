@@ -111,6 +111,7 @@ class TrackedStream:
         self._names = names
         self._tracker = RoomTracker(parameters.tracking, parameters.occupancy)
         self._layout = LayoutFollower()
+        self._analyzed: Iterator[tuple[OccupancySnapshot, Found]] | None = None
         self._has_told_coarser = self._has_told_far = False
 
     @classmethod
@@ -165,10 +166,15 @@ class TrackedStream:
         stream._has_told_far = True  # the reader leaves them out, and tells it
         return stream
 
+    def begin(self) -> Iterator[tuple[OccupancySnapshot, Found]]:
+        """Let worker processes begin with the first maps; otherwise they begin when one is asked for."""
+        if self._analyzed is None:
+            is_same = partial(is_same_to_analysis, parameters=self._occupancy)
+            self._analyzed = self._workers.map(self._snapshots, is_same)
+        return self._analyzed
+
     def __iter__(self) -> Iterator[TrackedSnapshot]:
-        is_same = partial(is_same_to_analysis, parameters=self._occupancy)
-        analyzed = self._workers.map(self._snapshots, is_same)
-        for number, (snapshot, found) in enumerate(analyzed, start=1):
+        for number, (snapshot, found) in enumerate(self.begin(), start=1):
             if number % GIVE_BACK_EVERY == 0:
                 give_back_freed_memory()
             if isinstance(found, InvalidMapError):

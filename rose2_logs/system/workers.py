@@ -16,6 +16,7 @@ from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack, contextmanager, suppress
 from functools import lru_cache
+from itertools import islice
 from multiprocessing.context import BaseContext
 from multiprocessing.reduction import ForkingPickler
 from multiprocessing.util import Finalize
@@ -138,7 +139,10 @@ class Workers(Generic[Item, Result]):
         is_same: Callable[[Item, Item], bool] | None = None,
         known: Callable[[Item], Result | None] | None = None,
     ) -> Iterator[tuple[Item, Result]]:
-        """Yield each item with its result, in the order of the items.
+        """Return each item with its result, in the order of the items.
+
+        With several processes, they begin at once with the first items, and not when the first result is
+        asked for.
 
         Parameters
         ----------
@@ -155,23 +159,44 @@ class Workers(Generic[Item, Result]):
             If a worker process is killed.
         """
         if self._pool is None:
-            yield from self._map_here(items, is_same, known)
-            return
-        pending: deque[tuple[Item, _Task]] = deque()
+            return self._map_here(items, is_same, known)
+        tasks = self._tasks(self._pool, items, is_same, known)
+        return self._results(tasks, deque(islice(tasks, LOOK_AHEAD_PER_WORKER * self._count)))
+
+    def _tasks(
+        self,
+        pool: ProcessPoolExecutor,
+        items: Iterable[Item],
+        is_same: Callable[[Item, Item], bool] | None,
+        known: Callable[[Item], Result | None] | None,
+    ) -> Iterator[tuple[Item, _Task]]:
+        """Hand out items one after the other."""
         before: tuple[Item, _Task] | None = None
+        for item in items:
+            if before is not None and is_same is not None and is_same(before[0], item):
+                before = (item, before[1])
+            elif known is not None and (result := known(item)) is not None:
+                before = (item, _Task(result=result))
+            else:
+                with self._killed_is_told():
+                    before = (item, self._submitted(pool, item))
+            yield before
+
+    def _results(
+        self, tasks: Iterator[tuple[Item, _Task]], pending: deque[tuple[Item, _Task]]
+    ) -> Iterator[tuple[Item, Result]]:
+        """Yield results in order, and hand out an item for each that was taken."""
+        while pending:
+            with self._killed_is_told():
+                taken = _taken(pending)
+            yield taken
+            del taken  # an item and its result are not kept while the next one is waited for
+            pending.extend(islice(tasks, 1))
+
+    @contextmanager
+    def _killed_is_told(self) -> Iterator[None]:
         try:
-            for item in items:
-                if before is not None and is_same is not None and is_same(before[0], item):
-                    before = (item, before[1])
-                elif known is not None and (result := known(item)) is not None:
-                    before = (item, _Task(result=result))
-                else:
-                    before = (item, self._submitted(self._pool, item))
-                pending.append(before)
-                if len(pending) >= LOOK_AHEAD_PER_WORKER * self._count:
-                    yield _taken(pending)
-            while pending:
-                yield _taken(pending)
+            yield
         except BrokenProcessPool as error:
             raise WorkerError(
                 f"one of {self._count} worker processes was killed, probably because memory ran out; "

@@ -20,7 +20,7 @@ from rose2_logs.io.discovery import stem_of
 from rose2_logs.io.log import LogReader
 from rose2_logs.io.room_names import read_room_names
 from rose2_logs.model.analysis import left_out_note
-from rose2_logs.model.room_names import TrackNames
+from rose2_logs.model.room_names import RoomNames, TrackNames
 from rose2_logs.outputs.mcap.viewer_layouts import bag_metadata_path, foxglove_path, rviz_path
 from rose2_logs.runs.history import RunHistory, RunSummary
 from rose2_logs.runs.journal import JournaledWorkers
@@ -161,10 +161,12 @@ def _analyze_log(
         prepared = output.prepared(_facts(info, options), overwrite=options.overwrite, resume=options.resume)
         with _refused_if_named_otherwise(folder, names), prepared as (work, journal):
             planned = _planned_files(work, path, options)
+            workers = JournaledWorkers(processes, journal) if options.journal else processes
+            stream, names_given = _stream_of(reader, workers, options)
+            stream.begin()  # the workers are at the first maps while the libraries of the sinks are imported
             called = TrackNames()
             outputs = [*sinks, *_make_sinks(planned, options, reader, called)]
-            workers = JournaledWorkers(processes, journal) if options.journal else processes
-            summary = _follow(reader, workers, work, info, options, outputs, called, on_snapshot)
+            summary = _follow(reader, stream, work, info, options, outputs, called, names_given, on_snapshot)
             if options.origin is not None:
                 warnings.rename(str(path), options.origin)
             seconds = time.perf_counter() - start
@@ -232,20 +234,11 @@ def _facts_of(sinks: Sequence[Sink]) -> dict[str, Any]:
     return facts
 
 
-def _follow(
-    reader: LogReader,
-    workers: SnapshotWorkers | JournaledWorkers,
-    folder: Path,
-    info: RunInfo,
-    options: RunOptions,
-    sinks: Sequence[Sink],
-    called: TrackNames,
-    on_snapshot: OnSnapshot | None,
-) -> RunSummary:
-    """Take the log's maps one by one to the history, the store and the sinks, and finish these."""
-    parameters = options.parameters
-    history = RunHistory(parameters, back_project=options.back_project)
-    names = None
+def _stream_of(
+    reader: LogReader, workers: SnapshotWorkers | JournaledWorkers, options: RunOptions
+) -> tuple[TrackedStream, RoomNames | None]:
+    """Return the maps of the log with their rooms, and what these are called."""
+    parameters, names = options.parameters, None
     if options.names is not None:
         names = names_in(reader.last(), Path(options.names), parameters, parameters.occupancy)
     stream = TrackedStream.of_log(
@@ -256,6 +249,23 @@ def _follow(
         base_frame=options.base_frame,
         names=names,
     )
+    return stream, names
+
+
+def _follow(
+    reader: LogReader,
+    stream: TrackedStream,
+    folder: Path,
+    info: RunInfo,
+    options: RunOptions,
+    sinks: Sequence[Sink],
+    called: TrackNames,
+    names: RoomNames | None,
+    on_snapshot: OnSnapshot | None,
+) -> RunSummary:
+    """Take the log's maps one by one to the history, the store and the sinks, and finish these."""
+    parameters = options.parameters
+    history = RunHistory(parameters, back_project=options.back_project)
     store = RunStore(folder, parameters.occupancy, parameters.kinds, back_project=options.back_project)
     tracks: set[int] = set()
     used: set[str] = set()
