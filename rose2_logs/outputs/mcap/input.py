@@ -21,7 +21,7 @@ from rose2_logs.outputs.mcap.ros_messages import ros2_typestore
 from rose2_logs.system.warnings import log_warning
 
 if TYPE_CHECKING:
-    from rosbags.typesys.store import Typestore
+    pass
 
 logger = logging.getLogger(__name__)
 
@@ -227,9 +227,10 @@ class _Files(CopiedLog):
         channels = [
             (number, channel) for number, file in enumerate(files) for channel in file.channels.values()
         ]
-        self._bag_types = _definitions([channel for _, channel in channels])
         names = {_ros2_name(channel.schema_name) for _, channel in channels}
-        self._target = ros2_typestore(self._bag_types, names)
+        defined = _definitions([channel for _, channel in channels])
+        is_ros1 = any(channel.message_encoding == "ros1" for _, channel in channels)
+        self._target = ros2_typestore(defined, names, is_ros1=is_ros1)
         self._schema_ids: dict[tuple[str, bytes], int] = {}
         self._channels: dict[tuple[int, int], CopiedChannel] = {}
         self._converters: dict[int, Callable[[Any], bytes | memoryview]] = {}
@@ -297,12 +298,10 @@ def _ros2_name(name: str) -> str:
 
 
 def _definitions(channels: Sequence[Channel]) -> dict[str, Any]:
-    """Message types defined in a log, in addition to the standard ones."""
-    from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
+    """Message types defined in a log."""
+    from rosbags.typesys import get_types_from_idl, get_types_from_msg
 
-    is_ros1 = any(channel.message_encoding == "ros1" for channel in channels)
-    store: Typestore = get_typestore(Stores.ROS1_NOETIC if is_ros1 else Stores.ROS2_HUMBLE)
-    types: dict[str, Any] = dict(store.fielddefs)
+    types: dict[str, Any] = {}
     for channel in channels:
         name = _ros2_name(channel.schema_name)
         text = channel.schema_data.decode(errors="replace")

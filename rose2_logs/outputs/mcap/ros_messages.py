@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
@@ -25,22 +25,9 @@ if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
 ROOMS_TYPE = "rose2_msgs/msg/Rooms"
-ROOMS_DEFINITION = """\
-# The rooms of one map snapshot, found by rose2_logs.
-std_msgs/Header header      # stamp and frame of the map
-float64 coverage            # known free area over that of the run's last map, 0..1
-uint32 count                # number of rooms
-rose2_msgs/Room[] rooms
-"""
-ROOM_DEFINITION = """\
-uint32 track                # identity of the room over the run, never used again
-string name                 # that was given to it; empty where none was
-float64 area                # m2 of its known free cells
-float64 predicted_area      # m2 of its shape, the unseen part included
-geometry_msgs/Point label_point
-geometry_msgs/Polygon[] outline   # outer rings of its shape
-uint32[] neighbors         # tracks of the rooms that a doorway connects it with
-"""
+ROOM_TYPE = "rose2_msgs/msg/Room"
+WRITTEN_TYPES = ("nav_msgs/msg/OccupancyGrid", "visualization_msgs/msg/MarkerArray", ROOMS_TYPE)
+HEADER_TYPE = "std_msgs/msg/Header"
 DEFINITIONS = Path(__file__).parent / "definitions"
 """Schemas of the written types: what `ros2_typestore` says of them, without loading all types of ROS 2."""
 HIGHEST_VALUE = 98
@@ -71,43 +58,60 @@ def definition(message_type: str) -> bytes:
     return (DEFINITIONS / f"{PurePosixPath(message_type).name}.msg").read_bytes()
 
 
-def ros2_typestore(extra: Mapping[str, Any] | None = None, wanted: Iterable[str] | None = None) -> Typestore:
+def ros2_typestore(
+    extra: Mapping[str, Any] | None = None, wanted: Collection[str] | None = None, *, is_ros1: bool = False
+) -> Typestore:
     """Build a store with the ROS 2 types, the types that a log defines, and the rooms message.
 
     Parameters
     ----------
     extra : mapping of type name to fields, optional
         Definitions from a bag; the Header of ROS 2 takes precedence over that of ROS 1.
-    wanted : iterable of str, optional
-        Register only these types and the types that they use: registering all of them is slow.
+    wanted : collection of str, optional
+        Register only these types and the types that they use: registering all of them is slow, and so is
+        loading those of a distribution, which is left out where the given ones are enough.
+    is_ros1 : bool
+        Whether types that are not given are first looked for in ROS 1.
     """
     from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-    ros2 = get_typestore(Stores.ROS2_HUMBLE)
+    written: dict[str, Any] = {}
+    for kind in WRITTEN_TYPES:
+        written |= get_types_from_msg(definition(kind).decode(), kind)
+    own = {name: written[name] for name in (HEADER_TYPE, ROOMS_TYPE, ROOM_TYPE)}
+    given = {**written, **(extra or {}), **own}
+    found = given if wanted is None else _needed(given, wanted)
+    used = {name for fields in found.values() for name in _used(fields)}
+    if wanted is None or not found.keys() >= used.union(wanted):
+        standard: dict[str, Any] = dict(get_typestore(Stores.ROS2_HUMBLE).fielddefs)
+        if is_ros1:
+            standard |= get_typestore(Stores.ROS1_NOETIC).fielddefs
+        given = standard | given
+        found = given if wanted is None else _needed(given, wanted)
     store = get_typestore(Stores.EMPTY)
-    own: dict[str, Any] = {}
-    own.update(get_types_from_msg(ROOM_DEFINITION, "rose2_msgs/msg/Room"))
-    own.update(get_types_from_msg(ROOMS_DEFINITION, ROOMS_TYPE))
-    definitions = {**ros2.fielddefs, **(extra or {}), **own}
-    definitions["std_msgs/msg/Header"] = ros2.fielddefs["std_msgs/msg/Header"]
-    store.register(definitions if wanted is None else _needed(definitions, wanted))
+    store.register(found)
     return store
 
 
 def _needed(definitions: Mapping[str, Any], wanted: Iterable[str]) -> dict[str, Any]:
-    """The wanted definitions and those that they use."""
+    """The wanted definitions and those that they use, as far as they are known."""
     found: dict[str, Any] = {}
     left = list(wanted)
     while left:
         name = left.pop()
         if name in definitions and name not in found:
             found[name] = definitions[name]
-            left += [_type_name(kind) for _, kind in definitions[name][1]]
+            left += _used(definitions[name])
     return found
 
 
+def _used(definition: Any) -> list[str]:
+    """Names of the message types that the fields of a definition have."""
+    return [name for _, kind in definition[1] if "/" in (name := _type_name(kind))]
+
+
 def _type_name(kind: Any) -> str:
-    """Name of a field's type, or of an array's elements; for primitive types the result is not used."""
+    """Name of a field's type, or of an array's elements."""
     _, inner = kind
     # `inner`: a name; for an array the kind and number of its elements; for a number its name and size.
     return (
