@@ -86,6 +86,7 @@ class RerunRecording(Sink):
         self._wanted = layers
         self._name_of = name_of
         self._recording: rr.RecordingStream | None = None
+        self._legend_of: list[str] | None = None
         self._viewer: subprocess.Popen[bytes] | None = None
         self._viewer_answers = live
         self._is_lost = False
@@ -208,7 +209,9 @@ class RerunRecording(Sink):
 
     def _log_legend(self) -> None:
         shown = [layer for layer in self._wanted if layer != "path" or self._world.has_path]
-        log_legend(self._stream, shown)
+        if shown != self._legend_of:
+            log_legend(self._stream, shown)
+            self._legend_of = shown
 
     def _send_blueprint(self) -> None:
         blueprint = make_blueprint(
