@@ -158,8 +158,8 @@ def run_progress(name: str) -> Iterator[OnSnapshot]:
         def on_snapshot(step: TrackedSnapshot, share: float) -> None:
             nonlocal seen
             seen += 1
-            if seen == 1:
-                # All is imported now; to look for garbage in it takes half as long as to analyze a map.
+            if not gc.get_freeze_count():
+                # All is imported now: looking for garbage in it takes half as long as analyzing a map.
                 gc.freeze()
             elapsed = progress.tasks[task].elapsed or 0.0
             rate = f"{seen / elapsed:.2f} maps/s" if elapsed > 0 else ""
