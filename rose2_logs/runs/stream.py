@@ -201,7 +201,8 @@ class TrackedStream:
             self.unchanged += 1
         begun = self._begun_part(snapshot)
         track_ids, events = self._tracker.update(snapshot, analysis)
-        change = self._layout.update(analysis.rooms, self._tracker.shapes, track_ids, map_motion(events))
+        tracker, motion = self._tracker, map_motion(events)
+        change = self._layout.update(analysis.rooms, tracker.shapes, track_ids, motion, tracker.common)
         coverage = self._coverage(analysis.free_area_m2)
         poses = None if self._path is None else self._path.until(snapshot.log_time_ns)
         names = self._named(track_ids, analysis)

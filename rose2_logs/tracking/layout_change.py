@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 
@@ -11,6 +12,8 @@ from rose2_logs.model.occupancy import FloatArray
 from rose2_logs.model.rooms import RoomMap
 from rose2_logs.tracking.matching import RegionShape
 from rose2_logs.tracking.registration import RigidMotion
+
+NOTHING: Mapping[RegionShape, FloatArray] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
@@ -47,6 +50,7 @@ class LayoutFollower:
         shapes: tuple[RegionShape | None, ...],
         track_ids: Sequence[int],
         motion: RigidMotion | None,
+        known: Mapping[RegionShape, FloatArray] = NOTHING,
     ) -> LayoutChange:
         """Take the next map of the run.
 
@@ -60,12 +64,17 @@ class LayoutFollower:
             Their tracks.
         motion : RigidMotion, optional
             How the map moved since the one before.
+        known : mapping of RegionShape to (R,) float, optional
+            What some shapes have in common with its rooms.
         """
         common = np.zeros((len(self._shapes), len(rooms)))
         for row, shape in enumerate(self._shapes):
             if shape is not None:
                 there = shape if motion is None else shape.moved(motion)
-                common[row] = there.common_area_m2(rooms.labels, rooms.geometry, len(rooms))
+                shared = known.get(there)
+                if shared is None:
+                    shared = there.common_area_m2(rooms.labels, rooms.geometry, len(rooms))
+                common[row] = shared
         same = np.array(self._tracks, np.int64)[:, None] == np.array(track_ids, np.int64)
         self._tracks = tuple(track_ids)
         self._shapes = shapes

@@ -82,6 +82,9 @@ class RoomTracker:
     ----------
     shapes : tuple of RegionShape or None
         The rooms of the last map, cut out; None for one without cells.
+    common : dict of RegionShape to (R,) float
+        Area in square meters that shapes from before have in common with each of these rooms, where they may
+        have any.
     """
 
     def __init__(self, parameters: TrackingParameters, occupancy: OccupancyParameters | None = None) -> None:
@@ -90,6 +93,7 @@ class RoomTracker:
         self._aligner = MapAligner(parameters, occupancy)
         self._tracks = _Tracks()
         self.shapes: tuple[RegionShape | None, ...] = ()
+        self.common: dict[RegionShape, FloatArray] = {}
 
     def begin_part(self) -> None:
         """Forget all rooms, as the next map does not grow from the ones before; numbers go on."""
@@ -146,8 +150,10 @@ class RoomTracker:
         their_boxes = np.array([shape.box_m for shape in known]).reshape(-1, 1, 4)
         meet = (boxes[:, :2] < their_boxes[..., 2:]) & (boxes[:, 2:] > their_boxes[..., :2])
         common = np.zeros((len(known), len(areas)))
+        self.common = {}
         for row in np.unique(np.nonzero(meet.all(axis=2))[0]).tolist():
-            common[row] = known[row].common_area_m2(rooms.labels, rooms.geometry, len(areas))
+            shared = known[row].common_area_m2(rooms.labels, rooms.geometry, len(areas))
+            common[row] = self.common[known[row]] = shared
         sizes = np.array([shape.area_m2 for shape in known]).reshape(-1, 1)
         smaller = np.minimum(sizes, areas)
         # Between grids of different resolution or yaw, sampling may count a little more than there is.

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 ENCAPSULATION = b"\0\1\0\0"
 """Start of each message: plain CDR, little endian. Fields are aligned relative to the byte after it."""
+HEAD_BYTES = len(ENCAPSULATION)
 SIZES = {code: struct.calcsize(f"<{code}") for code in "BiIfd"}
 """Size in bytes of each `struct` type that is written."""
 LARGEST = max(SIZES.values())
@@ -39,8 +40,7 @@ class CdrWriter:
 
     def numbers(self, types: str, *values: float) -> None:
         """Append numbers of `struct` types, such as "3id": three integers, then a double."""
-        offset = (len(self._data) - len(ENCAPSULATION)) % LARGEST
-        self._data += _layout(types, offset).pack(*values)
+        self._data += _layout(types, (len(self._data) - HEAD_BYTES) % LARGEST).pack(*values)
 
     def written(self, fields: bytes, alignment: int) -> None:
         """Append fields that are already serialized and start at a multiple of `alignment` bytes."""
@@ -82,12 +82,12 @@ class CdrWriter:
 
     def fields(self) -> bytearray:
         """Return the appended fields, without the start of the message."""
-        return self._data[len(ENCAPSULATION) :]
+        return self._data[HEAD_BYTES:]
 
     def message(self) -> bytearray:
         """Return the complete message."""
         return self._data
 
     def _align(self, size: int) -> None:
-        if gap := (len(self._data) - len(ENCAPSULATION)) % size:
+        if gap := (len(self._data) - HEAD_BYTES) % size:
             self._data += bytes(size - gap)
