@@ -43,7 +43,6 @@ LEFT_OUT = {
     "incremental_fr79/map06": 74.087,
     "incremental_fr79/map12": 81.108,
     "campus/floor1": 68.703,
-    "campus/floor4": 67.531,
     "homes/a03": 94.321,
     "homes/b09": 86.020,
     "homes/b27": 93.729,
