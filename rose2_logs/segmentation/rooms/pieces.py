@@ -15,7 +15,6 @@ def rooms_in_one_piece(
     labels: NDArray[np.int32],
     occupied: BoolArray,
     resolution_m: float,
-    piece_min_m2: float,
     parameters: RegionParameters,
 ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
     """Make rooms of their own of the pieces of a room that do not hang together.
@@ -31,10 +30,9 @@ def rooms_in_one_piece(
         Occupied cells: what they close is no gap.
     resolution_m : float
         Side of a cell.
-    piece_min_m2 : float
-        Smaller pieces stay with the largest one of their room.
     parameters : RegionParameters
-        How wide a gap pieces hang together across, and what is within an object.
+        How wide a gap pieces hang together across, and what is within an object; pieces smaller than any room
+        stay with the largest one of theirs.
 
     Returns
     -------
@@ -56,7 +54,7 @@ def rooms_in_one_piece(
         if number <= 2:
             continue
         cells = np.bincount(components[inside], minlength=number)
-        large = np.flatnonzero(cells * resolution_m**2 >= piece_min_m2)
+        large = np.flatnonzero(cells * resolution_m**2 >= parameters.room_min_area_m2)
         for other in large[large != cells.argmax()].tolist():
             piece = inside & (components == other)
             is_small = cells[other] * resolution_m**2 < parameters.object_max_m2

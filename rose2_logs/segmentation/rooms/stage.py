@@ -103,9 +103,7 @@ def finish_rooms(
     """
     of_regions = parameters.regions
     settled = settle_borders(found.labels, resolution_m, parameters.floor_plan.border_strip_m)
-    pieces, room_of_piece = rooms_in_one_piece(
-        settled, occupied, resolution_m, of_regions.room_min_area_m2, of_regions
-    )
+    pieces, room_of_piece = rooms_in_one_piece(settled, occupied, resolution_m, of_regions)
     runs = LabelRuns.of(pieces)
     number = number_rooms(runs, len(room_of_piece) - 1, of_regions.room_min_area_m2, resolution_m)
     labels = runs.renumbered(number)

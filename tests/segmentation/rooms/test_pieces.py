@@ -14,9 +14,8 @@ REGIONS = RegionParameters()
 
 def in_one_piece(labels, resolution_m, gap_m, piece_min_m2, occupied=None):
     occupied = np.zeros(labels.shape, bool) if occupied is None else occupied
-    return rooms_in_one_piece(
-        labels, occupied, resolution_m, piece_min_m2, replace(REGIONS, piece_gap_m=gap_m)
-    )
+    parameters = replace(REGIONS, piece_gap_m=gap_m, room_min_area_m2=piece_min_m2)
+    return rooms_in_one_piece(labels, occupied, resolution_m, parameters)
 
 
 def test_what_a_wall_closes_is_no_gap():
@@ -87,7 +86,7 @@ def object_in_a_room(inner_cells: int = 28, wall_cells: int = 2) -> tuple[np.nda
 
 def with_object(labels, occupied, **changed) -> tuple[int, bool]:
     """Number of rooms, and whether the floor in the object is in none."""
-    pieces, _ = rooms_in_one_piece(labels, occupied, 0.05, PIECE_M2, replace(REGIONS, **changed))
+    pieces, _ = rooms_in_one_piece(labels, occupied, 0.05, replace(REGIONS, **changed))
     return int(pieces.max()), bool(pieces[50, 50] == 0)
 
 
