@@ -10,7 +10,7 @@ from skimage.morphology import skeletonize
 from skimage.segmentation import watershed
 
 from rose2_logs.config.parameters import TopologyParameters
-from rose2_logs.model.labels import contacts, distance_from, label_sizes, straight_runs
+from rose2_logs.model.labels import LabelRuns, contacts, distance_from, label_sizes, straight_runs
 from rose2_logs.model.occupancy import BoolArray, FloatArray
 from rose2_logs.model.regions import RegionGraph, best_first
 
@@ -43,17 +43,19 @@ def parts_of_room(
         Parts 1.., 0 outside the room. Pieces too small for a part need not have a number of their own. None
         if the room has only one part.
     """
-    if _is_one_part(inside, clear, parameters) or _will_join(inside, clear, resolution_m, parameters):
+    if _is_one_part(inside, clear, parameters):
         return None
-    basin = _basins(inside, clear, resolution_m, parameters.summit_reach_m)
-    count = int(basin.max()) + 1
-    summit = np.zeros(count)
-    np.maximum.at(summit, basin[inside], clear[inside].astype(float))
-    area: FloatArray = np.bincount(basin[inside], minlength=count).astype(float) * resolution_m**2
-    root = _join_basins(_passages(basin, clear), summit, area, parameters)
-    number = np.zeros(count, np.int32)
+    height: NDArray[np.float32] = np.asarray(cv2.copyTo(clear, inside.view(np.uint8)), np.float32)
+    if _will_join(inside, height, resolution_m, parameters):
+        return None
+    basin = _basins(inside, height, resolution_m, parameters.summit_reach_m)
+    runs = LabelRuns.of(basin)
+    highest = int(runs.label.max())
+    summit, area = runs.greatest(height, highest).astype(float), runs.sizes(highest) * resolution_m**2
+    root = _join_basins(_passages(basin, height), summit, area, parameters)
+    number = np.zeros(highest + 1, np.int32)
     number[1:] = np.unique(root[1:], return_inverse=True)[1] + 1
-    return number[basin]
+    return runs.renumbered(number)
 
 
 def _is_one_part(inside: BoolArray, clear: NDArray[np.float32], parameters: TopologyParameters) -> bool:
@@ -72,15 +74,16 @@ def _is_one_part(inside: BoolArray, clear: NDArray[np.float32], parameters: Topo
 
 
 def _will_join(
-    inside: BoolArray, clear: NDArray[np.float32], resolution_m: float, parameters: TopologyParameters
+    inside: BoolArray, height: NDArray[np.float32], resolution_m: float, parameters: TopologyParameters
 ) -> bool:
     """Check whether a room has only one part that is large enough, without dividing it into basins.
 
     It is so if from each summit some way leads to a higher one that is nowhere too narrow a passage for the
     lower of the two. For if two large parts were left, such a way would lead from the highest summit of the
     less open one to a neighbor that it can be joined with. Most rooms pass, and basins take long.
+
+    The height (H, W) is the clearance inside the room, and 0 outside.
     """
-    height = np.where(inside, clear, np.float32(-1))
     cross = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
     place = np.flatnonzero(inside & (height == cv2.dilate(height, cross)))
     high = height.ravel()[place]
@@ -102,7 +105,7 @@ def _will_join(
         first = int(waiting.argmax())
         is_niche = high[first] < parameters.split_min_clearance_m
         narrowest = 0.0 if is_niche else parameters.passage_min_ratio * float(high[first]) * ROUNDED_UP
-        wide = (height >= narrowest).view(np.uint8)
+        wide = (inside & (height >= narrowest)).view(np.uint8)
         group = cv2.connectedComponents(wide, connectivity=4)[1].ravel()[place]
         highest = np.zeros(int(group.max()) + 1, np.intp)
         highest[group[::-1]] = np.arange(len(group))[::-1]  # the first of each group stays
@@ -162,34 +165,33 @@ def clearance_m(distance: NDArray[np.float32], resolution_m: float, blur_cells: 
 
 
 def _basins(
-    inside: BoolArray, clear: NDArray[np.float32], resolution_m: float, reach_m: float
+    inside: BoolArray, height: NDArray[np.float32], resolution_m: float, reach_m: float
 ) -> NDArray[np.int32]:
     """Divide a room (H, W) at the valleys between the summits of its clearance; basins 1.., 0 outside."""
     # The watershed makes larger copies of what it is given, so that nothing else shall hold on to it.
     basin: NDArray[np.int32] = watershed(  # type: ignore[no-untyped-call]
-        -clear, _summits(inside, clear, resolution_m, reach_m), mask=inside
+        -height, _summits(inside, height, resolution_m, reach_m), mask=inside
     )
     return basin
 
 
 def _summits(
-    inside: BoolArray, clear: NDArray[np.float32], resolution_m: float, reach_m: float
+    inside: BoolArray, height: NDArray[np.float32], resolution_m: float, reach_m: float
 ) -> NDArray[np.int32]:
     """Number (H, W) from 1 the cells that are the clearest of their room as far as `reach_m`."""
     width = 2 * max(1, round(reach_m / resolution_m)) + 1
-    height = np.where(inside, clear, -1)
     summits = inside & (height == cv2.dilate(height, np.ones((width, width), np.uint8)))
     markers: NDArray[np.int32] = ndimage.label(summits, np.ones((3, 3)))[0]
     return markers
 
 
-def _passages(basin: NDArray[np.int32], clear: NDArray[np.float32]) -> dict[tuple[int, int], float]:
+def _passages(basin: NDArray[np.int32], height: NDArray[np.float32]) -> dict[tuple[int, int], float]:
     """Clearance in meters of the widest passage between each two neighboring basins."""
     meet = contacts(basin)
     meet = meet.chosen(meet.low > 0)
     pairs, pair = meet.pairs()
     widest = np.zeros(len(pairs))
-    narrow = np.minimum(clear.ravel()[meet.first], clear.ravel()[meet.second])
+    narrow = np.minimum(height.take(meet.first), height.take(meet.second))
     np.maximum.at(widest, pair, narrow.astype(float))
     return dict(zip(pairs, widest.tolist(), strict=True))
 
