@@ -13,7 +13,7 @@ from rose2_logs.model.occupancy import BoolArray, Scalar
 
 Label = TypeVar("Label", bound=np.integer)
 
-COUNTED_AT_ONCE = 2**16
+COUNTED_AT_ONCE = 2**18
 """Cells whose labels are counted at once."""
 
 
@@ -60,7 +60,9 @@ def cells_where(values: NDArray[Scalar], which: Callable[[NDArray[Scalar]], Bool
 
 def run_starts(values: NDArray[Any]) -> NDArray[np.intp]:
     """Index (K,) of the first of each run of equal values (N,): of labels there are few, and many cells."""
-    return np.flatnonzero(np.append(len(values) > 0, values[1:] != values[:-1])[: len(values)])
+    is_first = np.ones(len(values), bool)
+    np.not_equal(values[1:], values[:-1], out=is_first[1:])
+    return np.flatnonzero(is_first)
 
 
 def distinct_labels(labels: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDArray[np.intp]]:
@@ -169,12 +171,11 @@ def label_sizes(labels: NDArray[np.integer], count: int) -> NDArray[np.int64]:
 
     The same as ``numpy.bincount``, which would make a copy of the image in its own type and count every cell.
     """
-    sizes = np.zeros(count + 1)
-    for rows in np.array_split(labels, max(1, labels.size // COUNTED_AT_ONCE)):
-        flat = rows.ravel()
-        starts = run_starts(flat)
-        sizes += np.bincount(flat[starts], np.diff(starts, append=flat.size), minlength=count + 1)
-    return sizes.astype(np.int64)
+    sizes = np.zeros(count + 1, np.int64)
+    rows = max(1, COUNTED_AT_ONCE * len(labels) // max(labels.size, 1))
+    for begin in range(0, len(labels), rows):
+        sizes += LabelRuns.of(labels[begin : begin + rows]).sizes(count)
+    return sizes
 
 
 def labels_near(labels: NDArray[Label], cells: NDArray[np.intp], reach_cells: float) -> NDArray[Label]:

@@ -124,10 +124,14 @@ class SortedCells:
             new = gap > parameters.segment_max_gap_m + cell_m
             new[1:] |= key[1:] != key[:-1]
             first = np.flatnonzero(new)
-            cells = np.diff(first, append=len(slot))
-            start, end = position[first] - cell_m / 2, position[first + cells - 1] + cell_m / 2
+            last = np.append(first[1:], len(slot))
+            last -= 1
+            start, end = position.take(first), position.take(last)
+            start -= cell_m / 2
+            end += cell_m / 2
             long = np.flatnonzero(end - start >= least_m)
-            first, cells, start, end = first[long], cells[long], start[long], end[long]
+            first, start, end = first[long], start[long], end[long]
+            cells = last[long] - first + 1
             begin = np.cumsum(cells) - cells
             run = np.repeat(np.arange(len(long)), cells)
             place = np.arange(len(run)) + (first - begin).take(run)
