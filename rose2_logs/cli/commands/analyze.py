@@ -158,8 +158,9 @@ def run_progress(name: str) -> Iterator[OnSnapshot]:
         def on_snapshot(step: TrackedSnapshot, share: float) -> None:
             nonlocal seen
             seen += 1
-            if not gc.get_freeze_count():
-                # All is imported now: looking for garbage in it takes half as long as analyzing a map.
+            if seen == 1 and not gc.get_freeze_count():
+                # All is imported now: looking for garbage in it takes half as long as analyzing a map, and
+                # counting what was set aside some milliseconds.
                 gc.freeze()
             elapsed = progress.tasks[task].elapsed or 0.0
             rate = f"{seen / elapsed:.2f} maps/s" if elapsed > 0 else ""
