@@ -195,11 +195,11 @@ def labels_near(labels: NDArray[Label], cells: NDArray[np.intp], reach_cells: fl
     if not labels.any():
         return np.zeros(len(cells), labels.dtype)
     distance, nearest = cv2.distanceTransformWithLabels(
-        (labels == 0).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
+        (labels == 0).view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
     )
     # OpenCV numbers the cells that have a label in reading order, from 1 on.
-    label = np.concatenate([np.zeros(1, labels.dtype), labels[labels > 0]])
-    near: NDArray[Label] = label.take(nearest.take(cells))
+    label = labels.take(np.flatnonzero(labels))
+    near: NDArray[Label] = label.take(nearest.take(cells) - 1)
     near[distance.take(cells) > reach_cells] = 0
     return near
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
-from rose2_logs.model.labels import label_sizes
+from rose2_logs.model.labels import LabelRuns, label_sizes
 from rose2_logs.model.occupancy import FloatArray, GridGeometry
 from rose2_logs.system.text import counted
 
@@ -117,9 +117,8 @@ class RoomMap:
     @cached_property
     def windows(self) -> tuple[tuple[slice, slice] | None, ...]:
         """Rows and columns that hold the cells of each room; None for a room without cells."""
-        from scipy.ndimage import find_objects
-
-        return tuple(find_objects(self.labels, max_label=len(self)))
+        found = LabelRuns.of(self.labels).windows()[: len(self)]
+        return (*found, *[None] * (len(self) - len(found)))
 
     @cached_property
     def label_points_m(self) -> FloatArray:
