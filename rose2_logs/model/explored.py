@@ -136,7 +136,7 @@ class ExploredPart:
             for down, right in NEIGHBORS:
                 beside = padded[1 + down : 1 + down + height, 1 + right : 1 + right + width]
                 np.copyto(labels, beside, where=labels == 0)
-        np.copyto(full[self.window], self._unblocked(labels), where=self.known_free)
+        np.multiply(self._unblocked(labels), self.known_free, out=full[self.window])
         return full
 
     def _unblocked(self, values: NDArray[Scalar]) -> NDArray[Scalar]:

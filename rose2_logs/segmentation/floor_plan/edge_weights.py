@@ -223,7 +223,7 @@ def _read_lines(
     met = np.bitwise_or.reduce(kinds.at(x + across_x * steps, y + across_y * steps), axis=0)
     is_wall = (met & WALL) > 0
     is_blind = np.zeros(len(line), bool)
-    wall_x, wall_y, across_x, across_y = (values[is_wall] for values in (x, y, across_x, across_y))
+    wall_x, wall_y, across_x, across_y = (values.compress(is_wall) for values in (x, y, across_x, across_y))
     steps = np.arange(1, round(parameters.blind_look_m / resolution_m) + 1)[:, None] * resolution_m
     for side in (1, -1):
         found = kinds.at(wall_x + across_x * (side * steps), wall_y + across_y * (side * steps))

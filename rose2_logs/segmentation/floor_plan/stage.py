@@ -106,7 +106,7 @@ def cut_by_lines(
         distance = distance_from(walls)
     evidence = edge_evidence(graph.edges_m, lines_m, walls, distance, free, resolution_m, parameters)
     face_of_cell = label_faces(graph, (free.shape[0], free.shape[1]), resolution_m)
-    free_faces = LabelRuns.of(np.where(free, face_of_cell, 0))
+    free_faces = LabelRuns.of(face_of_cell * free)
     area = free_faces.sizes(count)[1:].astype(float) * resolution_m**2
     seen = area / np.maximum(shapely.area(graph.polygons), 1e-12)
     no_group, no_labels = np.zeros(count, np.int32), np.zeros(free.shape, np.int32)

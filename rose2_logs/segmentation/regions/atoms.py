@@ -54,7 +54,11 @@ def cut_atoms(
         clearance_basins(open_cells & ~solid, solid, frame.cell_m, parameters), BASIN_REACH_M / frame.cell_m
     )
     basin = frame.back(basins, (free.shape[0], free.shape[1]))
-    key = np.where(free, faces.astype(np.int64) * (int(basin.max(initial=0)) + 1) + basin + 1, 0)
+    key = faces.astype(np.int64)
+    key *= int(basin.max(initial=0)) + 1
+    key += basin
+    key += 1
+    key *= free
     pieces = label(key, connectivity=1, background=0).astype(np.int32)  # type: ignore[no-untyped-call]
     return absorb_small(pieces, parameters.atom_min_m2 / resolution_m**2)
 
@@ -113,4 +117,4 @@ def absorb_small(pieces: Labels, min_cells: float) -> Labels:
     kept = size >= min_cells
     kept[0] = False
     number = np.where(kept, np.cumsum(kept), 0).astype(np.int32)
-    return number[piece][pieces]
+    return number[piece].take(pieces)

@@ -141,7 +141,7 @@ def build_graph(
     atoms = np.where(inside, grown_labels(atoms, ATOM_REACH_CELLS), 0).astype(np.int32)
     solid = without_specks(wall, WALL_MIN_CELLS)
     clear, clear_strong = (_clearance(mask, cell_m) for mask in (solid, strong))
-    at = np.flatnonzero(atoms)
+    at = np.flatnonzero(atoms > 0)
     row, column = np.divmod(at, atoms.shape[1])
     node = atoms.take(at).astype(np.int64) - 1
     node_sums = np.zeros((count, len(NODE_SUMS)))
@@ -152,10 +152,10 @@ def build_graph(
     for step in (-kind.shape[1], -1, 1, kind.shape[1]):
         beside = kind.take(in_kind + step)
         for which in (1, 2):
-            node_sums[:, which] += np.bincount(node[beside == which], minlength=count) * cell_m
+            node_sums[:, which] += np.bincount(node.compress(beside == which), minlength=count) * cell_m
     width = 2 * round(WIDE_M / cell_m / 2) + 1
     wide = cv2.morphologyEx(inside.astype(np.uint8), cv2.MORPH_OPEN, np.ones((width, width), np.uint8))
-    node_sums[:, 3] = np.bincount(node[wide.take(at) > 0], minlength=count) * cell_m**2
+    node_sums[:, 3] = np.bincount(node.compress(wide.take(at) > 0), minlength=count) * cell_m**2
     if answers is not None:
         node_sums[:, 4] = np.bincount(node, answers[-1].take(at), minlength=count) * cell_m**2
     node_maxima = np.full((count, len(NODE_MAXIMA)), -np.inf)
@@ -163,12 +163,12 @@ def build_graph(
     # What reaches farthest has no cell of its atom on its left, or none on its right.
     is_end = np.ones(atoms.shape, bool)
     is_end[:, 1:-1] = (atoms[:, 1:-1] != atoms[:, :-2]) | (atoms[:, 1:-1] != atoms[:, 2:])
-    outer = is_end.take(at)
-    x, y = (column[outer] + 0.5) * cell_m, (row[outer] + 0.5) * cell_m
+    outer = np.flatnonzero(is_end.take(at))
+    x, y = (column.take(outer) + 0.5) * cell_m, (row.take(outer) + 0.5) * cell_m
     half = cell_m / 2
     reaches = ((1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, -1), (1, -1), (-1, 1))
     extents = (a * x + b * y + half * (abs(a) + abs(b)) for a, b in reaches)
-    _fill_maxima(node_maxima[:, 2:], node[outer], extents)
+    _fill_maxima(node_maxima[:, 2:], node.take(outer), extents)
     # An atom that no center of a plan cell meets.
     missed = np.isinf(node_maxima[:, 0])
     node_maxima[missed] = 0
@@ -240,10 +240,12 @@ def _border_records(
         for k, (down, right) in enumerate(OFFSETS):
             a = atoms[down:, right:]
             b = atoms[: max(atoms.shape[0] - down, 0), : max(atoms.shape[1] - right, 0)]
-            asked = (a != b) & (a > 0) & (b > 0)
-            key, index = numbered(_pair_key(a[asked], b[asked], count))
+            row, column = np.divmod(np.flatnonzero((a != b) & (a > 0) & (b > 0)), max(a.shape[1], 1))
+            upper = row * atoms.shape[1] + column
+            lower = upper + down * atoms.shape[1] + right
+            key, index = numbered(_pair_key(atoms.take(lower), atoms.take(upper), count))
             record = np.zeros((len(key), len(BORDER_SUMS)))
-            record[:, 9 + k // 2] = np.bincount(index, answers[k][down:, right:][asked], minlength=len(key))
+            record[:, 9 + k // 2] = np.bincount(index, answers[k].take(lower), minlength=len(key))
             record[:, 12 + k // 2] = np.bincount(index, minlength=len(key))
             keys.append(key)
             sums.append(record)

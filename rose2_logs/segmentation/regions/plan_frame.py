@@ -143,7 +143,7 @@ def _looked_up(image: NDArray[Number], to_image: FloatArray, shape: tuple[int, i
 def grown_labels(labels: Labels, reach_cells: float) -> Labels:
     """Labels also on the cells without one, from the nearest that has one, up to a distance."""
     grown, without = labels.copy(), np.flatnonzero(labels == 0)
-    np.put(grown, without, labels_near(labels, without, reach_cells))
+    grown.reshape(-1)[without] = labels_near(labels, without, reach_cells)
     return grown
 
 

@@ -249,5 +249,5 @@ def room_labels(
     labels = np.concatenate([[0], room_of_atom]).astype(np.int32).take(atoms)
     loose = np.flatnonzero(free & (atoms == 0))
     if len(loose):
-        np.put(labels, loose, labels_near(labels, loose, reach_m / resolution_m))
+        labels.reshape(-1)[loose] = labels_near(labels, loose, reach_m / resolution_m)
     return labels

@@ -48,7 +48,7 @@ def adopt_left_out(
     room = sides.argmax(1).astype(np.int32)
     room[sides.max(1) * resolution_m < parameters.join_min_open_m] = 0
     adopted = labels.copy()
-    np.put(adopted, cells, room.take(number))
+    adopted.reshape(-1)[cells] = room.take(number)
     return adopted
 
 
@@ -79,7 +79,7 @@ def settle_borders(labels: NDArray[np.int32], resolution_m: float, strip_m: floa
     for _ in range(4 * radius):
         reached = functools.reduce(np.maximum, (values.take(empty + k) for k in (-width, -1, 1, width)))
         values[empty] = reached
-        empty = empty[reached == 0]
+        empty = empty.compress(reached == 0)
     settled = labels.copy()
     grown = grown[1:-1, 1:-1]
     np.copyto(settled, grown, where=grown > 0, casting="unsafe")

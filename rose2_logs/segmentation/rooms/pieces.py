@@ -53,7 +53,7 @@ def rooms_in_one_piece(
         number, components = cv2.connectedComponents(grown, connectivity=4)
         if number <= 2:
             continue
-        cells = np.bincount(components[inside], minlength=number)
+        cells = np.bincount(components.take(np.flatnonzero(inside)), minlength=number)
         large = np.flatnonzero(cells * resolution_m**2 >= parameters.room_min_area_m2)
         for other in large[large != cells.argmax()].tolist():
             piece = inside & (components == other)

@@ -152,9 +152,9 @@ def predicted_cells(
     pocket = _parts(claim, (claim > 0) & ~wall)
     inside = np.flatnonzero(pocket > 0)
     is_room = _open_pockets(seen, claim, pocket, inside, wall, resolution_m, parameters)
-    taken = inside[is_room.take(pocket.take(inside))]
+    taken = inside.compress(is_room.take(pocket.take(inside)))
     cells = seen.copy()
-    np.put(cells, taken, claim.take(taken))
+    cells.reshape(-1)[taken] = claim.take(taken)
     reach = gap + max(1, round(parameters.shape_wall_m / resolution_m))
     beside = _dilated(cells > 0, np.ones((2 * reach + 1, 2 * reach + 1), np.uint8))
     beside &= (claim > 0) & (pocket == 0)
@@ -163,7 +163,7 @@ def predicted_cells(
     was_seen = np.zeros(part.max() + 1, bool)
     was_seen[part.take(np.flatnonzero(seen > 0))] = True
     predicted = np.flatnonzero((cells > 0) & (seen == 0))
-    np.put(cells, predicted[~was_seen.take(part.take(predicted))], 0)
+    cells.reshape(-1)[predicted.compress(~was_seen.take(part.take(predicted)))] = 0
     _fill_small_holes(cells, resolution_m, parameters.shape_fill_max_m2)
     return cells
 
@@ -190,10 +190,10 @@ def _claims(
     room_of = np.where(is_known, np.concatenate([np.zeros(1, np.int32), room_of_face]), 0)
     unseen = np.flatnonzero(is_known.take(face_of_cell) & ~free)
     room = labels_near(labels, unseen, parameters.shape_reach_m / resolution_m)
-    unseen, room = unseen[room > 0], room[room > 0]
+    unseen, room = unseen.compress(room > 0), room.compress(room > 0)
     face = face_of_cell.take(unseen)
     claim = np.zeros_like(labels)
-    np.put(claim, unseen, np.where(has_part[face, room - 1], room, room_of.take(face)))
+    claim.reshape(-1)[unseen] = np.where(has_part[face, room - 1], room, room_of.take(face))
     return claim
 
 
@@ -227,13 +227,14 @@ def _fill_small_holes(cells: NDArray[np.integer], resolution_m: float, largest_m
     inside = np.flatnonzero(hole > 1)  # not the rooms themselves, nor what is outside of them
     number = hole.take(inside)
     small = np.bincount(number, minlength=count) * resolution_m**2 <= largest_m2
-    inside, number = inside[small[number]], number[small[number]]
+    is_small = small.take(number)
+    inside, number = inside.compress(is_small), number.compress(is_small)
     filled = np.pad(cells, 1)
     beside = _beside(filled, inside)
     highest, lowest = np.zeros(count, np.int32), np.full(count, np.iinfo(np.int32).max, np.int32)
     np.maximum.at(highest, number, beside.max(0, initial=0))
     np.minimum.at(lowest, number, np.where(beside > 0, beside, lowest[0]).min(0, initial=lowest[0]))
-    np.put(filled, inside, np.where(lowest == highest, highest, 0)[number])
+    filled.reshape(-1)[inside] = np.where(lowest == highest, highest, 0).take(number)
     cells[...] = filled[1:-1, 1:-1]
 
 

@@ -44,7 +44,7 @@ def structure_score(
     score : (H, W) float32
         The best score over the directions on occupied cells, 0 elsewhere.
     """
-    row, column = np.nonzero(occupied)
+    row, column = np.divmod(np.flatnonzero(occupied), occupied.shape[1])
     best = np.zeros(len(row), np.float32)
     for direction in directions_rad:
         blurred = spectrum.blurred_along(direction, parameters.structure_length_m / 4, occupied.shape)
@@ -82,7 +82,7 @@ def supported_cells(
     """
     margin = round(parameters.piece_max_gap_m / resolution_m / 2)
     pieces = Pieces.of(occupied, margin)
-    total = np.bincount(pieces.number, score[pieces.row, pieces.column], minlength=pieces.count)
+    total = np.bincount(pieces.number, score.take(pieces.cell), minlength=pieces.count)
     mean = total / np.maximum(np.bincount(pieces.number, minlength=pieces.count), 1)
     # The box of a grown piece is wider by the margin.
     sides = (pieces.sides - 2 * margin) * resolution_m
@@ -141,9 +141,9 @@ def attached_cells(clean: BoolArray, candidates: BoolArray) -> BoolArray:
     either = clean | candidates
     _, part = cv2.connectedComponents(either.view(np.uint8), connectivity=8)
     cells = np.flatnonzero(either)
-    number = part.ravel()[cells].astype(np.intp)
+    number = part.take(cells).astype(np.intp)
     touched = np.zeros(int(number.max(initial=0)) + 1, bool)
-    touched[number[clean.take(cells)]] = True
+    touched[number.compress(clean.take(cells))] = True
     attached = np.zeros(clean.shape, bool)
-    np.put(attached, cells[touched.take(number)], True)
+    attached.reshape(-1)[cells.compress(touched.take(number))] = True
     return attached

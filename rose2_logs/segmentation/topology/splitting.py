@@ -113,14 +113,15 @@ def _beyond_cut(
     largest = np.argsort(-size, kind="stable")[:2]
     if len(largest) < 2 or size[largest[1]] < parameters.split_min_area_m2:
         return None
-    row, column = np.nonzero(inside)
+    cell = np.flatnonzero(inside)
+    row, column = np.divmod(cell, inside.shape[1])
     in_cells = np.empty((len(row), 2), np.float32)
     in_cells[:, 0], in_cells[:, 1] = column, row
     in_cells += np.array([window[1].start, window[0].start], np.float32) + 0.5
     in_cells *= resolution_m
     points = in_cells.astype(float)  # once, not for every line
-    of_cell = part[row, column]
-    one, two = points[of_cell == largest[0] + 1], points[of_cell == largest[1] + 1]
+    of_cell = part.take(cell)
+    one, two = (points.compress(of_cell == number + 1, axis=0) for number in largest)
     normals, offsets = lines.near(points)
     beyond = _cut(points, one, two, normals, offsets, parameters.split_min_purity)
     if beyond is None:

@@ -107,7 +107,7 @@ def _near_intervals(
     one, other = order[first], order[second]
     gap = np.maximum(start[one], start[other]) - np.minimum(end[one], end[other])
     near = gap <= parameters.cluster_gap_m
-    return one[near], other[near]
+    return one.compress(near), other.compress(near)
 
 
 def weighted_median(

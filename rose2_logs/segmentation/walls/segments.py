@@ -80,7 +80,7 @@ def detect_segments(
     members : (H, W) bool
         The cells on segments.
     """
-    chosen = clean.ravel()[among.index]
+    chosen = clean.take(among.index)
     count = len(chosen)
     longest, best = np.zeros(count), np.zeros(count, np.int32)
     # What is shorter than this decides nothing: each direction moves the longest run by half a cell at most
@@ -107,8 +107,8 @@ def detect_segments(
             keep = runs.covered
             direction, strip, offset = cells.lines(runs)
             rows.append(np.column_stack([direction + part.start, strip, offset, runs.start, runs.end])[keep])
-            on_segment = runs.slot[keep.take(runs.of_cell)]
-            members.ravel()[among.index.take(on_segment % count)] = True
+            on_segment = runs.slot.compress(keep.take(runs.of_cell))
+            members.reshape(-1)[among.index.take(on_segment % count)] = True
     found = np.concatenate(rows)
     direction, _, offset, start, end = found[np.lexsort((found[:, 3], found[:, 1], found[:, 0]))].T
     return Segments(among.directions_rad, direction.astype(np.int32), offset, start, end), members
