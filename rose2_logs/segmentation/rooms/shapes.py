@@ -225,10 +225,10 @@ def _fill_small_holes(cells: NDArray[np.integer], resolution_m: float, largest_m
     empty = np.pad(cells == 0, 1, constant_values=True).astype(np.uint8)
     count, hole = cv2.connectedComponents(empty, connectivity=4)
     inside = np.flatnonzero(hole > 1)  # not the rooms themselves, nor what is outside of them
-    number = hole.take(inside)
+    number = hole.take(inside).astype(np.intp)
     small = np.bincount(number, minlength=count) * resolution_m**2 <= largest_m2
-    is_small = small.take(number)
-    inside, number = inside.compress(is_small), number.compress(is_small)
+    of_small = np.flatnonzero(small.take(number))
+    inside, number = inside.take(of_small), number.take(of_small)
     filled = np.pad(cells, 1)
     beside = _beside(filled, inside)
     highest, lowest = np.zeros(count, np.int32), np.full(count, np.iinfo(np.int32).max, np.int32)

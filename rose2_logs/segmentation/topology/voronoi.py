@@ -51,7 +51,8 @@ def parts_of_room(
     basin = _basins(inside, height, resolution_m, parameters.summit_reach_m)
     runs = LabelRuns.of(basin)
     highest = int(runs.label.max())
-    summit, area = runs.greatest(height, highest).astype(float), runs.sizes(highest) * resolution_m**2
+    summit = runs.greatest(height, highest).astype(float)
+    area = runs.sizes(highest).astype(float) * resolution_m**2
     root = _join_basins(_passages(basin, height), summit, area, parameters)
     number = np.zeros(highest + 1, np.int32)
     number[1:] = np.unique(root[1:], return_inverse=True)[1] + 1
