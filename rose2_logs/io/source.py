@@ -203,9 +203,7 @@ def distinct(times: Times) -> Times:
     [1, 3]
     """
     ordered: Times = np.sort(times)
-    is_new = np.ones(len(ordered), bool)
-    is_new[1:] = ordered[1:] != ordered[:-1]
-    return ordered[is_new]
+    return ordered[run_starts(ordered)]
 
 
 def places_of(times: Times, among: Times) -> NDArray[np.intp]:
