@@ -18,7 +18,7 @@ from scipy.spatial import cKDTree
 from rose2_logs.config.comparison import ComparisonParameters
 from rose2_logs.config.parameters import OccupancyParameters, Parameters
 from rose2_logs.model.explored import ExploredPart
-from rose2_logs.model.labels import known_window
+from rose2_logs.model.labels import distance_from, known_window
 from rose2_logs.model.occupancy import UNKNOWN, BoolArray, FloatArray, OccupancySnapshot, classify
 from rose2_logs.segmentation.circular_peaks import circular_peaks
 from rose2_logs.segmentation.rose.spectrum import angular_energy, compute_spectrum
@@ -326,11 +326,8 @@ class _ShiftSearch:
 
     def _nearness(self, wall: NDArray[np.float32]) -> NDArray[np.float32]:
         """1 at walls, 0 from `wall_blur_m` on."""
-        import cv2
-
-        distance = cv2.distanceTransform((wall == 0).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
         per_cell = np.float32(self._cell_m / self._parameters.wall_blur_m)
-        near: NDArray[np.float32] = np.maximum(0, 1 - distance * per_cell)
+        near: NDArray[np.float32] = np.maximum(0, 1 - distance_from(wall != 0) * per_cell)
         return near
 
 

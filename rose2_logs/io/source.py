@@ -15,6 +15,7 @@ from rose2_logs.config.parameters import OccupancyParameters
 from rose2_logs.config.selection import Times
 from rose2_logs.errors import LogError
 from rose2_logs.io.grids import Grid, Patch
+from rose2_logs.model.labels import run_starts
 
 
 @dataclass(frozen=True)
@@ -203,9 +204,8 @@ def distinct(times: Times) -> Times:
     [1, 3]
     """
     ordered: Times = np.sort(times)
-    is_new = np.ones(len(ordered), bool)
-    is_new[1:] = ordered[1:] != ordered[:-1]
-    return ordered[is_new]
+    different: Times = ordered[run_starts(ordered)]
+    return different
 
 
 def places_of(times: Times, among: Times) -> NDArray[np.intp]:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from rose2_logs.config.parameters import OccupancyParameters
 from rose2_logs.config.tracking import TrackingParameters
+from rose2_logs.model.labels import distance_from
 from rose2_logs.model.occupancy import BoolArray, FloatArray, GridGeometry, OccupancySnapshot, classify
 
 if TYPE_CHECKING:
@@ -293,16 +294,14 @@ class WallFit:
 
     def _nearness(self, margin_m: float) -> tuple[FloatArray, FloatArray]:
         """Raster (H, W): 1 at walls, 0 from the first gate on; and the world position (2,) of its corner."""
-        import cv2
-
         cell_m = self._parameters.search_raster_m
         low = self._points.min(axis=0) - margin_m
         cells = np.floor((self._points - low) / cell_m).astype(np.intp)
         margin = int(np.ceil(margin_m / cell_m)) + 1
         width, height = (cells.max(axis=0) + margin).tolist()
-        no_wall = np.ones((height, width), np.uint8)
-        no_wall[cells[:, 1], cells[:, 0]] = 0
-        distance = cv2.distanceTransform(no_wall, cv2.DIST_L2, cv2.DIST_MASK_5) * cell_m
+        wall = np.zeros((height, width), bool)
+        wall[cells[:, 1], cells[:, 0]] = True
+        distance = distance_from(wall) * cell_m
         return np.maximum(0.0, 1.0 - distance / self._gates[0]).astype(np.float64), low
 
 
