@@ -154,12 +154,13 @@ def test_villas_are_grown_in_one_piece(seed):
     assert label(plan.rooms > 0, np.ones((3, 3)))[1] == 1
 
 
-WITH_CORRIDORS = ("offices", "faculty", "suites", "loop", "wings")
-LARGE = (*WITH_CORRIDORS, "depot", "arena", "shop", "gallery", "warehouse")
+WITH_CORRIDORS = ("offices", "faculty", "suites", "loop", "wings", "cellular")
+LARGE = (*WITH_CORRIDORS, "depot", "arena", "shop", "gallery", "warehouse", "partitions")
+OPEN_HOMES = ("openhome", "hallways")
 
 
 @pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("kind", [*LARGE, "openhome"])
+@pytest.mark.parametrize("kind", [*LARGE, *OPEN_HOMES])
 def test_rooms_of_buildings_are_in_one_piece(kind, seed):
     """Rooms are connected, large enough to stand in, and marked as what the maker made them."""
     from fit_grouping.buildings.makers import MAKERS
@@ -174,7 +175,7 @@ def test_rooms_of_buildings_are_in_one_piece(kind, seed):
     assert plan.kind == kind
     for kinds in plan.marks:
         assert kinds <= set(numbers)
-    if kind not in ("gallery", "openhome"):
+    if kind not in ("gallery", *OPEN_HOMES):
         assert bool(plan.corridors) == (kind in WITH_CORRIDORS)
     for number in numbers:
         assert label(plan.rooms == number)[1] == 1
@@ -184,7 +185,7 @@ def test_rooms_of_buildings_are_in_one_piece(kind, seed):
 
 
 @pytest.mark.parametrize("seed", range(2))
-@pytest.mark.parametrize("kind", [*LARGE, "openhome"])
+@pytest.mark.parametrize("kind", [*LARGE, *OPEN_HOMES])
 def test_true_rooms_of_buildings_are_free_floor(kind, seed, monkeypatch):
     """Rooms are seen within the building only: what is free around it has no room."""
     from fit_grouping.buildings import make_buildings, sensing
@@ -278,6 +279,57 @@ def test_offices_of_a_suite_meet_beside_their_ways_to_the_corridor():
         meet = [(walled.walls[60:110, 114 + 95 * number] == 0).any() for number in range(3)]
         assert meet == [joined == 1.0] * 3
         assert (walled.other == rooms).all()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_hallway_without_a_jamb_is_a_room_of_its_own(seed, monkeypatch):
+    """A narrow hallway that opens into a wide room without a jamb is parted from it in both truths."""
+    from fit_grouping.buildings import walls
+    from fit_grouping.buildings.plans import Plan
+
+    rooms = np.zeros((160, 320), np.int32)
+    rooms[60:90, 20:150], rooms[20:140, 150:300] = 1, 2
+    monkeypatch.setattr(walls, "FLOWING_OPENINGS", {"open": 1.0})
+    plan = Plan("hallways", rooms, flowing={1, 2})
+    walled = walls.build_walls(np.random.default_rng(seed), plan)
+    assert (walled.walls[69:81, 149] == 0).all()
+    assert (walled.other == rooms).all()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_walls_that_stand_in_a_hall_leave_it_whole(seed):
+    """One can walk around every piece of wall: the floor of each hall hangs together."""
+    from fit_grouping.buildings.faint_borders import PASSAGE_M, partitions
+    from fit_grouping.buildings.raster import cells
+    from scipy.ndimage import binary_erosion, label
+
+    plan = partitions(np.random.default_rng(seed))
+    assert plan.things.any()
+    assert not plan.things[~np.isin(plan.rooms, list(plan.halls))].any()
+    for hall in plan.halls & set(np.unique(plan.rooms).tolist()):
+        floor = plan.rooms == hall
+        wide = binary_erosion(floor, iterations=cells(PASSAGE_M) // 3)
+        free = binary_erosion(floor & (plan.things == 0), iterations=cells(PASSAGE_M) // 3)
+        assert label(free)[1] <= label(wide)[1]
+
+
+def test_walls_between_cellular_offices_are_mostly_frayed():
+    """Gaps in the walls between offices, beside their doors to the corridor."""
+    from fit_grouping.buildings.faint_borders import cellular
+    from fit_grouping.buildings.walls import border_runs, build_walls
+
+    open_shares = []
+    for seed in range(6):
+        plan = cellular(np.random.default_rng(seed))
+        plan.tidy()
+        walled = build_walls(np.random.default_rng(seed), plan)
+        offices = set(np.unique(plan.rooms).tolist()) - {0} - plan.corridors
+        for pair, runs in border_runs(plan.rooms).items():
+            if set(pair) <= offices:
+                run = max(runs, key=lambda run: run.length)
+                line = (walled.walls if run.upright else walled.walls.T)[run.low : run.high, run.at]
+                open_shares.append(np.mean(line == 0))
+    assert np.mean(np.array(open_shares) > 0.1) > 0.25
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -497,11 +549,13 @@ def test_trees_are_fitted_without_training_a_network(tmp_path, three_homes):
     check_fitted(work, three_homes)
 
 
-def test_everything_is_fitted_by_one_command(tmp_path, three_homes):
+@pytest.mark.parametrize("processes", [1, 2])
+def test_everything_is_fitted_by_one_command(processes, tmp_path, three_homes):
     """A tiny run: three maps in three folds, trained on for a second."""
     pytest.importorskip("torch", reason="the network is trained with torch, which is not installed")
     work = tmp_path / "work"
     arguments = (work, "--cases", three_homes, "--buildings", 4, "--network-seconds", 1, "--fold-seconds", 1)
+    arguments += ("--processes", processes)
     run("fit_everything.py", *arguments, *SMALL)
     check_fitted(work, three_homes)
     made = {path: path.stat().st_mtime_ns for path in (work / "networks").iterdir()}

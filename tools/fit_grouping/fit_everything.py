@@ -1,7 +1,7 @@
 """Remakes all that is fitted, step by step; a step whose file exists is not made again.
 
     python tools/fit_grouping/fit_everything.py WORK --cases CASES [--buildings 5000] [--tree-buildings 800]
-        [--network-seconds 7200] [--fold-seconds 3600] [--trees 250] [--seeds 3]
+        [--network-seconds 7200] [--fold-seconds 3600] [--trees 250] [--seeds 3] [--processes 1]
 
 WORK holds simulated maps, checkpoints, prepared maps, and for each seed folders `seedS/foldK` with what
 was fitted without the buildings of fold K. `seed0/all` holds what was fitted on all maps, and its
@@ -79,9 +79,12 @@ def network_file(work: Path, seed: int, fold: int) -> Path:
     return work / f"networks/seed{seed}_{'all' if fold == ALL else f'fold{fold}'}"
 
 
-def train_networks(work: Path, cases: Path, seconds: float, fold_seconds: float, seeds: int) -> None:
+def train_networks(
+    work: Path, cases: Path, seconds: float, fold_seconds: float, seeds: int, processes: int
+) -> None:
     """One network on simulated maps, and from it for each seed one for each fold left out, and one on all."""
-    common = ("--simulated", work / "buildings", "--keep", work / "rasters")
+    common: tuple[object, ...] = ("--simulated", work / "buildings", "--keep", work / "rasters")
+    common += ("--processes", processes)
     base = work / "networks/simulated"
     run_tool("train_network.py", base, *common, "--seconds", seconds)
     real = ("--cases", cases, "--real-share", REAL_SHARE, "--start", base.with_suffix(".pt"))
@@ -170,6 +173,7 @@ def main() -> None:
     parser.add_argument("--tree-buildings", type=int, default=800)
     parser.add_argument("--network-seconds", type=float, default=7200.0)
     parser.add_argument("--fold-seconds", type=float, default=3600.0)
+    parser.add_argument("--processes", type=int, default=1, help="CPU cores that train a network together")
     parser.add_argument("--network", type=Path, help="ONNX file to take instead of training one")
     parser.add_argument("--trees", type=int, default=250)
     parser.add_argument("--seeds", type=int, default=3)
@@ -180,7 +184,8 @@ def main() -> None:
     if arguments.network:
         take_network(work, arguments.network, arguments.seeds)
     else:
-        train_networks(work, cases, arguments.network_seconds, arguments.fold_seconds, arguments.seeds)
+        seconds = arguments.network_seconds, arguments.fold_seconds
+        train_networks(work, cases, *seconds, arguments.seeds, arguments.processes)
     maps = prepared_benchmark(load_benchmark(cases), work / "prepared/real.pkl")
     simulated: list[PreparedMap] = []
     for path in sorted((work / "tree_buildings").glob("*.npz")):

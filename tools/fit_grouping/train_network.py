@@ -5,7 +5,10 @@
 
 OUT.pt is the checkpoint (weights, their running mean, the optimizer's state, steps and seconds done), written
 every few minutes; a run whose OUT.pt exists goes on from it until it has trained for that long all told.
-OUT.onnx answers with the running mean of the weights.
+OUT.onnx answers with the running mean of the weights. The learning rate falls to nothing over that time.
+
+With `--processes 2` two processes, each on one core, change the same weights without waiting for each other
+(Recht et al., Hogwild!, NIPS 2011).
 """
 
 from __future__ import annotations
@@ -15,7 +18,9 @@ import copy
 import os
 import sys
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
@@ -43,14 +48,14 @@ BATCH = 6
 LEARNING_RATE = 2e-3
 WEIGHT_DECAY = 1e-3
 WARM_UP_STEPS = 200
-HALF_LIFE_STEPS = 6000
-"""The learning rate falls as 1 / (1 + steps / this)."""
 MEAN_DECAY = 0.998
 """Decay of the running mean of the weights, which is what is shipped."""
 GRADIENT_MAX = 1.0
 CHECKPOINT_EVERY_S = 240.0
 HELD_OUT_MAX, HELD_OUT_SHARE = 40, 0.1
 """So many of the simulated maps, but no more than this share, are not trained on but watched."""
+WATCHED_BATCHES = 24
+"""Batches of watched maps of which the loss is told."""
 VARIANTS = 3
 """Each real map is sampled so many times, at other scales and slightly other directions."""
 
@@ -125,9 +130,74 @@ def loss_of(network: nn.Module, batch: tuple[Tensor, Tensor, Tensor]) -> Tensor:
     """Sum over the outputs of the weighted mean cross-entropy."""
     device = next(network.parameters()).device
     inputs, targets, weights = (part.to(device) for part in batch)
+    inputs = inputs.contiguous(memory_format=torch.channels_last)
     loss = nn.functional.binary_cross_entropy_with_logits(network(inputs), targets, reduction="none")
     per_output = (loss * weights).sum((0, 2, 3)) / (weights.sum((0, 2, 3)) + 1)
     return per_output.sum()
+
+
+@dataclass(frozen=True)
+class Trainer:
+    """Changes a network, batch by batch, at a rate that falls to nothing over a time.
+
+    Attributes
+    ----------
+    network : RoomNetwork
+    batches : Batches
+    learning_rate : float
+        At the beginning.
+    seconds, begun : float
+        Training time in all, and when it would have begun had it not been interrupted (monotonic clock).
+    optimizer : torch.optim.Optimizer
+    """
+
+    network: RoomNetwork
+    batches: Batches
+    learning_rate: float
+    seconds: float
+    begun: float
+    optimizer: torch.optim.Optimizer
+
+    def left(self) -> float:
+        """Share of the time that is left, 0 at its end."""
+        return max(0.0, 1 - (time.monotonic() - self.begun) / self.seconds)
+
+    def step(self, number: int) -> float:
+        """Go one step; the loss before it."""
+        rate = self.learning_rate * min(1.0, (number + 1) / WARM_UP_STEPS) * self.left()
+        for group in self.optimizer.param_groups:
+            group["lr"] = rate
+        self.network.train()
+        self.optimizer.zero_grad()
+        loss = loss_of(self.network, self.batches.next())
+        loss.backward()
+        nn.utils.clip_grad_norm_(self.network.parameters(), GRADIENT_MAX)
+        self.optimizer.step()
+        return float(loss.item())
+
+
+def _step_until_done(trainer: Trainer) -> None:
+    """Train in a process of its own on weights that are shared."""
+    torch.set_num_threads(1)
+    number = 0
+    while trainer.left() > 0:
+        trainer.step(number)
+        number += 1
+
+
+@contextmanager
+def helped(trainers: list[Trainer]) -> Iterator[None]:
+    """Let processes of their own train the same weights meanwhile."""
+    context = torch.multiprocessing.get_context("fork")
+    processes = [context.Process(target=_step_until_done, args=(t,), daemon=True) for t in trainers]
+    for process in processes:
+        process.start()
+    try:
+        yield
+    finally:
+        for process in processes:
+            process.terminate()
+            process.join()
 
 
 def main() -> None:
@@ -143,12 +213,13 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--keep", type=Path, help="folder in which sampled maps are kept for the next run")
     parser.add_argument("--learning-rate", type=float, default=LEARNING_RATE)
+    parser.add_argument("--processes", type=int, default=1, help="processes that train together, on CPUs")
     arguments = parser.parse_args()
     torch.set_num_threads(1)
     cv2.setNumThreads(1)
     torch.manual_seed(arguments.seed)
     device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
-    network = RoomNetwork().to(device)
+    network = RoomNetwork().to(device, memory_format=torch.channels_last)
     optimizer = torch.optim.AdamW(network.parameters(), arguments.learning_rate, weight_decay=WEIGHT_DECAY)
     steps, before = 0, 0.0
     checkpoint = arguments.out.with_suffix(".pt")
@@ -165,6 +236,7 @@ def main() -> None:
         begun_with = torch.load(arguments.start, map_location=device)["mean"]
         network.load_state_dict(begun_with)
         mean.load_state_dict(begun_with)
+    network.share_memory()
     keep: Path | None = arguments.keep
     simulated, held_out = kept(
         keep and keep / "simulated.pkl", lambda: simulated_rasters(arguments.simulated, arguments.seed)
@@ -178,47 +250,56 @@ def main() -> None:
         watched["left out"] = [
             r for b, rs in exact.items() if folds[b] == arguments.leave_out for r in rs[:3]
         ]
-    batches = Batches(simulated, real, arguments.real_share, arguments.seed + steps + 1)
     fixed = {
-        name: [b.next() for b in [Batches(rasters, {}, 0.0, 7)] for _ in range(8)]
+        name: [b.next() for b in [Batches(rasters, {}, 0.0, 7)] for _ in range(WATCHED_BATCHES)]
         for name, rasters in watched.items()
         if rasters
     }
     print(f"{len(simulated)} simulated maps, {len(real)} real buildings, from step {steps}", flush=True)
     now = last = time.monotonic()
     start, losses = now - before, []
-    while now - start < arguments.seconds:
-        rate = arguments.learning_rate * min(1.0, (steps + 1) / WARM_UP_STEPS) / (1 + steps / HALF_LIFE_STEPS)
-        for group in optimizer.param_groups:
-            group["lr"] = rate
-        network.train()
-        optimizer.zero_grad()
-        loss = loss_of(network, batches.next())
-        loss.backward()
-        nn.utils.clip_grad_norm_(network.parameters(), GRADIENT_MAX)
-        optimizer.step()
-        losses.append(loss.item())
-        steps += 1
-        decay = min(MEAN_DECAY, 1 - 10 / (steps + 10))
-        with torch.no_grad():
-            for slow, new in zip(mean.state_dict().values(), network.state_dict().values(), strict=True):
-                if slow.dtype.is_floating_point:
-                    slow.lerp_(new, 1 - decay)
-        now = time.monotonic()
-        if now - last > CHECKPOINT_EVERY_S or now - start >= arguments.seconds:
-            last = now
-            mean.eval()
+    trainers = [
+        Trainer(
+            network,
+            Batches(simulated, real, arguments.real_share, arguments.seed + steps + 1 + 1_000_000 * number),
+            arguments.learning_rate,
+            arguments.seconds,
+            start,
+            torch.optim.AdamW(network.parameters(), arguments.learning_rate, weight_decay=WEIGHT_DECAY)
+            if number
+            else optimizer,
+        )
+        for number in range(arguments.processes)
+    ]
+    with helped(trainers[1:]):
+        while now - start < arguments.seconds:
+            losses.append(trainers[0].step(steps))
+            steps += 1
+            decay = min(MEAN_DECAY, 1 - 10 / (steps + 10))
             with torch.no_grad():
-                seen = {
-                    name: float(np.mean([loss_of(mean, b).item() for b in bs])) for name, bs in fixed.items()
-                }
-            told = ", ".join(f"{name} {value:.3f}" for name, value in seen.items())
-            print(f"{now - start:6.0f} s {steps:6d} steps: loss {np.mean(losses):.3f}, {told}", flush=True)
-            losses.clear()
-            # The network first: where there is a checkpoint, there is the network of it or of a later one.
-            with replacing(checkpoint.with_suffix(".onnx")) as part:
-                export_onnx(copy.deepcopy(mean).cpu(), part)
-            _save(checkpoint, network, mean, optimizer, steps, now - start)
+                for slow, new in zip(mean.state_dict().values(), network.state_dict().values(), strict=True):
+                    if slow.dtype.is_floating_point:
+                        slow.lerp_(new, 1 - decay)
+            now = time.monotonic()
+            if now - last > CHECKPOINT_EVERY_S or now - start >= arguments.seconds:
+                last = now
+                told = _watched(mean, fixed)
+                print(
+                    f"{now - start:6.0f} s {steps:6d} steps: loss {np.mean(losses):.3f}, {told}", flush=True
+                )
+                losses.clear()
+                # The network first: where there is a checkpoint, there is its network or a later one.
+                with replacing(checkpoint.with_suffix(".onnx")) as part:
+                    export_onnx(copy.deepcopy(mean).cpu(), part)
+                _save(checkpoint, network, mean, optimizer, steps, now - start)
+
+
+def _watched(mean: RoomNetwork, fixed: dict[str, list[tuple[Tensor, Tensor, Tensor]]]) -> str:
+    """The loss of the running mean on maps that are not trained on, as text."""
+    mean.eval()
+    with torch.no_grad():
+        seen = {name: np.mean([loss_of(mean, b).item() for b in bs]) for name, bs in fixed.items()}
+    return ", ".join(f"{name} {value:.3f}" for name, value in seen.items())
 
 
 def _save(

@@ -24,6 +24,8 @@ OTHER_KINDS = {
     "warehouse": {"none": 1.0},
     "loop": {"none": 0.85, "slant": 0.1, "arc": 0.05},
     "openhome": {"none": 0.9, "slant": 0.06, "bend": 0.04},
+    "hallways": {"none": 0.9, "slant": 0.06, "bend": 0.04},
+    "cellular": {"none": 0.8, "slant": 0.1, "bend": 0.1},
     "wings": {"none": 0.85, "slant": 0.12, "arc": 0.03},
     "gallery": {"none": 0.6, "slant": 0.15, "arc": 0.12, "bend": 0.13},
     "passage": {"none": 0.74, "slant": 0.1, "arc": 0.08, "bend": 0.08},

@@ -34,6 +34,7 @@ OTHER_HALLS = {
     "shop": {"islands": 0.5, "rows": 0.3, "mixed": 0.1, "stands": 0.1},
     "wings": {"benches": 0.35, "study": 0.25, "rows": 0.15, "tables": 0.1, "pillars": 0.05, "empty": 0.1},
     "gallery": {"stands": 0.45, "empty": 0.15, "pillars": 0.1, "islands": 0.15, "mixed": 0.1, "study": 0.05},
+    "partitions": {"empty": 0.35, "stands": 0.2, "tables": 0.15, "pillars": 0.1, "mixed": 0.1, "boxes": 0.1},
     "warehouse": {"crates": 0.35, "racks": 0.3, "pallets": 0.15, "mixed": 0.1, "boxes": 0.1},
     "faculty": {"rows": 0.35, "pillars": 0.2, "tables": 0.2, "mixed": 0.15, "empty": 0.1},
 }

@@ -43,6 +43,9 @@ FURNISHING = {
     "wings": [0.06, 0.02, 0.0, 0.17, 0.1, 0.5, 0.15],
     "gallery": [0.1, 0.0, 0.0, 0.5, 0.25, 0.0, 0.15],
     "warehouse": [0.05, 0.0, 0.0, 0.6, 0.35],
+    "hallways": [0.08, 0.02, 0.75, 0.0, 0.15],
+    "cellular": [0.02, 0.04, 0.0, 0.2, 0.1, 0.44, 0.2],
+    "partitions": [0.25, 0.05, 0.0, 0.5, 0.2],
 }
 """Shares of the furnishing styles for each kind of plan, in the order of `furniture.STYLES`; none of the last
 ones where the list is shorter."""

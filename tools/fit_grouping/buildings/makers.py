@@ -6,6 +6,7 @@ from collections.abc import Callable, Collection
 
 import numpy as np
 
+from fit_grouping.buildings.faint_borders import cellular, hallways, partitions
 from fit_grouping.buildings.joined_rooms import loop, openhome, suites
 from fit_grouping.buildings.large_floors import gallery, warehouse, wings
 from fit_grouping.buildings.plans import Plan, campus, chamfers, cubicles, hall, home, office, passage
@@ -32,6 +33,9 @@ MAKERS: tuple[tuple[Callable[[Generator], Plan], float], ...] = (
     (wings, 0.08),
     (gallery, 0.06),
     (warehouse, 0.05),
+    (hallways, 0.12),
+    (cellular, 0.12),
+    (partitions, 0.06),
 )
 """Makers of plans and their shares, relative to each other."""
 KINDS = tuple(maker.__name__ for maker, _ in MAKERS)
@@ -48,6 +52,9 @@ TIDY_CORNERS = {
     "wings": (0.1, 0.1),
     "gallery": (0.4, 0.1),
     "warehouse": (0.2, 0.0),
+    "hallways": (0.2, 0.2),
+    "cellular": (0.2, 0.1),
+    "partitions": (0.4, 0.0),
 }
 """How many corners are cut off a building of a kind and how many of its rooms are cut in two, on average."""
 USUAL_CORNERS = (0.35, 0.15)

@@ -55,6 +55,8 @@ class Plan:
         Halls that meet through portals, rows of pillars and pieces of wall.
     zones : set of int
         Parts of an open floor of a home, which a counter, a stub or a change of width parts.
+    flowing : set of int
+        Rooms of a home that meet without a jamb, mostly.
     open_fronts : float
         Share of doors that are openings of most of the wall.
     joined : float
@@ -85,6 +87,7 @@ class Plan:
     suite: set[int] = field(default_factory=set)
     galleries: set[int] = field(default_factory=set)
     zones: set[int] = field(default_factory=set)
+    flowing: set[int] = field(default_factory=set)
     open_fronts: float = 0.05
     joined: float = 0.0
     frayed: float = 0.0
@@ -121,6 +124,7 @@ class Plan:
             self.suite,
             self.galleries,
             self.zones,
+            self.flowing,
         )
 
     def paint(self, rectangle: Rectangle, *, over: bool = False) -> int:

@@ -45,6 +45,9 @@ DRAWN_SHARE = {
     "wings": 0.08,
     "gallery": 0.08,
     "warehouse": 0.3,
+    "hallways": 0.05,
+    "cellular": 0.03,
+    "partitions": 0.15,
 }
 """Share of drawings among the maps of a kind; 0.12 elsewhere."""
 ROOM_SEEN_MIN_M2 = 0.5
@@ -82,6 +85,7 @@ SURVEYS = {
     "suites": Survey((0.0, 0.0, 0.1, 0.3, 0.6), 0.3, 0.6),
     "loop": Survey((0.0, 0.0, 0.2, 0.5), 0.3, 0.6),
     "wings": Survey((0.0, 0.0, 0.0, 0.2), 0.12, 0.7, (0.0, 0.15, 0.3, 0.35, 0.2), (1, 1, 2)),
+    "cellular": Survey((0.0, 0.1, 0.3, 0.6), 0.35, 0.55),
     "gallery": Survey((0.0, 0.0, 0.1), 0.1, 0.75, (0.05, 0.2, 0.3, 0.3, 0.15), (1, 1, 2)),
 }
 """Kinds of plans that are mapped so; few beams leave fans of single rays in far rooms."""

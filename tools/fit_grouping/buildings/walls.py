@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from fit_grouping.buildings.plans import Plan
 from fit_grouping.buildings.raster import Generator, Labels, Mask, between, cells, chance, numbers_in
 
-HOMES = frozenset({"home", "villa", "openhome"})
+HOMES = frozenset({"home", "villa", "openhome", "hallways"})
 """Kinds of plans that people live in."""
 DOOR_PLACE_MIN_M = 0.9
 """A border that is as long has place for a door."""
@@ -58,7 +58,8 @@ ZONE_OPENINGS = {
     "open": 0.12,
     "door": 0.1,
 }
-"""How rooms of a suite, halls of a gallery and zones of an open floor meet, and how often."""
+FLOWING_OPENINGS = {"open": 0.5, "one side": 0.18, "large gap": 0.12, "stub": 0.08, "door": 0.12}
+"""How rooms of a suite, halls of a gallery, zones of an open floor and rooms without jambs meet, and how often."""
 FRAYED_GAP_M, FRAYED_PIECE_M, FRAYED_DOT_STEP_M = (0.15, 0.7), (0.2, 1.6), (0.1, 0.22)
 """What is seen of a frayed wall: gaps between pieces, or dots too near to each other to walk through."""
 GATE_M = (0.9, 3.5)
@@ -250,6 +251,7 @@ def _opening_kind(rng: Generator, plan: Plan, a: int, b: int) -> str:
         (plan.suite, SUITE_OPENINGS),
         (plan.galleries, GALLERY_OPENINGS),
         (plan.zones, ZONE_OPENINGS),
+        (plan.flowing, FLOWING_OPENINGS),
     ):
         if a in kinds and b in kinds:
             return str(rng.choice(list(openings), p=list(openings.values())))
@@ -350,7 +352,7 @@ def build_walls(rng: Generator, plan: Plan) -> WalledPlan:
     reached, taste = _Groups(neighbors), _Groups(neighbors)
     place_min = cells(DOOR_PLACE_MIN_M)
     pairs = [p for p, parts in runs.items() if p[0] > 0 and sum(r.length for r in parts) >= place_min]
-    ways = plan.corridors | plan.halls | plan.public | plan.lobbies | plan.zones
+    ways = plan.corridors | plan.halls | plan.public | plan.lobbies | plan.zones | plan.flowing
     order = sorted(pairs, key=lambda p: (not (p[0] in ways or p[1] in ways)) + rng.uniform(0, 0.9))
     usual_m = rng.uniform(0.75, 1.1)
     leaves = rng.choice([0.0, 0.15, 0.4])
@@ -414,7 +416,7 @@ def _again(plan: Plan, a: int, b: int, ways: set[int]) -> float:
         return PUBLIC_AGAIN
     if a in plan.suite and b in plan.suite:
         return plan.joined
-    if a in plan.zones and b in plan.zones:
+    if (a in plan.zones and b in plan.zones) or (a in plan.flowing and b in plan.flowing):
         return ZONES_AGAIN
     return 0.1 if (a in ways) != (b in ways) else 0.05
 
