@@ -38,7 +38,7 @@ def hallways(rng: Generator) -> Plan:
 
 
 def cellular(rng: Generator) -> Plan:
-    """Offices of much the same width, whose walls to each other stand behind furniture and are hardly seen."""
+    """Offices of much the same width, whose walls to each other stand behind furniture and hardly show."""
     plan = empty_building(
         rng, "cellular", between(rng, 18, 54), between(rng, 11, 34 if chance(rng, 0.3) else 18)
     )
