@@ -59,7 +59,7 @@ ZONE_OPENINGS = {
     "door": 0.1,
 }
 FLOWING_OPENINGS = {"open": 0.5, "one side": 0.18, "large gap": 0.12, "stub": 0.08, "door": 0.12}
-"""How rooms of a suite, of a gallery and of an open floor meet, and rooms that jambs hardly part; how often."""
+"""How rooms of a suite, of a gallery and of an open floor meet, and rooms hardly parted by jambs."""
 FRAYED_GAP_M, FRAYED_PIECE_M, FRAYED_DOT_STEP_M = (0.15, 0.7), (0.2, 1.6), (0.1, 0.22)
 """What is seen of a frayed wall: gaps between pieces, or dots too near to each other to walk through."""
 GATE_M = (0.9, 3.5)
