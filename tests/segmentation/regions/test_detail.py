@@ -46,7 +46,9 @@ def test_more_detail_never_joins_what_less_detail_parts(grown: RoomTree, strengt
 def test_detail_parts_surer_joins_step_by_step(grown: RoomTree):
     """At the least detail all that touches is joined, at the greatest no atom is."""
     atoms = len(grown.tree.graph.node_sums)
-    parameters = dataclasses.replace(grown.tree.parameters, room_min_area_m2=0.0, outside_max_share=0.0)
+    parameters = dataclasses.replace(
+        grown.tree.parameters, room_min_area_m2=0.0, small_room_max_m2=0.0, outside_max_share=0.0
+    )
     tree = dataclasses.replace(grown.tree, strength=lambda features: np.zeros(len(features)) + 1.0)
     tree = dataclasses.replace(tree, parameters=parameters)
     assert tree.rooms(1.1).labels.max() == atoms
