@@ -47,7 +47,10 @@ class RegionParameters(ParameterBlock):
         2,
     )
     answer_weight: float = number(
-        0.6, "1", "Weight of the network's answers beside the trees' 1: best of 0.4 to 1.6 on maps left out.", 0.0
+        0.6,
+        "1",
+        "Weight of the network's answers beside the trees' 1: best of 0.4 to 1.6 on maps left out.",
+        0.0,
     )
     answer_scale: float = number(
         12.0,

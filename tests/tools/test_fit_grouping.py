@@ -549,15 +549,29 @@ def test_trees_are_fitted_without_training_a_network(tmp_path, three_homes):
     check_fitted(work, three_homes)
 
 
-@pytest.mark.parametrize("processes", [1, 2])
-def test_everything_is_fitted_by_one_command(processes, tmp_path, three_homes):
+def test_everything_is_fitted_by_one_command(tmp_path, three_homes):
     """A tiny run: three maps in three folds, trained on for a second."""
     pytest.importorskip("torch", reason="the network is trained with torch, which is not installed")
     work = tmp_path / "work"
     arguments = (work, "--cases", three_homes, "--buildings", 4, "--network-seconds", 1, "--fold-seconds", 1)
-    arguments += ("--processes", processes)
     run("fit_everything.py", *arguments, *SMALL)
     check_fitted(work, three_homes)
     made = {path: path.stat().st_mtime_ns for path in (work / "networks").iterdir()}
     run("fit_everything.py", *arguments, *SMALL)
     assert {path: path.stat().st_mtime_ns for path in (work / "networks").iterdir()} == made
+
+
+def test_two_processes_train_one_network(tmp_path):
+    """Both change the same weights, and nothing of the second one is left when the time is over."""
+    torch = pytest.importorskip("torch", reason="the network is trained with torch, which is not installed")
+    run("buildings/make_buildings.py", tmp_path / "maps/0.npz", "--count", 3, "--kinds", "home")
+    out = tmp_path / "network"
+    run("train_network.py", out, "--simulated", tmp_path / "maps", "--seconds", 3, "--processes", 2)
+    state = torch.load(out.with_suffix(".pt"))
+    assert state["steps"] > 0
+    assert state["seconds"] >= 3
+    # The counter of batches is shared, the optimizer is not: it has seen those of the first process alone.
+    batches = int(state["network"]["stem.1.num_batches_tracked"])
+    assert batches > state["steps"]
+    left_over = subprocess.run(["pgrep", "-f", str(out)], check=False, capture_output=True, text=True)
+    assert left_over.stdout == ""
