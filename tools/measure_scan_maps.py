@@ -5,7 +5,8 @@ OMP_NUM_THREADS=1 python tools/measure_scan_maps.py --seeds 1 2 3 4 5 --carmen .
 For each seed a robot explores a simulated building. Its log holds the maps of the run as its mapper made
 them, the transforms, and the scans of its lidar: 360 beams, ten times a second, each beam measured from where
 the robot was at that moment. The mapper uses one scan every 35 cm, as those of SLAM packages do; the maps
-built from scans use them all, so the two maps are of the same run, but not of the same measurements.
+built from scans use one every 20 cm or less, so the two maps are of the same run, but not of the same
+measurements.
 
 The columns of the table, for the last map of each log:
 

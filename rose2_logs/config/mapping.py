@@ -22,6 +22,20 @@ class MappingParameters(ParameterBlock):
         0.01,
         86_400.0,
     )
+    min_travel_m: float = number(
+        0.2,
+        "m",
+        "A scan is used if the lidar has moved this far since the last one that was: four cells of the usual "
+        "size. 0 uses all scans.",
+        0.0,
+        100.0,
+    )
+    min_turn_rad: float = number(
+        0.2, "rad", "The same for turns: a sixth of the view to each side, see min_travel_m.", 0.0, 6.3
+    )
+    scan_at_least_every_s: float = number(
+        5.0, "s", "A lidar that stands still sees doors open and people go: a scan this often.", 0.0, 86_400.0
+    )
     hit_log_odds: float = number(
         0.9,
         "1",

@@ -19,6 +19,7 @@ from rose2_logs.io.carmen_format import CARMEN_FORMAT, opened_text
 from rose2_logs.io.placed_scans import PlacedScan
 from rose2_logs.io.source import LoggedMap, LogInfo, MessageSource, TopicInfo
 from rose2_logs.mapping.log_odds import beams_of
+from rose2_logs.mapping.motion_filter import LidarPose
 from rose2_logs.model.occupancy import FARTHEST_ORIGIN_M, FloatArray
 from rose2_logs.system.warnings import log_warning
 
@@ -189,7 +190,7 @@ class CarmenScans:
             angles = pose[2] + scan.bearings_rad
             directions = np.stack([np.cos(angles), np.sin(angles)], 1)
             beams = beams_of(pose[:2], directions, scan.ranges_m, self._parameters)
-            yield PlacedScan(time_ns, time_ns, beams)
+            yield PlacedScan(time_ns, time_ns, LidarPose(*pose.tolist()), beams)
 
 
 def _robot_laser(words: list[str], max_range_m: float | None) -> CarmenScan:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 from collections import Counter, deque
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -18,6 +19,7 @@ from rose2_logs.io.scan_topics import scan_topics, transform_topics
 from rose2_logs.io.scans import Scan, scan_of, transforms_of
 from rose2_logs.io.source import LoggedBytes, MessageSource
 from rose2_logs.mapping.log_odds import Beams, beams_of
+from rose2_logs.mapping.motion_filter import LidarPose
 from rose2_logs.mapping.transforms import Link, NotPlacedError, Transform, TransformTree, rotated
 from rose2_logs.system.text import listed
 from rose2_logs.system.warnings import log_warning
@@ -36,10 +38,11 @@ _MOST_LISTED = 6
 
 
 class PlacedScan(NamedTuple):
-    """A scan in the world: when it was recorded and measured, in nanoseconds, and its beams."""
+    """A scan in the world: when it was recorded and measured, in nanoseconds, from where, and its beams."""
 
     log_time_ns: int
     stamp_ns: int
+    pose: LidarPose
     beams: Beams
 
 
@@ -180,11 +183,12 @@ class RosScans:
                 return
             waiting.popleft()
             try:
-                yield PlacedScan(first.log_time_ns, first.scan.stamp_ns, self._beams(first, tree))
+                yield PlacedScan(first.log_time_ns, first.scan.stamp_ns, *self._in_world(first, tree))
             except NotPlacedError as error:
                 self.left_out[str(error)] += 1
 
-    def _beams(self, taken: _Waiting, tree: TransformTree) -> Beams:
+    def _in_world(self, taken: _Waiting, tree: TransformTree) -> tuple[LidarPose, Beams]:
+        """Where the lidar was at its first beam, and its beams."""
         scan, parameters = taken.scan, self._parameters
         if not taken.links:
             raise NotPlacedError(f"in the frame {scan.frame_id!r}, which no transforms lead to")
@@ -195,7 +199,11 @@ class RosScans:
         level[:, 0], level[:, 1] = np.cos(scan.bearings_rad), np.sin(scan.bearings_rad)
         starts = poses.positions_m[:, :2]
         directions = rotated(poses.quaternions, level)[:, :2]
-        return beams_of(starts[0] if len(starts) == 1 else starts, directions, scan.ranges_m, parameters)
+        (x, y), (across, along) = starts[0].tolist(), directions[0].tolist()
+        pose = LidarPose(x, y, math.atan2(along, across) - float(scan.bearings_rad[0]))
+        return pose, beams_of(
+            starts[0] if len(starts) == 1 else starts, directions, scan.ranges_m, parameters
+        )
 
     def _started_tree(self) -> TransformTree:
         """Return a tree with the fixed transforms, which hold at all times, whenever they were recorded."""

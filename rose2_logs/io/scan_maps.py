@@ -21,6 +21,7 @@ from rose2_logs.io.grids import Grid
 from rose2_logs.io.placed_scans import PlacedScans
 from rose2_logs.io.source import LoggedBytes, LoggedMap, MessageSource, TopicInfo
 from rose2_logs.mapping.log_odds import MapBuilder
+from rose2_logs.mapping.motion_filter import MotionFilter
 from rose2_logs.model.occupancy import GridGeometry
 from rose2_logs.system.warnings import log_warning
 
@@ -142,7 +143,7 @@ class ScanMaps(MessageSource):
 
     def _build(self, file: IO[bytes]) -> Iterator[_Built]:
         """Build all maps; each is kept back until the next is due, so that the last one has all scans."""
-        builder = MapBuilder(self._parameters, self._most_cells)
+        builder, moved = MapBuilder(self._parameters, self._most_cells), MotionFilter(self._parameters)
         every_ns = round((self._selection.every_s or self._parameters.map_every_s) * 1e9)
         start_ns, end_ns = self._selection.start_ns, self._selection.end_ns
         path, frame_id = self.info.path, self._scans.frame_id
@@ -156,8 +157,9 @@ class ScanMaps(MessageSource):
             if end_ns is not None and scan.log_time_ns > end_ns:
                 break
             try:
-                builder.add(scan.beams)
-                used += 1
+                if moved.takes(scan.stamp_ns, scan.pose):
+                    builder.add(scan.beams)
+                    used += 1
             except InvalidMapError as error:
                 refused += 1
                 if refused == 1:

@@ -125,6 +125,22 @@ def test_resolution_is_a_parameter(tmp_path):
     assert area[1] == pytest.approx(area[0], rel=0.1)
 
 
+def test_a_robot_that_stands_is_not_looked_through_again_and_again(tmp_path):
+    """Someone who stands before the lidar of a waiting robot is in the map only if all scans are used."""
+    logged: list = [("/tf_static", Move(0.02, "map", "laser", (3.0, 2.0, 0.3), turned(0.0)))]
+    position, headings = np.array([[3.0, 2.0]]), np.zeros(1)
+    room = ranges_in_box(np.repeat(position, len(BEARINGS), 0), headings + BEARINGS, LOW, HIGH)
+    someone = np.where(np.abs(BEARINGS) < 0.2, 1.0, room)
+    for k in range(1, 40):
+        logged.append(("/scan", Scan(k / 10, room if k < 3 else someone, BEARINGS)))
+    path = write_scans(tmp_path / "run.mcap", logged)
+    thinned, all_scans = (final_map(path, parameters={"mapping.min_travel_m": m}) for m in (0.2, 0.0))
+    (row, column), *_ = thinned.geometry.world_to_cell(np.array([[4.0, 2.0]]))
+    assert thinned.cells[row, column] == 0
+    assert (all_scans.cells[row - 2 : row + 3, column - 2 : column + 3] == 100).any()
+    assert (thinned.cells == 100).sum() < (all_scans.cells == 100).sum()
+
+
 def test_maps_come_every_so_often_and_grow_and_the_last_has_all_scans(tmp_path):
     path = write_scans(tmp_path / "run.mcap", drive(duration_s=6.0))
     near = {"mapping.usable_range_m": 1.0}
