@@ -13,7 +13,7 @@ from rose2_logs.model.occupancy import BoolArray, Scalar
 
 Label = TypeVar("Label", bound=np.integer)
 
-COUNTED_AT_ONCE = 2**18
+COUNTED_AT_ONCE = 2**16
 """Cells whose labels are counted at once."""
 
 

@@ -72,7 +72,7 @@ def test_a_layout_that_came_late_though_what_was_known_was_right_is_said(changed
 
 def test_tracks_that_were_soon_gone_are_counted_apart(changed):
     """Nothing is said of none."""
-    for brief, said in ((2, "18 followed over the run, 2 only briefly"), (0, "18 followed over the run")):
+    for brief, said in ((2, "19 followed over the run, 2 only briefly"), (0, "19 followed over the run")):
         results = changed(results={"brief_tracks": brief})
         (tile,) = [tile for tile in tiles(results, two_rooms_plan()) if tile.name == "Rooms at the end"]
         assert tile.more == said
