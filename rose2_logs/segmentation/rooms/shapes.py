@@ -192,7 +192,7 @@ def _claims(
     room = labels_near(labels, unseen, parameters.shape_reach_m / resolution_m)
     unseen, room = unseen.compress(room > 0), room.compress(room > 0)
     face = face_of_cell.take(unseen)
-    claim = np.zeros_like(labels)
+    claim = np.zeros_like(labels, order="C")
     claim.reshape(-1)[unseen] = np.where(has_part[face, room - 1], room, room_of.take(face))
     return claim
 
