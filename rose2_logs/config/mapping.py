@@ -31,7 +31,7 @@ class MappingParameters(ParameterBlock):
         100.0,
     )
     min_turn_rad: float = number(
-        0.2, "rad", "The same for turns: a sixth of the view to each side, see min_travel_m.", 0.0, 6.3
+        0.2, "rad", "The same for turns: about 11 degrees, see min_travel_m.", 0.0, 6.3
     )
     scan_at_least_every_s: float = number(
         5.0, "s", "A lidar that stands still sees doors open and people go: a scan this often.", 0.0, 86_400.0

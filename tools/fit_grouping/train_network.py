@@ -200,6 +200,11 @@ def helped(trainers: list[Trainer]) -> Iterator[None]:
             process.join()
 
 
+def _optimizer_of(network: RoomNetwork) -> torch.optim.Optimizer:
+    """A new optimizer; the rate is set at each step."""
+    return torch.optim.AdamW(network.parameters(), LEARNING_RATE, weight_decay=WEIGHT_DECAY)
+
+
 def main() -> None:
     """Train for a time."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -220,7 +225,7 @@ def main() -> None:
     torch.manual_seed(arguments.seed)
     device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
     network = RoomNetwork().to(device, memory_format=torch.channels_last)
-    optimizer = torch.optim.AdamW(network.parameters(), arguments.learning_rate, weight_decay=WEIGHT_DECAY)
+    optimizer = _optimizer_of(network)
     steps, before = 0, 0.0
     checkpoint = arguments.out.with_suffix(".pt")
     mean = copy.deepcopy(network).eval()
@@ -265,9 +270,7 @@ def main() -> None:
             arguments.learning_rate,
             arguments.seconds,
             start,
-            torch.optim.AdamW(network.parameters(), arguments.learning_rate, weight_decay=WEIGHT_DECAY)
-            if number
-            else optimizer,
+            _optimizer_of(network) if number else optimizer,
         )
         for number in range(arguments.processes)
     ]

@@ -95,10 +95,10 @@ def _stand_walls(rng: Generator, things: Mask, hall: Rectangle) -> None:
         lies = chance(rng, 0.5)
         across = (x1 - x0) if lies else (y1 - y0)
         long = min(between(rng, *WALL_PIECE_M), round(WALL_PIECE_SHARE_MAX * across))
-        room_for = across - long - cells(PASSAGE_M)
-        if room_for <= 0:
+        left_over = across - long
+        if left_over <= cells(PASSAGE_M):
             continue
-        at = 0 if chance(rng, 0.25) else int(rng.integers(0, room_for + cells(PASSAGE_M) + 1))
+        at = 0 if chance(rng, 0.25) else int(rng.integers(0, left_over + 1))
         aside = round(((y1 - y0) if lies else (x1 - x0)) * rng.uniform(0.15, 0.85))
         first = (x0 + at, y0 + aside) if lies else (x0 + aside, y0 + at)
         last = (first[0] + long, first[1]) if lies else (first[0], first[1] + long)
