@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -34,21 +35,8 @@ IOU_SYM = {
     "places/depot": 53.666,
 }
 """Mean IoU in both directions, in percent, by group and name of the map, of rooms by walls."""
-LEFT_OUT = {
-    "full/freiburg_building79": 98.628,
-    "full/map15": 83.988,
-    "full/map_with_clutter": 72.678,
-    "survey_empty/NLB": 94.297,
-    "survey_furnished/Freiburg79_scan_furnitures": 78.762,
-    "incremental_fr79/map06": 82.516,
-    "incremental_fr79/map12": 84.259,
-    "campus/floor1": 72.660,
-    "homes/a03": 94.622,
-    "homes/b09": 80.863,
-    "homes/b27": 89.730,
-    "places/cic": 89.210,
-    "places/bookstore": 100.000,
-}
+REGIONS = Path(__file__).parent / "regions"
+LEFT_OUT: dict[str, float] = json.loads((REGIONS / "left_out.json").read_text("utf-8"))
 """The same of rooms by borders that were fitted without these buildings."""
 
 pytestmark = pytest.mark.skipif(not CASES.is_file(), reason="the benchmark's maps are not beside the project")
@@ -80,5 +68,5 @@ def without_a_fold() -> Iterator[None]:
     """What was fitted without the buildings of the second fold."""
     from fit_grouping.left_out_figures import fitted_from
 
-    with fitted_from(Path(__file__).parent / "regions" / "without_fold_1"):
+    with fitted_from(REGIONS / "without_fold_1"):
         yield

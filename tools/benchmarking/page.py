@@ -222,8 +222,8 @@ def write_page(page: PageFigures, folder: Path) -> Path:
 def page_tables(page: PageFigures) -> str:
     """Return all tables as Markdown."""
     first = page.methods[0].name
-    lines = [f"## Rooms: {first}", "", *_figures_table(page, first), "## Methods", "", EXPLAINED, ""]
-    lines += [*_methods_table(page), "## Buildings", "", f"`{FIGURE}`, mean over the maps of a building.", ""]
+    lines = [f"## Rooms: {first}", "", *figures_lines(page, first), "## Methods", "", EXPLAINED, ""]
+    lines += [*methods_lines(page), "## Buildings", "", f"`{FIGURE}`, mean over the maps of a building.", ""]
     lines += _buildings_table(page)
     if page.robustness:
         lines += [
@@ -240,7 +240,7 @@ def page_tables(page: PageFigures) -> str:
     return "\n".join(lines)
 
 
-def _figures_table(page: PageFigures, name: str) -> list[str]:
+def figures_lines(page: PageFigures, name: str) -> list[str]:
     """Every figure of one method by group, with the published ones."""
     published = load_published().groups
     rows = []
@@ -257,7 +257,8 @@ def _figures_table(page: PageFigures, name: str) -> list[str]:
     ]
 
 
-def _methods_table(page: PageFigures) -> list[str]:
+def methods_lines(page: PageFigures) -> list[str]:
+    """Return a row per method: means of groups, their mean, and the mean of the buildings, with ranges."""
     groups, buildings = np.array(page.groups), np.array(page.buildings)
     names = list(dict.fromkeys(page.groups))
     heads = [f"{group} ({np.count_nonzero(groups == group)})" for group in names]
@@ -270,7 +271,7 @@ def _methods_table(page: PageFigures) -> list[str]:
             cells.append(_with_range(scores[inside].mean(), buildings[inside].tolist(), scores[inside]))
         mean = float(np.mean([scores[groups == group].mean() for group in names]))
         cells.append(_with_range(mean, page.buildings, scores, page.groups))
-        of_building = np.array(list(_building_means(page, each.name).values()))
+        of_building = np.array(list(building_means(page, each.name).values()))
         cells.append(_with_range(of_building.mean(), list(dict.fromkeys(page.buildings)), of_building))
         rows.append([each.name, *cells])
     return table(["method", *heads, "mean of groups", "mean of buildings"], rows)
@@ -285,13 +286,14 @@ def _with_range(
     return f"{percent(mean)} ({percent(low)} to {percent(high)})"
 
 
-def _building_means(page: PageFigures, name: str) -> dict[str, float]:
+def building_means(page: PageFigures, name: str) -> dict[str, float]:
+    """Mean figure of each building with a method."""
     buildings, scores = np.array(page.buildings), page.iou_sym(name)
     return {one: float(scores[buildings == one].mean()) for one in dict.fromkeys(page.buildings)}
 
 
 def _buildings_table(page: PageFigures) -> list[str]:
-    means = {each.name: _building_means(page, each.name) for each in page.methods}
+    means = {each.name: building_means(page, each.name) for each in page.methods}
     rows = [
         [building, str(page.buildings.count(building)), *(percent(of[building]) for of in means.values())]
         for building in dict.fromkeys(page.buildings)

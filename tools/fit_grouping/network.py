@@ -13,8 +13,9 @@ from torch import Tensor, nn
 from rose2_logs.segmentation.regions.answers import BLOCK
 from rose2_logs.segmentation.regions.plan_raster import OUTPUTS
 
-CHANNELS = (16, 28, 40, 56, 72)
-"""Channels at 0.2, 0.4, 0.8, 1.6 and 3.2 m a cell."""
+CHANNELS = (16, 32, 48, 80, 112)
+"""Channels at 0.2, 0.4, 0.8, 1.6 and 3.2 m a cell. Convolutions are fast with multiples of 16: these take the
+time of 16, 28, 40, 56 and 72, and hold nearly twice as many weights."""
 INPUTS = 4
 HALVED_MIN_SIZE = 64
 """Smaller arrays of numbers, as of biases, are kept in 32 bits."""
