@@ -80,11 +80,11 @@ def network_file(work: Path, seed: int, fold: int) -> Path:
 
 
 def train_networks(
-    work: Path, cases: Path, seconds: float, fold_seconds: float, seeds: int, processes: int
+    work: Path, cases: Path, seconds: float, fold_seconds: float, seeds: int, how: Sequence[object]
 ) -> None:
     """One network on simulated maps, and from it for each seed one for each fold left out, and one on all."""
     common: tuple[object, ...] = ("--simulated", work / "buildings", "--keep", work / "rasters")
-    common += ("--processes", processes)
+    common += tuple(how)
     base = work / "networks/simulated"
     run_tool("train_network.py", base, *common, "--seconds", seconds)
     real = ("--cases", cases, "--real-share", REAL_SHARE, "--start", base.with_suffix(".pt"))
@@ -174,6 +174,7 @@ def main() -> None:
     parser.add_argument("--network-seconds", type=float, default=7200.0)
     parser.add_argument("--fold-seconds", type=float, default=3600.0)
     parser.add_argument("--processes", type=int, default=1, help="CPU cores that train a network together")
+    parser.add_argument("--bfloat16", action="store_true", help="train in 16 bits, see train_network.py")
     parser.add_argument("--network", type=Path, help="ONNX file to take instead of training one")
     parser.add_argument("--trees", type=int, default=250)
     parser.add_argument("--seeds", type=int, default=3)
@@ -185,7 +186,8 @@ def main() -> None:
         take_network(work, arguments.network, arguments.seeds)
     else:
         seconds = arguments.network_seconds, arguments.fold_seconds
-        train_networks(work, cases, *seconds, arguments.seeds, arguments.processes)
+        how = ["--processes", arguments.processes, *(["--bfloat16"] if arguments.bfloat16 else [])]
+        train_networks(work, cases, *seconds, arguments.seeds, how)
     maps = prepared_benchmark(load_benchmark(cases), work / "prepared/real.pkl")
     simulated: list[PreparedMap] = []
     for path in sorted((work / "tree_buildings").glob("*.npz")):
