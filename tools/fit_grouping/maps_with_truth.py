@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import re
-import zlib
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -49,8 +47,6 @@ FOLD_OF_BUILDING = {
 }
 """Fold in which a building is left out; homes are dealt round by their number, others are in the last."""
 FOLDS = 3
-UNKNOWN_SHARE_MAX = 0.02
-"""Of a varied map up to this share of cells is unknown."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,41 +104,6 @@ def load_benchmark(cases: Path) -> list[TruthMap]:
             )
         )
     return maps
-
-
-def varied(one: TruthMap, number: int) -> TruthMap:
-    """Turn a map, mirror it at times, make some of its cells unknown: the same building, mapped otherwise.
-
-    Odd variants are turned by a quarter or more, which leaves cells as they are, others by any angle.
-    """
-    rng = np.random.default_rng([zlib.crc32(f"{one.group}/{one.name}".encode()), number])
-    turns, mirrored, angle_rad = (
-        int(rng.integers(1, 4)),
-        bool(rng.integers(2)),
-        rng.uniform(0.1, np.pi / 2 - 0.1),
-    )
-    seen = rng.random(one.free.shape) >= rng.uniform(0, UNKNOWN_SHARE_MAX)
-
-    def changed(image: NDArray[np.uint16]) -> NDArray[np.uint16]:
-        image = image[:, ::-1] if mirrored else image
-        if number % 2:
-            return np.ascontiguousarray(np.rot90(image, turns))
-        return _turned(np.ascontiguousarray(image), angle_rad)
-
-    free, occupied = (changed((mask & seen).astype(np.uint16)) > 0 for mask in (one.free, one.occupied))
-    truths = tuple(changed(truth.astype(np.uint16)).astype(np.int32) for truth in one.truths)
-    return replace(one, name=f"{one.name}_{number}", free=free, occupied=occupied, truths=truths)
-
-
-def _turned(image: NDArray[np.uint16], angle_rad: float) -> NDArray[np.uint16]:
-    """Turn about the middle onto a canvas that holds all; each cell takes the value at its center."""
-    height, width = image.shape
-    c, s = np.cos(angle_rad), np.sin(angle_rad)
-    size = int(np.ceil(height * s + width * c)), int(np.ceil(height * c + width * s))
-    matrix = cv2.getRotationMatrix2D(((width - 1) / 2, (height - 1) / 2), float(np.degrees(angle_rad)), 1.0)
-    matrix[:, 2] += (size[0] - width) / 2, (size[1] - height) / 2
-    turned = cv2.warpAffine(image, matrix, size, flags=cv2.INTER_NEAREST)
-    return np.asarray(turned, np.uint16)
 
 
 def on_blocks(part: ExploredPart, labels: NDArray[np.integer]) -> Labels:

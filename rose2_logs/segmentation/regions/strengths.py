@@ -14,9 +14,6 @@ from rose2_logs.model.occupancy import FloatArray
 from rose2_logs.segmentation.regions.features import FEATURES, NO_ANSWER, REGION_FEATURES
 
 DIFFERENT, OUTSIDE = FEATURES.index("different"), REGION_FEATURES.index("outside")
-UNASKED_ANSWER = -0.5
-"""What the answer counts for regions that touch nowhere: they are in different rooms."""
-
 ROWS_AT_ONCE = 64
 """Rows whose answers to all nodes are held at once, in a CPU's cache."""
 LEAVES_MAX = 16
@@ -195,8 +192,8 @@ class FittedStrength:
         Feature that holds the mean of the network's answers, which speak against.
     answer_weight : float
         Weight of the network's log odds beside the trees' 1.
-    answer_scale : float
-        Log odds of the network per difference of its mean answer from one half.
+    answer_least : float
+        Added to the mean answer and to its opposite before their log odds are taken.
     margin : float
         Subtracted from the log odds: how much surer than even odds they must be.
     """
@@ -204,19 +201,19 @@ class FittedStrength:
     trees: BoostedTrees | None
     answer: int
     answer_weight: float
-    answer_scale: float
+    answer_least: float
     margin: float = 0.0
 
     @classmethod
     def of_joins(cls, trees: BoostedTrees | None, parameters: RegionParameters) -> FittedStrength:
         """Log odds that two regions are one room, from `join_features`."""
-        weight, scale = parameters.answer_weight, parameters.answer_scale
-        return cls(trees, DIFFERENT, weight, scale, parameters.join_margin)
+        weight, least = parameters.answer_weight, parameters.answer_least
+        return cls(trees, DIFFERENT, weight, least, parameters.join_margin)
 
     @classmethod
     def of_rooms(cls, trees: BoostedTrees | None, parameters: RegionParameters) -> FittedStrength:
         """Log odds that a region is a room and not outside, from `region_features`."""
-        return cls(trees, OUTSIDE, parameters.answer_weight, parameters.answer_scale)
+        return cls(trees, OUTSIDE, parameters.answer_weight, parameters.answer_least)
 
     def __call__(self, features: FloatArray) -> FloatArray:
         """Strength (N,) for features (N, F)."""
@@ -225,8 +222,9 @@ class FittedStrength:
             total += self.trees(features)
             weight += 1.0
         if self.answer_weight:
-            mean = features[:, self.answer]
-            answer = np.where(mean == NO_ANSWER, UNASKED_ANSWER, 0.5 - mean)
-            total += self.answer_weight * self.answer_scale * answer
+            # What the network was not asked about touches nowhere: these are different rooms.
+            against = np.where(features[:, self.answer] == NO_ANSWER, 1.0, features[:, self.answer])
+            odds = (1 - against + self.answer_least) / (against + self.answer_least)
+            total += self.answer_weight * np.log(odds)
             weight += self.answer_weight
         return np.rint((total / weight - self.margin) * STRENGTH_STEPS) / STRENGTH_STEPS

@@ -98,17 +98,17 @@ def strength(mean_answer, log_odds=0.0, **changed):
 @pytest.mark.parametrize(
     ("below", "above"),
     [
-        ({"join_margin": 0.46}, {"join_margin": 0.44}),
-        ({"answer_scale": 19.9}, {"answer_scale": 20.1}),
-        ({"answer_weight": 1.0, "join_margin": 0.81}, {"answer_weight": 2.1, "join_margin": 0.79}),
+        ({"join_margin": 0.73}, {"join_margin": 0.66}),
+        ({"answer_least": 0.05, "join_margin": 0.65}, {"answer_least": 0.001, "join_margin": 0.65}),
+        ({"answer_weight": 0.9, "join_margin": 0.69}, {"answer_weight": 1.1, "join_margin": 0.69}),
     ],
 )
 def test_a_border_goes_from_even_odds_on(below, above):
-    """A mean answer of 0.4 is 1.2 log odds for one room; the trees say even odds."""
-    assert strength(0.4, **{"join_margin": 0.75} | below) < 0 < strength(0.4, **{"join_margin": 0.75} | above)
+    """A mean answer of 0.2 is 1.39 log odds for one room; the trees say even odds."""
+    assert strength(0.2, **below) < 0 < strength(0.2, **above)
 
 
-@pytest.mark.parametrize(("least", "is_room"), [(1.24, True), (1.26, False)])
+@pytest.mark.parametrize(("least", "is_room"), [(0.99, True), (1.01, False)])
 def test_a_region_is_a_room_from_the_least_odds_on(least, is_room):
     features = np.zeros((1, len(REGION_FEATURES)))
     features[0, REGION_FEATURES.index("outside")] = 0.5

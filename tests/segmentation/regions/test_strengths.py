@@ -76,16 +76,19 @@ def features(*different):
 
 
 def test_strength_weighs_trees_and_answers():
-    answers_alone = FittedStrength(None, DIFFERENT, answer_weight=1.0, answer_scale=12.0)
-    np.testing.assert_allclose(answers_alone(features(0.0, 1.0, NO_ANSWER)), [6.0, -6.0, -6.0])
-    both = FittedStrength(BoostedTrees.constant(3.0), DIFFERENT, answer_weight=0.5, answer_scale=12.0)
-    np.testing.assert_allclose(both(features(0.0, 1.0)), [4.0, 0.0])
-    trees_alone = FittedStrength(BoostedTrees.constant(3.0), DIFFERENT, answer_weight=0.0, answer_scale=12.0)
+    answers_alone = FittedStrength(None, DIFFERENT, answer_weight=1.0, answer_least=0.1)
+    surest = round(np.log(11), 3)
+    np.testing.assert_allclose(
+        answers_alone(features(0.0, 0.5, 1.0, NO_ANSWER)), [surest, 0.0, -surest, -surest]
+    )
+    both = FittedStrength(BoostedTrees.constant(3.0), DIFFERENT, answer_weight=0.5, answer_least=1e-9)
+    np.testing.assert_allclose(both(features(0.2, 0.8)), (3 + np.log([4, 1 / 4]) / 2) / 1.5, atol=5e-4)
+    trees_alone = FittedStrength(BoostedTrees.constant(3.0), DIFFERENT, answer_weight=0.0, answer_least=0.1)
     np.testing.assert_allclose(trees_alone(features(0.0, NO_ANSWER)), [3.0, 3.0])
 
 
 def test_strengths_that_differ_by_rounding_errors_are_equal():
-    strength = FittedStrength(None, DIFFERENT, answer_weight=1.0, answer_scale=12.0)
+    strength = FittedStrength(None, DIFFERENT, answer_weight=1.0, answer_least=0.001)
     one, other = strength(features(0.3, np.nextafter(0.3, 1) + 1e-9))
     assert one == other
 
