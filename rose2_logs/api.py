@@ -110,7 +110,7 @@ def analyze(
     >>> import rose2_logs as rl
     >>> run = rl.analyze("sample_logs/office.mcap", max_snapshots=3)
     >>> run.snapshots.arrow["rooms"].to_pylist()
-    [5, 12, 18]
+    [6, 12, 18]
     """
     log = _path(log, "log")
     folder = None if out is None else _path(out, "out")
@@ -172,9 +172,9 @@ def track(
     >>> import rose2_logs as rl
     >>> for step in rl.track(rl.open_log("sample_logs/office.mcap", max_snapshots=3)):
     ...     print(f"{step.coverage:.2f}", len(step.rooms), sorted(step.track_ids)[:4])
-    0.26 5 [1, 2, 3, 4]
-    0.72 12 [1, 2, 3, 4]
-    1.00 18 [1, 2, 3, 4]
+    0.26 6 [1, 2, 3, 4]
+    0.72 12 [1, 2, 4, 5]
+    1.00 18 [1, 2, 4, 5]
     """
     # What cannot be used is refused by the call, not when the first map is asked for.
     options = _options(parameters, {"method": method, "detail": detail, "workers": workers, "topic": topic})

@@ -243,7 +243,7 @@ class RunSnapshot:
     >>> import rose2_logs as rl
     >>> run = rl.analyze("sample_logs/office.mcap", max_snapshots=3)
     >>> run[0]
-    <RunSnapshot 0 of office: coverage 26%, 5 rooms>
+    <RunSnapshot 0 of office: coverage 26%, 6 rooms>
     """
 
     def __init__(self, run: Run, number: int) -> None:

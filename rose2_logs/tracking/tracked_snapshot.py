@@ -98,7 +98,7 @@ class TrackedSnapshot:
     --------
     >>> import rose2_logs as rl
     >>> next(rl.track("sample_logs/office.mcap"))
-    TrackedSnapshot(index=0, coverage=0.26, tracks=[1, 2, 3, 4, 5], 512 x 320 cells of 0.05 m)
+    TrackedSnapshot(index=0, coverage=0.26, tracks=[1, 2, 3, 4, 5, 6], 512 x 320 cells of 0.05 m)
     """
 
     snapshot: OccupancySnapshot
