@@ -14,6 +14,7 @@ import argparse
 import csv
 import json
 import re
+import shutil
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -32,7 +33,6 @@ from benchmarking.page import (
 )
 from benchmarking.robustness import Robustness, check_robustness, robustness_table, sampled
 
-from fit_grouping.fit_everything import write_manifest
 from rose2_logs.config.parameters import Parameters
 from rose2_logs.evaluation.cases import load_cases
 from rose2_logs.segmentation.regions import fitted
@@ -70,15 +70,12 @@ SHORT_GROUP_NAMES = GROUP_NAMES | {"incremental_fr79": "fr79", "incremental_inte
 
 
 def take_fits(work: Path) -> None:
-    """Copy what was fitted."""
-    facts = {key: value for key, value in fitted.manifest().items() if key != "sha256"}
-    made = json.loads((work / "seed0/all" / fitted.MANIFEST).read_text("utf-8"))
-    facts |= {key: value for key, value in made.items() if key != "sha256"}
+    """Copy what was fitted; the manifest tells the hashes of the files beside it."""
+    for name in (*fitted.FILES, fitted.MANIFEST):
+        shutil.copyfile(work / "seed0/all" / name, fitted.FOLDER / name)
     for name in fitted.FILES:
-        (fitted.FOLDER / name).write_bytes((work / "seed0/all" / name).read_bytes())
         tested = TESTS / "regions" / f"without_fold_{TESTED_FOLD}" / name
-        tested.write_bytes((work / f"seed0/fold{TESTED_FOLD}" / name).read_bytes())
-    write_manifest(fitted.FOLDER, facts)
+        shutil.copyfile(work / f"seed0/fold{TESTED_FOLD}" / name, tested)
 
 
 def take_figures(work: Path) -> None:
