@@ -94,8 +94,14 @@ def _encoded_array(array: NDArray[Any]) -> tuple[Any, ...]:
         rows, columns = known_window(array != 0)
         window, kept = (rows.start, rows.stop, columns.start, columns.stop), array[rows, columns]
         if kept.size and kept.dtype.kind == "i":
-            kept = kept.astype(np.result_type(np.min_scalar_type(kept.min()), np.min_scalar_type(kept.max())))
+            kept = kept.astype(_smallest_type(int(kept.min()), int(kept.max())))
     return array.dtype.str, array.shape, window, kept.dtype.str, kept.tobytes()
+
+
+def _smallest_type(least: int, most: int) -> np.dtype[Any]:
+    """Integer type of fewest bytes that holds both numbers."""
+    # The common type of both by NumPy would be a float for some; signed types reach one further below zero.
+    return np.min_scalar_type(most if least >= 0 else min(least, -1 - most))
 
 
 def _decoded_array(

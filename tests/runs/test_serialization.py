@@ -9,7 +9,7 @@ import msgspec
 import numpy as np
 import pytest
 from drawn_maps import office, snapshot
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 from shapely.geometry import MultiPolygon, Polygon, box
@@ -70,6 +70,9 @@ def test_images_of_labels_stay_small():
         arrays.array_shapes(min_dims=0, max_dims=3, min_side=0, max_side=5),
     )
 )
+@example(np.array([[2**53 + 1, -1]]))
+@example(np.array([[2**63 - 1, -(2**63)]]))
+@example(np.array([[255, -1]]))
 def test_any_array_comes_back(array: np.ndarray):
     """Also empty ones, negative numbers, those that are not a number."""
     assert_equal(ARRAYS.decode(ARRAYS.encode(array)), array)
