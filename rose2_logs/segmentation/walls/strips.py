@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,6 +15,8 @@ from rose2_logs.model.occupancy import BoolArray, FloatArray
 
 SORTED_AT_ONCE = 2**16
 """Cells times directions that are sorted at once: what this takes stays in a CPU's cache."""
+PLACE_STEPS = 2.0**32 - 1
+"""Places along directions are sorted in so many steps: 32 bits, far finer than cells lie."""
 KEPT_SORTED = 2**21
 """Cells times directions that are kept sorted: 100 MB."""
 
@@ -90,7 +93,7 @@ class SortedCells:
         lowest = [strip.min(1, keepdims=True) for strip in strips]
         strips = [strip - low for strip, low in zip(strips, lowest, strict=True)]
         spans = [int(strip.max()) + 1 for strip in strips]
-        order = _Order.of(along, max(spans))
+        order = _Order.of(along)
         number = np.arange(len(directions_rad))[:, None]
         slots, keys, alongs = [], [], []
         for strip, span in zip(strips, spans, strict=True):
@@ -153,53 +156,58 @@ class SortedCells:
 class _Order:
     """Sorts cells by their strip and then by their place along it; equal ones stay as they come.
 
-    Each cell becomes one number, from high to low bits its strip, its place in small steps, and its index:
-    NumPy sorts numbers several times as fast as it finds the order of values.
+    NumPy sorts numbers of 16 bits by their digits, several times as fast as it compares longer ones. So
+    places are told in steps of two such digits, sorted by one digit after the other, and then by strip: the
+    order of the places serves for both sets of strips.
 
     Attributes
     ----------
     along : (D, P) float
         Places of the cells along each direction.
-    step : (D, P) int64
-        Their places in steps, and their indices.
-    index_bits, place_bits : int
-        How many bits each of the two takes.
+    slot : (D, P) int
+        The cells by their place, as places in the flattened array.
     """
 
     along: FloatArray
-    step: NDArray[np.int64]
-    index_bits: int
-    place_bits: int
+    slot: NDArray[np.intp]
 
     @classmethod
-    def of(cls, along: FloatArray, strips: int) -> _Order:
-        """Prepare places for the order within so many strips."""
-        count = along.shape[1]
-        index_bits = count.bit_length()
-        place_bits = 63 - (strips - 1).bit_length() - index_bits
+    def of(cls, along: FloatArray) -> _Order:
+        """Order cells by their places."""
         step = along - along.min()
-        step *= 2.0**place_bits / (float(np.ptp(along)) + 1.0)
-        whole = step.astype(np.int64)
-        whole <<= index_bits
-        whole |= np.arange(count)
-        return cls(along, whole, index_bits, place_bits)
+        step *= PLACE_STEPS / (float(np.ptp(along)) + 1.0)
+        digits = step.astype(np.uint32).view(np.uint16).reshape(*along.shape, 2)
+        high, low = (1, 0) if sys.byteorder == "little" else (0, 1)
+        slot = np.arange(along.size).reshape(along.shape)
+        for digit in (low, high):
+            slot = _sorted_by(np.ascontiguousarray(digits[..., digit]), slot)
+        return cls(along, slot)
 
     def by_strip(self, strip: NDArray[np.int32]) -> tuple[NDArray[np.intp], FloatArray]:
         """Place (D, P) of each cell in the flattened array, in order, and `along` in this order."""
-        count = strip.shape[1]
-        row = np.arange(len(strip))[:, None] * count
-        packed = strip.astype(np.int64)
-        packed <<= self.place_bits + self.index_bits
-        packed |= self.step
-        packed.sort(axis=1)
-        slot: NDArray[np.intp] = packed & ((1 << self.index_bits) - 1)
-        slot += row
+        narrow = strip.astype(np.uint16) if strip.max() <= np.iinfo(np.uint16).max else strip
+        slot = _sorted_by(narrow, self.slot)
         place = self.along.take(slot)
-        one_step = (packed[:, 1:] ^ packed[:, :-1]) < (1 << self.index_bits)
-        if (one_step & (place[:, 1:] < place[:, :-1])).any():
-            slot = np.lexsort((self.along, strip)) + row
-            place = self.along.take(slot)
+        # Places within one step may still be in the wrong order; those of a strip before the next are not.
+        wrong = place[:, 1:] < place[:, :-1]
+        if wrong.any():
+            in_order = narrow.take(slot)
+            if (wrong & (in_order[:, 1:] == in_order[:, :-1])).any():
+                slot = np.lexsort((self.along, strip)) + _row_starts(strip)
+                place = self.along.take(slot)
         return slot, place
+
+
+def _sorted_by(keys: NDArray[np.integer], slot: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Order `slot` (D, P), cells as places in the flattened array, by their keys (D, P), row by row."""
+    order = np.argsort(keys.take(slot), axis=1, kind="stable")
+    order += _row_starts(slot)
+    return slot.take(order)
+
+
+def _row_starts(values: NDArray[np.integer]) -> NDArray[np.intp]:
+    """Place (D, 1) of the first cell of each row of values (D, P) in the flattened array."""
+    return np.arange(len(values))[:, None] * values.shape[1]
 
 
 @dataclass(frozen=True, eq=False)
