@@ -29,7 +29,7 @@ def room_outlines(labels: NDArray[np.integer], resolution_m: float) -> list[Base
     along_row = _partners(room, row, column, second)
     # Where an outline touches itself, the edges on both sides of a cell of the room share a vertex.
     along_column = _partners(room, column, row, second ^ (code == NORTHEAST | SOUTHWEST))
-    order, length = _rings(along_row, along_column, row * (labels.shape[1] + 1) + column, code)
+    order, length = _rings(along_row, along_column, row * (labels.shape[1] + 1) + column, code, second)
     vertices = np.column_stack([column, row])[order] * resolution_m
     ring = np.repeat(np.arange(len(length)), length)
     return _polygons(
@@ -84,6 +84,7 @@ def _rings(
     along_column: NDArray[np.int64],
     place: NDArray[np.int64],
     code: NDArray[np.int64],
+    second: NDArray[np.int64],
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Follow edges along rows and columns in turn, the room on the left; cut rings that touch themselves.
 
@@ -97,6 +98,8 @@ def _rings(
     at, is_outer = place.tolist(), (code & SOUTHEAST > 0).tolist()
     beside, below = along_row.tolist(), along_column.tolist()
     is_left = [True] * len(beside)
+    # Most places have one vertex of a room: a ring can touch itself at the others only.
+    once = ((second | np.append(second[1:], 0)) == 0).tolist()
     order: list[int] = []
     length = []
     for start in range(len(beside)):
@@ -111,6 +114,9 @@ def _rings(
             other = first[vertex]
             is_left[vertex] = is_left[other] = False
             for reached in (vertex, other):
+                if once[reached]:
+                    ring.append(reached)
+                    continue
                 back = position.setdefault(at[reached], len(ring))
                 if back == len(ring):
                     ring.append(reached)
@@ -119,7 +125,7 @@ def _rings(
                     order += cut
                     length.append(len(cut))
                     for dropped in ring[back + 1 :]:
-                        del position[at[dropped]]
+                        position.pop(at[dropped], None)
                     del ring[back + 1 :]
             vertex = then[other]
         order += ring

@@ -15,6 +15,8 @@ from rose2_logs.segmentation.floor_plan.faces import SNAP_M
 
 LINE_SEARCH_M = 4 * SNAP_M
 """Noding moves an edge off its line by less than this."""
+TINY_M2 = 1e-24
+"""Numerical: a segment of no length has its ends alone."""
 WALL, FREE = 1, 2
 """Bits of the image that tells both."""
 Number = TypeVar("Number", bound=np.generic)
@@ -245,15 +247,16 @@ class _Image(Generic[Number]):
         index = self._padded(y_m, self._rows)
         index *= self._columns + 2
         index += self._padded(x_m, self._columns)
-        return self._values.take(index.astype(np.intp))
+        return self._values.take(index)
 
-    def _padded(self, place_m: FloatArray, count: int) -> FloatArray:
+    def _padded(self, place_m: FloatArray, count: int) -> NDArray[np.int32]:
         """Number of the cell in the padded image; all that lies beside the image is in its margin."""
         cell = place_m / self._resolution_m
         np.floor(cell, out=cell)
-        cell += 1
-        np.maximum(cell, 0, out=cell)
-        return np.minimum(cell, count + 1, out=cell)
+        np.clip(cell, -1, count, out=cell)
+        padded = cell.astype(np.int32)
+        padded += 1
+        return padded
 
 
 def _place_edges(edges_m: FloatArray, lines_m: FloatArray) -> tuple[NDArray[np.intp], FloatArray, FloatArray]:
@@ -263,8 +266,7 @@ def _place_edges(edges_m: FloatArray, lines_m: FloatArray) -> tuple[NDArray[np.i
     middle = shapely.points((edges_m[:, :2] + edges_m[:, 2:]) / 2)
     edge, line = tree.query(middle, predicate="dwithin", distance=LINE_SEARCH_M)
     # Where lines cross at a point, the edge's own line is the one that both its ends lie on.
-    ends = [shapely.points(edges_m[edge, k : k + 2]) for k in (0, 2)]
-    misfit = np.maximum(*[shapely.distance(end, tree.geometries[line]) for end in ends])
+    misfit = np.maximum(*(_from_segments(edges_m[edge, k : k + 2], lines_m[line]) for k in (0, 2)))
     good = misfit <= LINE_SEARCH_M
     edge, line, misfit = edge[good], line[good], misfit[good]
     order = np.lexsort((line, misfit, edge))[::-1]
@@ -275,3 +277,14 @@ def _place_edges(edges_m: FloatArray, lines_m: FloatArray) -> tuple[NDArray[np.i
     length = shapely.length(tree.geometries[owner])
     start, end = np.minimum(*along), np.maximum(*along)
     return owner, np.clip(start, 0, length), np.clip(end, 0, length)
+
+
+def _from_segments(points: FloatArray, segments_m: FloatArray) -> FloatArray:
+    """Distance (N,) of points (N, 2) from segments (N, 4), each from its own, as GEOS tells it of objects."""
+    (x, y), (x0, y0, x1, y1) = points.T, segments_m.T
+    along_x, along_y = x1 - x0, y1 - y0
+    square = np.maximum(along_x**2 + along_y**2, TINY_M2)
+    share = ((x - x0) * along_x + (y - y0) * along_y) / square
+    beside: FloatArray = np.abs((y0 - y) * along_x - (x0 - x) * along_y) / square * np.sqrt(square)
+    beyond = [np.sqrt((x - end_x) ** 2 + (y - end_y) ** 2) for end_x, end_y in ((x0, y0), (x1, y1))]
+    return np.where(share <= 0, beyond[0], np.where(share >= 1, beyond[1], beside))

@@ -103,12 +103,15 @@ def detect_segments(
     rows = [np.zeros((0, 5))]
     for part, cells in among.sorted_parts():
         own = chosen & (best == np.arange(len(among.directions_rad))[part, None])
+        if not own.any():
+            continue
+        on_segments = np.zeros(own.size, bool)
         for runs in cells.runs(own, min_length_m, parameters):
             keep = runs.covered
             direction, strip, offset = cells.lines(runs)
             rows.append(np.column_stack([direction + part.start, strip, offset, runs.start, runs.end])[keep])
-            on_segment = runs.slot.compress(keep.take(runs.of_cell))
-            members.reshape(-1)[among.index.take(on_segment % count)] = True
+            on_segments[runs.slot.compress(keep.take(runs.of_cell))] = True
+        members.reshape(-1)[among.index.compress(on_segments.reshape(own.shape).any(0))] = True
     found = np.concatenate(rows)
     direction, _, offset, start, end = found[np.lexsort((found[:, 3], found[:, 1], found[:, 0]))].T
     return Segments(among.directions_rad, direction.astype(np.int32), offset, start, end), members
