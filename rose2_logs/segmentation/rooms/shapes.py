@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from rose2_logs.config.parameters import FloorPlanParameters
-from rose2_logs.model.labels import Label, distinct_labels, label_sizes, labels_near, narrow
+from rose2_logs.model.labels import Label, LabelRuns, distinct_labels, label_sizes, labels_near, narrow
 from rose2_logs.model.occupancy import BoolArray
 from rose2_logs.model.outlines import room_outlines
 from rose2_logs.segmentation.floor_plan.stage import FloorPlanResult
@@ -161,7 +161,7 @@ def predicted_cells(
     np.copyto(cells, claim, where=beside)
     part = _parts(cells, cells > 0)
     was_seen = np.zeros(part.max() + 1, bool)
-    was_seen[part.take(np.flatnonzero(seen > 0))] = True
+    was_seen[LabelRuns.of(part * (seen > 0)).label] = True
     predicted = np.flatnonzero((cells > 0) & (seen == 0))
     cells.reshape(-1)[predicted.compress(~was_seen.take(part.take(predicted)))] = 0
     _fill_small_holes(cells, resolution_m, parameters.shape_fill_max_m2)
