@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, TypeVar
@@ -250,6 +251,43 @@ class Pieces:
         mask = np.zeros(shape, bool)
         mask.reshape(-1)[self.cell.compress(chosen.take(self.number))] = True
         return mask
+
+
+def equal_pieces(mask: BoolArray, *images: NDArray[Any]) -> NDArray[np.int32]:
+    """Number the pieces (H, W) of a mask that hang together by sides and in which some images are the same.
+
+    They are numbered from 1 by their first cells in reading order; beside the mask there is 0. What is joined
+    are the runs of equal cells within rows: there are few of them, and many cells.
+    """
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    height, width = mask.shape
+    flats = [image.ravel() for image in (mask, *images)]
+    is_first = np.zeros(mask.size, bool)
+    is_first[::width] = True
+    for flat in flats:
+        is_first[1:] |= flat[1:] != flat[:-1]
+    is_first &= flats[0]
+    # What is beside the mask are runs, too, which nothing is joined to.
+    is_first[1:] |= flats[0][:-1] & ~flats[0][1:]
+    is_first[0] = True
+    start = np.flatnonzero(is_first)
+    cells = np.diff(start, append=mask.size)
+    run = np.repeat(np.arange(len(start), dtype=np.int32), cells)
+    # Where two runs lie one above the other, the one or the other of them begins.
+    begin = start.compress(flats[0].take(start))
+    below, above = begin.compress(begin >= width), begin.compress(begin < (height - 1) * width)
+    upper, lower = np.concatenate([below - width, above]), np.concatenate([below, above + width])
+    same = functools.reduce(np.logical_and, (flat.take(upper) == flat.take(lower) for flat in flats))
+    ends = run.take(upper.compress(same)), run.take(lower.compress(same))
+    links = coo_matrix((np.ones(len(ends[0]), np.int8), ends), shape=(len(start), len(start)))
+    # SciPy numbers pieces by their first runs.
+    piece = connected_components(links, directed=False)[1]
+    counts = np.zeros(int(piece.max(initial=-1)) + 1, bool)
+    counts[piece.take(run.take(begin))] = True
+    number = (np.cumsum(counts) * counts).astype(np.int32)
+    return np.repeat(number.take(piece), cells).reshape(mask.shape)
 
 
 @dataclass(frozen=True, eq=False)

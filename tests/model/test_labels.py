@@ -9,11 +9,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 from scipy import ndimage
+from skimage import measure
 
 from rose2_logs.model.labels import (
     LabelRuns,
     contacts,
     distinct_labels,
+    equal_pieces,
     label_sizes,
     labels_near,
     narrow,
@@ -138,3 +140,15 @@ def test_narrow_labels_have_room_for_one_more(highest, kind):
     labels = np.array([[0, highest]], np.int32)
     assert narrow(labels).dtype == kind
     assert np.array_equal(narrow(labels), labels)
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 9), st.integers(1, 9))
+def test_equal_pieces_are_those_of_each_pair_of_values(seed, height, width):
+    """Any two images: their pieces are those of an image that tells both, and numbered alike."""
+    draw = np.random.default_rng(seed)
+    mask = draw.random((height, width)) < 0.8
+    one, other = draw.integers(0, 2, (2, height, width), np.int32)
+    expected = measure.label(np.where(mask, 1 + one + 2 * other, 0), connectivity=1, background=0)
+    found = equal_pieces(mask, one, other)
+    assert found.dtype == np.int32
+    assert found.tolist() == expected.tolist()

@@ -6,11 +6,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
-from skimage.measure import label
 from skimage.segmentation import watershed
 
 from rose2_logs.config.regions import RegionParameters
-from rose2_logs.model.labels import contacts, distance_from, label_sizes
+from rose2_logs.model.labels import contacts, distance_from, equal_pieces, label_sizes
 from rose2_logs.model.occupancy import BoolArray
 from rose2_logs.segmentation.regions.plan_frame import Labels, PlanFrame, grown_labels
 
@@ -54,12 +53,7 @@ def cut_atoms(
         clearance_basins(open_cells & ~solid, solid, frame.cell_m, parameters), BASIN_REACH_M / frame.cell_m
     )
     basin = frame.back(basins, (free.shape[0], free.shape[1]))
-    key = faces.astype(np.int64)
-    key *= int(basin.max(initial=0)) + 1
-    key += basin
-    key += 1
-    key *= free
-    pieces = label(key, connectivity=1, background=0).astype(np.int32)  # type: ignore[no-untyped-call]
+    pieces = equal_pieces(free, faces, basin)
     return absorb_small(pieces, parameters.atom_min_m2 / resolution_m**2)
 
 
