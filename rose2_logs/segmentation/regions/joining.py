@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -47,12 +47,20 @@ class Joins:
     count: int
     pairs: NDArray[np.int64]
     strength: FloatArray
+    _known: dict[float, NDArray[np.int64]] = field(default_factory=dict)
 
     def regions(self, least: float) -> NDArray[np.int64]:
         """Region 0.. of each atom when only joins of at least that strength are made.
 
         A join counts only where those below it in the tree, of either region, were made.
         """
+        # Whatever is asked for below the weakest join, all are made.
+        asked = max(least, float(self.strength.min(initial=least)))
+        if asked not in self._known:
+            self._known[asked] = self._regions(least)
+        return self._known[asked]
+
+    def _regions(self, least: float) -> NDArray[np.int64]:
         above = list(range(self.count))
         """A step towards the root of the whole tree."""
         parent = list(range(self.count))
@@ -72,7 +80,10 @@ class Joins:
             whole[one] = made
             if made:
                 parent[root(parent, b)] = root(parent, a)
-        return np.unique([root(parent, n) for n in range(self.count)], return_inverse=True)[1]
+        region = np.array(parent, np.int64)
+        while not np.array_equal(further := region[region], region):
+            region = further
+        return np.unique(region, return_inverse=True)[1]
 
     def then(self, later: Joins) -> Joins:
         """Add joins of the regions that all of these give."""
