@@ -47,8 +47,8 @@ def structure_score(
     row, column = np.divmod(np.flatnonzero(occupied), occupied.shape[1])
     best = np.zeros(len(row), np.float32)
     for direction in directions_rad:
-        blurred = spectrum.blurred_along(direction, parameters.structure_length_m / 4, occupied.shape)
-        np.maximum(best, blurred[row, column], out=best)
+        blurred = spectrum.blurred_along(direction, parameters.structure_length_m / 4, row, column)
+        np.maximum(best, blurred, out=best)
     np.minimum(best, 1, out=best)
     best *= np.float32(SCORE_STEPS)
     np.rint(best, out=best)

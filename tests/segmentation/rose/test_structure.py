@@ -125,5 +125,6 @@ def test_a_ridge_alone_gives_what_the_whole_plane_with_its_gain_gives(direction_
     along = spectrum.frequency_x * np.cos(direction) + spectrum.frequency_y * np.sin(direction)
     gain = np.exp(-2 * (np.pi * sigma_m * along.astype(float)) ** 2)
     expected = np.fft.irfft2(spectrum.values * gain, spectrum.shape)[:90, :140]
-    blurred = spectrum.blurred_along(direction, sigma_m, occupied.shape)
-    assert np.abs(blurred - expected).max() < 1e-5
+    row, column = (index.ravel() for index in np.indices(occupied.shape))
+    blurred = spectrum.blurred_along(direction, sigma_m, row, column)
+    assert np.abs(blurred - expected.ravel()).max() < 1e-5
