@@ -199,8 +199,8 @@ def labels_near(labels: NDArray[Label], cells: NDArray[np.intp], reach_cells: fl
         (labels == 0).view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
     )
     # OpenCV numbers the cells that have a label in reading order, from 1 on.
-    label = labels.take(np.flatnonzero(labels > 0))
-    near: NDArray[Label] = label.take(nearest.take(cells) - 1)
+    labeled = np.flatnonzero(labels > 0)
+    near: NDArray[Label] = labels.take(labeled.take(nearest.take(cells) - 1))
     near[distance.take(cells) > reach_cells] = 0
     return near
 

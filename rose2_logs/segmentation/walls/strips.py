@@ -178,10 +178,9 @@ class _Order:
         step *= PLACE_STEPS / (float(np.ptp(along)) + 1.0)
         digits = step.astype(np.uint32).view(np.uint16).reshape(*along.shape, 2)
         high, low = (1, 0) if sys.byteorder == "little" else (0, 1)
-        slot = np.arange(along.size).reshape(along.shape)
-        for digit in (low, high):
-            slot = _sorted_by(np.ascontiguousarray(digits[..., digit]), slot)
-        return cls(along, slot)
+        slot = np.argsort(digits[..., low], axis=1, kind="stable")
+        slot += _row_starts(slot)
+        return cls(along, _sorted_by(np.ascontiguousarray(digits[..., high]), slot))
 
     def by_strip(self, strip: NDArray[np.int32]) -> tuple[NDArray[np.intp], FloatArray]:
         """Place (D, P) of each cell in the flattened array, in order, and `along` in this order."""
