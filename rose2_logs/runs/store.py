@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -12,6 +13,8 @@ import numpy as np
 
 from rose2_logs.config.kinds import KindParameters
 from rose2_logs.config.parameters import OccupancyParameters
+from rose2_logs.model.per_shape import PerShape
+from rose2_logs.model.room_kinds import guess_kinds
 from rose2_logs.runs import tables
 from rose2_logs.runs.history import RunHistory, RunSummary
 from rose2_logs.runs.parquet_table import ParquetTable, Row
@@ -62,6 +65,7 @@ class RunStore:
         self._folder = folder
         self._parameters = parameters
         self._kinds = kinds or KindParameters()
+        self._kinds_of_rooms = PerShape(partial(guess_kinds, parameters=self._kinds))
         self._names = (*TABLES, BACK_PROJECTED) if back_project else TABLES
         self._stack = ExitStack()
         self._tables: dict[str, ParquetTable] = {}
@@ -87,7 +91,7 @@ class RunStore:
         key = snapshot_key(step)
         rows: dict[str, list[Row]] = {
             ALONG: [tables.snapshot_row(step, history.snapshot_refs[step.snapshot.index])],
-            "rooms": tables.room_rows(step, self._kinds),
+            "rooms": tables.room_rows(step, self._kinds_of_rooms),
             "events": tables.event_rows(step),
             "doorways": tables.doorway_rows(step),
             "borders": tables.border_rows(step),

@@ -15,6 +15,7 @@ from rose2_logs.config.parameters import OccupancyParameters
 from rose2_logs.model.analysis import Walls
 from rose2_logs.model.labels import known_window
 from rose2_logs.model.occupancy import UNKNOWN, FloatArray, classify
+from rose2_logs.model.per_shape import PerShape
 from rose2_logs.model.room_kinds import guess_kinds
 from rose2_logs.runs.parquet_table import Columns, Row
 from rose2_logs.tracking.back_projection import BackProjectedSnapshot
@@ -86,14 +87,14 @@ def snapshot_row(step: TrackedSnapshot, ref: SnapshotRef) -> Row:
     }
 
 
-def room_rows(step: TrackedSnapshot, kinds: KindParameters) -> list[Row]:
-    """Give a row per room, by track."""
+def room_rows(step: TrackedSnapshot, kinds: PerShape[str]) -> list[Row]:
+    """Give a row per room, by track; the guess of kinds is told shape by shape."""
     rooms, tracks = step.analysis.rooms, step.track_ids
     rows = []
     of_rooms = zip(
         tracks,
         rooms.label_points_m.tolist(),
-        guess_kinds(rooms.polygons, kinds),
+        kinds(rooms.polygons),
         rooms.areas_m2.tolist(),
         rooms.predicted_areas_m2.tolist(),
         shapely.is_empty(rooms.polygons),

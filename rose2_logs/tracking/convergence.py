@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from rose2_logs.config.tracking import TrackingParameters
 from rose2_logs.model.occupancy import FloatArray
+from rose2_logs.model.per_shape import PerShape
 from rose2_logs.system.workers import threaded_map
 from rose2_logs.tracking.overlap import share_of
 from rose2_logs.tracking.registration import RigidMotion
@@ -265,6 +266,7 @@ class _LastLayout:
         self._drifts = drifts
         self._last = None if histories.last is None else histories.last.snapshot
         self._room_min_iou = room_min_iou
+        self._common_of_rooms = PerShape(self._common)
 
     @property
     def likeness_of_nothing(self) -> _Likeness:
@@ -277,6 +279,10 @@ class _LastLayout:
         assert self._last is not None  # at the latest, it is this map
         drift = self._drifts[int(rows.snapshot[0])], self._drifts[self._last]
         rooms = _placed(rows.polygons, [drift] * len(rows.polygons))
+        return _Placed(shapely.area(rooms), self._areas, np.stack(self._common_of_rooms(rooms)))
+
+    def _common(self, rooms: NDArray[np.object_]) -> list[FloatArray]:
+        """What each of some shapes has in common with each room of the last map (F,)."""
         shapely.prepare(rooms)
         room, last = self._tree.query(rooms, predicate="intersects")
         # Many are neighbors, which is found much faster than what shapes have in common.
@@ -284,7 +290,7 @@ class _LastLayout:
         room, last = room[shares_area], last[shares_area]
         common = np.zeros((len(rooms), len(self._rooms)))
         common[room, last] = shapely.area(shapely.intersection(rooms[room], self._rooms[last]))
-        return _Placed(shapely.area(rooms), self._areas, common)
+        return list(common)
 
     def likeness(self, placed: _Placed) -> _Likeness:
         """Compare the rooms of one map."""

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from rose2_logs.config.parameters import OccupancyParameters
 from rose2_logs.drawing.palette import track_color
 from rose2_logs.model.occupancy import UNKNOWN, FloatArray, classify
+from rose2_logs.model.per_shape import PerShape
 from rose2_logs.model.room_quality import unsure_sign
 from rose2_logs.outputs.mcap.cdr import CdrWriter
 from rose2_logs.tracking.track_history import quality_of
@@ -398,18 +399,14 @@ class Triangles:
     """
 
     def __init__(self) -> None:
-        self._known: dict[bytes, FloatArray] = {}
+        self._of_parts = PerShape(_triangulated)
 
     def corners_of(self, shapes: Sequence[BaseGeometry]) -> list[FloatArray]:
         """Corners (3 K, 2) of the triangles of each shape, world meters."""
         parts, shape = shapely.get_parts(np.array(shapes, object), return_index=True)
-        keys = shapely.to_wkb(parts).tolist()
-        new = {key: number for number, key in enumerate(keys) if key not in self._known}
-        found = self._known | dict(zip(new, _triangulated(parts[list(new.values())]), strict=True))
-        self._known = {key: found[key] for key in keys}
         corners: list[list[FloatArray]] = [[np.zeros((0, 2))] for _ in shapes]
-        for number, key in zip(shape.tolist(), keys, strict=True):
-            corners[number].append(found[key])
+        for number, of_part in zip(shape.tolist(), self._of_parts(parts), strict=True):
+            corners[number].append(of_part)
         return [np.concatenate(each) for each in corners]
 
 
