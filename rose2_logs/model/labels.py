@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rose2_logs.model.occupancy import BoolArray, Scalar
+from rose2_logs.model.regions import connected
 
 Label = TypeVar("Label", bound=np.integer)
 
@@ -259,9 +260,6 @@ def equal_pieces(mask: BoolArray, *images: NDArray[Any]) -> NDArray[np.int32]:
     They are numbered from 1 by their first cells in reading order; beside the mask there is 0. What is joined
     are the runs of equal cells within rows: there are few of them, and many cells.
     """
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     height, width = mask.shape
     flats = [image.ravel() for image in (mask, *images)]
     is_first = np.zeros(mask.size, bool)
@@ -281,10 +279,8 @@ def equal_pieces(mask: BoolArray, *images: NDArray[Any]) -> NDArray[np.int32]:
     upper, lower = np.concatenate([below - width, above]), np.concatenate([below, above + width])
     same = functools.reduce(np.logical_and, (flat.take(upper) == flat.take(lower) for flat in flats))
     ends = run.take(upper.compress(same)), run.take(lower.compress(same))
-    links = coo_matrix((np.ones(len(ends[0]), np.int8), ends), shape=(len(start), len(start)))
-    # SciPy numbers pieces by their first runs.
-    piece = connected_components(links, directed=False)[1]
-    counts = np.zeros(int(piece.max(initial=-1)) + 1, bool)
+    pieces, piece = connected(len(start), *ends)
+    counts = np.zeros(pieces, bool)
     counts[piece.take(run.take(begin))] = True
     number = (np.cumsum(counts) * counts).astype(np.int32)
     return np.repeat(number.take(piece), cells).reshape(mask.shape)

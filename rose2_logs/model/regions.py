@@ -19,6 +19,42 @@ class _Ordered(Protocol):
 Item = TypeVar("Item", bound=_Ordered)
 
 
+def connected(
+    count: int, one: NDArray[np.integer], other: NDArray[np.integer]
+) -> tuple[int, NDArray[np.int32]]:
+    """Find what hangs together, as SciPy's ``connected_components``, which first makes a matrix of it.
+
+    Each thing takes the lowest number that any of its pairs has, and then what that one has taken, until all
+    that hang together have one.
+
+    Parameters
+    ----------
+    count : int
+        Number of things.
+    one, other : (K,) int
+        Pairs that hang together.
+
+    Returns
+    -------
+    groups : int
+    group : (count,) int32
+        Of each thing: 0.., by their first things.
+    """
+    lowest = np.arange(count)
+    while True:
+        ends = lowest.take(one), lowest.take(other)
+        apart = np.flatnonzero(ends[0] != ends[1])
+        if len(apart) == 0:
+            break
+        one, other = one.take(apart), other.take(apart)
+        low, high = np.minimum(*ends).take(apart), np.maximum(*ends).take(apart)
+        np.minimum.at(lowest, high, low)
+        while not np.array_equal(above := lowest.take(lowest), lowest):
+            lowest = above
+    number = np.cumsum(lowest == np.arange(count), dtype=np.int32) - 1
+    return int(number.max(initial=-1)) + 1, number.take(lowest)
+
+
 class RegionGraph(Generic[Border]):
     """Regions 0..N - 1 and the borders between neighbors, while regions are joined.
 

@@ -4,7 +4,28 @@ from __future__ import annotations
 
 import operator
 
-from rose2_logs.model.regions import RegionGraph, best_first
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from rose2_logs.model.regions import RegionGraph, best_first, connected
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(0, 40), st.integers(0, 60))
+def test_what_hangs_together_is_what_scipy_finds(seed, count, pairs):
+    """Any pairs, also twice and with themselves."""
+    one, other = np.random.default_rng(seed).integers(0, max(count, 1), (2, pairs if count else 0))
+    graph = coo_matrix((np.ones(len(one)), (one, other)), shape=(count, count))
+    expected = connected_components(graph, directed=False) if count else (0, np.zeros(0, np.int32))
+    groups, group = connected(count, one, other)
+    assert (groups, group.tolist()) == (expected[0], expected[1].tolist())
+
+
+def test_a_long_chain_hangs_together_in_whatever_order_it_comes():
+    order = np.random.default_rng(1).permutation(5000)
+    assert connected(5000, order[:-1], order[1:])[0] == 1
 
 
 def test_borders_of_a_joined_region_go_to_its_target():

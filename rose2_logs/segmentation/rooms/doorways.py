@@ -7,14 +7,13 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from rose2_logs.config.parameters import TopologyParameters
 from rose2_logs.model.borders import Border
 from rose2_logs.model.labels import contacts, narrow
 from rose2_logs.model.occupancy import FloatArray
+from rose2_logs.model.regions import connected
 from rose2_logs.model.rooms import Doorway
 
 ROUNDING_M = 1e-9
@@ -50,8 +49,7 @@ def find_doorways(
     pairs, pair = meet.pairs()
     near = cKDTree(points).query_pairs(parameters.doorway_gap_cells, output_type="ndarray")
     near = near[pair[near[:, 0]] == pair[near[:, 1]]]
-    graph = coo_matrix((np.ones(len(near), bool), near.T), shape=(len(points), len(points)))
-    count, component = connected_components(graph, directed=False)
+    count, component = connected(len(points), *near.T)
     order = np.argsort(component, kind="stable")
     bounds = np.searchsorted(component[order], np.arange(count + 1))
     doorways = []

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from rose2_logs.config.parameters import WallParameters
 from rose2_logs.model.occupancy import FloatArray
+from rose2_logs.model.regions import connected
 from rose2_logs.segmentation.walls.segments import Segments
 
 
@@ -69,8 +68,8 @@ def group_segments(segments: Segments, parameters: WallParameters) -> tuple[int,
     """Number the clusters of segments of one direction that are close to each other, as DBSCAN finds them.
 
     With min_samples of 1 no segment is noise, and the clusters of DBSCAN are the connected components of the
-    segments nearer than 1 to each other. SciPy finds these. Importing DBSCAN from scikit-learn would take a
-    second in every process, several times as long as a usual map.
+    segments nearer than 1 to each other. Importing DBSCAN from scikit-learn would take a second in every
+    process, several times as long as a usual map.
 
     Distance is lateral offset over `cluster_lateral_m` or gap along the wall over `cluster_gap_m`, the larger
     of the two.
@@ -84,9 +83,7 @@ def group_segments(segments: Segments, parameters: WallParameters) -> tuple[int,
     """
     count = len(segments.offset)
     one, other = _near_intervals(segments, parameters)
-    near = coo_matrix((np.ones(len(one), bool), (one, other)), shape=(count, count))
-    clusters, of_segment = connected_components(near, directed=False)
-    return int(clusters), of_segment
+    return connected(count, one, other)
 
 
 def _near_intervals(
