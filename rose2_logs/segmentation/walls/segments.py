@@ -83,6 +83,7 @@ def detect_segments(
     chosen = clean.take(among.index)
     count = len(chosen)
     longest, best = np.zeros(count), np.zeros(count, np.int32)
+    least_better = longest + among.resolution_m / 2
     # What is shorter than this decides nothing: each direction moves the longest run by half a cell at most
     # without taking its place.
     least_m = min_length_m - (len(among.directions_rad) + 1) * among.resolution_m / 2
@@ -90,14 +91,12 @@ def detect_segments(
         directions = range(len(among.directions_rad))[part]
         reached = np.zeros(len(directions) * count)
         for runs in cells.runs(np.tile(chosen, len(directions)), least_m, parameters):
-            length = np.where(runs.covered, runs.end - runs.start, 0.0)
-            of_slot = np.zeros(len(reached))
-            of_slot[runs.slot] = length.take(runs.of_cell)
-            np.maximum(reached, of_slot, out=reached)
+            length = np.where(runs.covered, runs.end - runs.start, 0.0).take(runs.of_cell)
+            reached[runs.slot] = np.maximum(reached.take(runs.slot), length)
         for number, reach in zip(directions, reached.reshape(len(directions), count), strict=True):
-            better = reach > longest + among.resolution_m / 2
-            np.copyto(best, np.int32(number), where=better)
-            np.copyto(longest, reach, where=better)
+            better = np.flatnonzero(reach > least_better)
+            best[better], longest[better] = number, reach.take(better)
+            least_better[better] = longest.take(better) + among.resolution_m / 2
     chosen &= longest >= min_length_m
     members = np.zeros(clean.shape, bool)
     rows = [np.zeros((0, 5))]
