@@ -21,10 +21,10 @@ COUNTED_AT_ONCE = 2**16
 
 def known_window(known: BoolArray) -> tuple[slice, slice]:
     """Rows and columns of the smallest part of a mask that holds all of it; the first cell if it is empty."""
-    rows, columns = np.flatnonzero(known.any(1)), np.flatnonzero(known.any(0))
-    if len(rows) == 0:
-        return slice(0, 1), slice(0, 1)
-    return slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)
+    import cv2
+
+    left, top, width, height = cv2.boundingRect(np.ascontiguousarray(known).view(np.uint8))
+    return slice(top, top + max(height, 1)), slice(left, left + max(width, 1))
 
 
 def row_ends(mask: BoolArray) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:

@@ -136,7 +136,8 @@ class RoomMap:
                 inside = np.equal(self.labels[window], number + 1).view(np.uint8)
                 framed = cv2.copyMakeBorder(inside, 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=0)
                 depth = cv2.distanceTransform(framed, cv2.DIST_L2, cv2.DIST_MASK_3)[1:-1, 1:-1]
-                row, column = np.nonzero(depth >= LABEL_DEPTH_SHARE * depth.max())
+                deep = np.flatnonzero(depth >= LABEL_DEPTH_SHARE * depth.max())
+                row, column = np.divmod(deep, depth.shape[1])
                 sums = cv2.moments(inside, binaryImage=True)
                 down, right = sums["m01"] / sums["m00"], sums["m10"] / sums["m00"]
                 middle = np.argmin((row - down) ** 2 + (column - right) ** 2)

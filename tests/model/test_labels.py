@@ -16,6 +16,7 @@ from rose2_logs.model.labels import (
     contacts,
     distinct_labels,
     equal_pieces,
+    known_window,
     label_sizes,
     labels_near,
     narrow,
@@ -152,3 +153,15 @@ def test_equal_pieces_are_those_of_each_pair_of_values(seed, height, width):
     found = equal_pieces(mask, one, other)
     assert found.dtype == np.int32
     assert found.tolist() == expected.tolist()
+
+
+@given(arrays.arrays(bool, st.tuples(st.integers(1, 9), st.integers(1, 9))))
+def test_the_known_window_is_the_smallest_that_holds_all_of_a_mask(mask):
+    rows, columns = known_window(mask)
+    if mask.any():
+        assert np.count_nonzero(mask[rows, columns]) == np.count_nonzero(mask)
+        assert all(
+            side.any() for part in (mask[rows, columns], mask[rows, columns].T) for side in part[[0, -1]]
+        )
+    else:
+        assert (rows, columns) == (slice(0, 1), slice(0, 1))
