@@ -141,7 +141,8 @@ def _face_cells(free: BoolArray, occupied: BoolArray) -> tuple[NDArray[np.intp],
     """Row and column (N,) of the occupied cells that share a side with a free one."""
     import cv2
 
-    is_face = cv2.dilate(free.astype(np.uint8), SIDES) > 0
+    framed = np.pad(free.astype(np.uint8), 1)  # OpenCV takes no empty image
+    is_face = cv2.dilate(framed, SIDES)[1:-1, 1:-1] > 0
     is_face &= occupied
     row, column = np.divmod(np.flatnonzero(is_face), occupied.shape[1])
     return row, column

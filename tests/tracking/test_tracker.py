@@ -14,6 +14,7 @@ from moved_maps import motion_about, moved
 
 from rose2_logs.config.tracking import TrackingParameters
 from rose2_logs.model.rooms import RoomMap
+from rose2_logs.segmentation.pipeline import analyze
 from rose2_logs.tracking.tracked_snapshot import MAP_TRACK
 from rose2_logs.tracking.tracker import RoomTracker
 
@@ -161,6 +162,12 @@ def test_maps_without_rooms_are_no_trouble():
     ids, events = run(rows("..."), rows("111"), rows("..."))
     assert ids == [(), (1,), ()]
     assert events == [[], [("born", 1, ())], [("lost", 1, ())]]
+
+
+@pytest.mark.parametrize("shape", [(0, 5), (5, 0), (0, 0)])
+def test_maps_without_cells_are_no_trouble(shape):
+    empty = snapshot(np.zeros(shape, np.int8))
+    assert RoomTracker().update(empty, analyze(empty)) == ((), ())
 
 
 @given(
