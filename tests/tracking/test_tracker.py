@@ -167,7 +167,7 @@ def test_maps_without_rooms_are_no_trouble():
 @pytest.mark.parametrize("shape", [(0, 5), (5, 0), (0, 0)])
 def test_maps_without_cells_are_no_trouble(shape):
     empty = snapshot(np.zeros(shape, np.int8))
-    assert RoomTracker().update(empty, analyze(empty)) == ((), ())
+    assert RoomTracker(TrackingParameters()).update(empty, analyze(empty)) == ((), ())
 
 
 @given(

@@ -74,10 +74,10 @@ class Spectrum:
         ridge = np.zeros((self.shape[0], columns), np.complex64)
         ridge[rows] = self.values[rows, :columns] * gain
         # One axis after the other, so that rows that are cut off are not transformed.
-        rows = int(row.max(initial=-1)) + 1
-        of_rows = fft.ifft(ridge, axis=0, overwrite_x=True)[:rows]
+        count = int(row.max(initial=-1)) + 1
+        of_rows = fft.ifft(ridge, axis=0, overwrite_x=True)[:count]
         values = np.empty(len(row), np.float32)
-        for begin in range(0, rows, ROWS_AT_ONCE):
+        for begin in range(0, count, ROWS_AT_ONCE):
             image = fft.irfft(of_rows[begin : begin + ROWS_AT_ONCE], self.shape[1], axis=1)
             part = slice(*np.searchsorted(row, [begin, begin + ROWS_AT_ONCE]))
             values[part] = image[row[part] - begin, column[part]]

@@ -206,7 +206,8 @@ def _sorted_by(keys: NDArray[np.integer], slot: NDArray[np.intp]) -> NDArray[np.
 
 def _row_starts(values: NDArray[np.integer]) -> NDArray[np.intp]:
     """Place (D, 1) of the first cell of each row of values (D, P) in the flattened array."""
-    return np.arange(len(values))[:, None] * values.shape[1]
+    starts: NDArray[np.intp] = np.arange(len(values))[:, None] * values.shape[1]
+    return starts
 
 
 @dataclass(frozen=True, eq=False)
