@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import shapely
 from numpy.typing import NDArray
@@ -134,12 +136,19 @@ def _rings(
 
 
 def _polygons(rings: NDArray[np.object_], room: NDArray[np.int64], count: int) -> list[BaseGeometry]:
-    """Polygons of the rings of each room: those around holes run clockwise."""
+    """Polygons of rings, which come room by room: those around holes run clockwise."""
     outer = shapely.is_ccw(rings)
+    all_shells, all_holes = shapely.polygons(rings[outer]), rings[~outer]
+    numbers = np.arange(1, count + 2)
+    ends_of_shells, ends_of_holes = (
+        np.searchsorted(room[each], numbers).tolist() for each in (outer, ~outer)
+    )
     shapes: list[BaseGeometry] = []
-    for number in range(1, count + 1):
-        mine = room == number
-        shells, holes = shapely.polygons(rings[mine & outer]), rings[mine & ~outer]
+    for of_shells, of_holes in zip(pairwise(ends_of_shells), pairwise(ends_of_holes), strict=True):
+        shells, holes = all_shells[slice(*of_shells)], all_holes[slice(*of_holes)]
+        if len(shells) == 1 and len(holes) == 0:  # as most rooms
+            shapes.append(shells[0])
+            continue
         if len(shells) > 1:
             shapely.prepare(shells)
             surround = shapely.covers(shells[:, None], holes[None])
