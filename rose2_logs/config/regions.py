@@ -94,6 +94,13 @@ class RegionParameters(ParameterBlock):
         -20,
         20,
     )
+    room_min_width_m: float = number(
+        0.6,
+        "m",
+        "What is nowhere this wide is no room: narrower than a door leaf, as rays through windows are, and "
+        "white beside outer walls. On maps left out 0.55 to 0.65 are equally good.",
+        0.0,
+    )
     outside_max_share: float = number(
         0.4,
         "share",

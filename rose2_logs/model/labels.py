@@ -180,6 +180,31 @@ def label_sizes(labels: NDArray[np.integer], count: int) -> NDArray[np.int64]:
     return sizes
 
 
+def greatest_widths(labels: NDArray[np.int32], count: int) -> NDArray[np.float32]:
+    """Greatest width (count,) of each label 1.., in cells: twice the distance of a cell from other labels.
+
+    It is at most a cell more than there is. What lies beyond the image has no label.
+
+    Parameters
+    ----------
+    labels : (H, W) int32
+        0 for none.
+    count : int
+        Greatest label.
+    """
+    padded = np.pad(labels, 1)
+    edge = labels == 0
+    for rows, columns in ((slice(0, -2), slice(1, -1)), (slice(2, None), slice(1, -1))):
+        edge |= padded[rows, columns] != labels
+        edge |= labels != padded.T[rows, columns].T
+    # Cells along the edge of a label are one from what lies beyond.
+    distance = distance_from(edge)
+    cells = np.flatnonzero(labels)
+    widest = np.zeros(count + 1, np.float32)
+    np.maximum.at(widest, labels.take(cells), 2 * (distance.take(cells) + 1))
+    return widest[1:]
+
+
 def labels_near(labels: NDArray[Label], cells: NDArray[np.intp], reach_cells: float) -> NDArray[Label]:
     """Label (N,) nearest to each of some cells of an image, 0 where none is within reach.
 

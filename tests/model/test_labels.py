@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import pytest
 from drawn_rooms import rows
@@ -16,6 +17,7 @@ from rose2_logs.model.labels import (
     contacts,
     distinct_labels,
     equal_pieces,
+    greatest_widths,
     known_window,
     label_sizes,
     labels_near,
@@ -165,3 +167,23 @@ def test_the_known_window_is_the_smallest_that_holds_all_of_a_mask(mask):
         )
     else:
         assert (rows, columns) == (slice(0, 1), slice(0, 1))
+
+
+def test_a_width_is_told_to_a_cell():
+    labels = np.zeros((40, 60), np.int32)
+    labels[0:9, 0:30] = 1  # along the edge of the image
+    labels[20:24, 5:50] = 2
+    labels[24:25, 5:50] = 3  # beside another label
+    labels[30:37, 10:12] = 4
+    widths = greatest_widths(labels, 5)
+    assert widths[:4] == pytest.approx([10, 4, 2, 2], abs=0.1)
+    assert widths[4] == 0
+
+
+def test_a_square_is_as_wide_however_it_is_turned():
+    side, widths = 20, []
+    for degrees in (0, 17, 45):
+        corners = cv2.boxPoints(((40, 40), (side, side), degrees)).round().astype(np.int32)
+        labels = cv2.fillConvexPoly(np.zeros((80, 80), np.int32), corners, 1)
+        widths.append(greatest_widths(labels, 1)[0])
+    assert widths == pytest.approx([side] * 3, abs=3)

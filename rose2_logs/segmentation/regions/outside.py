@@ -59,7 +59,11 @@ def surroundings(edge_share: FloatArray, area_m2: FloatArray, parameters: Region
 
 
 def outside_of(
-    graph: RegionGraph, edge_share: FloatArray, is_room: Strength, parameters: RegionParameters
+    graph: RegionGraph,
+    edge_share: FloatArray,
+    is_room: Strength,
+    parameters: RegionParameters,
+    width_m: FloatArray | None = None,
 ) -> BoolArray:
     """Which regions (N,) of a graph are outside.
 
@@ -72,10 +76,15 @@ def outside_of(
     is_room : callable
         Log odds (N,) of `region_features` (N, F).
     parameters : RegionParameters
+    width_m : (N,) float, optional
+        Greatest width of each region, see `greatest_widths`; regions too small for a room need none.
     """
     area = graph.node_sums[:, 0]
     around = surroundings(edge_share, area, parameters)
-    outside = ~around & (is_room(region_features(graph)) < parameters.room_min_log_odds)
+    no_room = is_room(region_features(graph)) < parameters.room_min_log_odds
+    if width_m is not None:
+        no_room |= (width_m < parameters.room_min_width_m) & (area >= parameters.room_min_area_m2)
+    outside = ~around & no_room
     # An answer by which hardly anything is left is not believed.
     if area[outside].sum() > parameters.outside_max_share * area[~around].sum():
         outside[:] = False

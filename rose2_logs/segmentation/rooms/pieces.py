@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rose2_logs.config.regions import RegionParameters
-from rose2_logs.model.labels import LabelRuns
+from rose2_logs.model.labels import LabelRuns, greatest_widths
 from rose2_logs.model.occupancy import BoolArray
 
 
@@ -31,8 +31,8 @@ def rooms_in_one_piece(
     resolution_m : float
         Side of a cell.
     parameters : RegionParameters
-        How wide a gap pieces hang together across, and what is within an object; pieces smaller than any room
-        stay with the largest one of theirs.
+        How wide a gap pieces hang together across, and what is within an object; pieces smaller or
+        narrower than any room stay with the largest one of theirs.
 
     Returns
     -------
@@ -54,7 +54,9 @@ def rooms_in_one_piece(
         if number <= 2:
             continue
         cells = np.bincount(components.take(np.flatnonzero(inside)), minlength=number)
-        large = np.flatnonzero(cells * resolution_m**2 >= parameters.room_min_area_m2)
+        widths_m = greatest_widths(np.where(inside, components, 0), number - 1) * resolution_m
+        wide = np.append(False, widths_m >= parameters.room_min_width_m)
+        large = np.flatnonzero((cells * resolution_m**2 >= parameters.room_min_area_m2) & wide)
         for other in large[large != cells.argmax()].tolist():
             piece = inside & (components == other)
             is_small = cells[other] * resolution_m**2 < parameters.object_max_m2

@@ -39,10 +39,11 @@ def lone_regions(*area_m2):
     )
 
 
-def rooms(area_m2, log_odds, edge_share=None):
+def rooms(area_m2, log_odds, edge_share=None, width_m=None):
     edge = np.zeros(len(area_m2)) if edge_share is None else np.array(edge_share)
     graph = lone_regions(*area_m2)
-    outside = outside_of(graph, edge, lambda _: np.array(log_odds), PARAMETERS)
+    widths = None if width_m is None else np.array(width_m)
+    outside = outside_of(graph, edge, lambda _: np.array(log_odds), PARAMETERS, widths)
     return room_numbers(graph, outside, PARAMETERS).tolist(), float(np.array(area_m2)[outside].sum())
 
 
@@ -60,6 +61,20 @@ def test_an_answer_by_which_hardly_anything_is_left_is_not_used(outside_m2, beli
     found, left_out_m2 = rooms([outside_m2, 10 - outside_m2], [-9.0, 9.0])
     assert found == ([0, 1] if believed else [1, 2])
     assert left_out_m2 == (outside_m2 if believed else 0.0)
+
+
+@pytest.mark.parametrize(("width_m", "room"), [(0.6, 2), (0.59, 0)])
+def test_what_is_nowhere_as_wide_as_a_door_leaf_is_no_room(width_m, room):
+    assert rooms([20.0, 5.0], [9.0, 9.0], width_m=[3.0, width_m]) == ([1, room], 0.0 if room else 5.0)
+
+
+def test_small_regions_may_be_narrow():
+    """They are given to rooms that they touch."""
+    assert rooms([20.0, 0.9], [9.0, 9.0], width_m=[3.0, 0.2]) == ([1, 0], 0.0)
+
+
+def test_where_all_is_narrow_all_are_rooms():
+    assert rooms([5.0, 5.0], [9.0, 9.0], width_m=[0.3, 0.3]) == ([1, 2], 0.0)
 
 
 def test_white_around_a_building_may_be_most_of_a_map():

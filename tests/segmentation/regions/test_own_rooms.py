@@ -70,6 +70,24 @@ def test_what_is_outside_stays_by_itself(closet):
     assert joins(closet, -9.0, outside=[False, False, True], small_room_max_m2=0.05) == ([], [])
 
 
+@pytest.mark.parametrize(
+    ("odds_of_closet", "joined"),
+    [(9.0, []), (-9.0, [[0, 1], [1, 2]])],
+    ids=["beside a room", "beside a pocket"],
+)
+def test_a_small_region_is_joined_to_another_only_where_that_is_no_room(odds_of_closet, joined):
+    """Closet 2 opens to room 1, and closet 3, which is smaller, to closet 2 alone."""
+    graph = drawn_graph(["111111######", "111111######", "111111222233", "111111222233", "111111######"])
+    found = small_region_joins(
+        graph,
+        np.zeros(len(graph.node_sums), bool),
+        by_contact,
+        lambda features: np.array([odds_of_closet, -9.0]),
+        replace(PARAMETERS, small_room_max_m2=0.1),
+    )
+    assert sorted(found.pairs.tolist()) == joined
+
+
 def test_half_of_all_floor_lies_in_regions_up_to_the_typical_area():
     assert typical_area(np.array([1.0, 1.0, 2.0, 10.0])) == 10.0
     assert typical_area(np.array([4.0, 4.0, 4.0])) == 4.0

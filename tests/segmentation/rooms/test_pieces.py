@@ -12,9 +12,9 @@ GAP_M, PIECE_M2 = 0.3, 1.0
 REGIONS = RegionParameters()
 
 
-def in_one_piece(labels, resolution_m, gap_m, piece_min_m2, occupied=None):
+def in_one_piece(labels, resolution_m, gap_m, piece_min_m2, occupied=None, width_m=0.0):
     occupied = np.zeros(labels.shape, bool) if occupied is None else occupied
-    parameters = replace(REGIONS, piece_gap_m=gap_m, room_min_area_m2=piece_min_m2)
+    parameters = replace(REGIONS, piece_gap_m=gap_m, room_min_area_m2=piece_min_m2, room_min_width_m=width_m)
     return rooms_in_one_piece(labels, occupied, resolution_m, parameters)
 
 
@@ -48,6 +48,13 @@ def test_pieces_across_a_wider_gap_than_noise_are_rooms_of_their_own(gap_cells, 
 def test_pieces_below_the_least_area_stay(columns, rooms):
     """Of 60 rows, 7 columns are 1.05 m2, 6 are 0.9 m2."""
     pieces, _ = in_one_piece(two_pieces(20, columns), 0.05, GAP_M, PIECE_M2)
+    assert pieces.max() == rooms
+
+
+@pytest.mark.parametrize(("columns", "rooms"), [(11, 3), (10, 2)])
+def test_pieces_that_are_nowhere_wide_enough_stay(columns, rooms):
+    """A width is told to a cell: 11 columns of 5 cm may be 0.6 m, 10 are less."""
+    pieces, _ = in_one_piece(two_pieces(20, columns), 0.05, GAP_M, PIECE_M2, width_m=0.6)
     assert pieces.max() == rooms
 
 
