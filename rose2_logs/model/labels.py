@@ -180,17 +180,22 @@ def label_sizes(labels: NDArray[np.integer], count: int) -> NDArray[np.int64]:
     return sizes
 
 
-def greatest_widths(labels: NDArray[np.int32], count: int) -> NDArray[np.float32]:
-    """Greatest width (count,) of each label 1.., in cells: twice the distance of a cell from other labels.
+def wide_labels(labels: NDArray[np.int32], count: int, least_cells: float) -> BoolArray:
+    """Whether each label 1.. is somewhere so wide: a disk of that width fits on its cells, or nearly so.
 
-    It is at most a cell more than there is. What lies beyond the image has no label.
+    A width is twice the distance of a cell from those of other labels: up to a cell more than there is.
 
     Parameters
     ----------
     labels : (H, W) int32
-        0 for none.
+        0 for none, as is what lies beyond the image.
     count : int
         Greatest label.
+    least_cells : float
+
+    Returns
+    -------
+    wide : (count,) bool
     """
     padded = np.pad(labels, 1)
     edge = labels == 0
@@ -198,11 +203,10 @@ def greatest_widths(labels: NDArray[np.int32], count: int) -> NDArray[np.float32
         edge |= padded[rows, columns] != labels
         edge |= labels != padded.T[rows, columns].T
     # Cells along the edge of a label are one from what lies beyond.
-    distance = distance_from(edge)
-    cells = np.flatnonzero(labels)
-    widest = np.zeros(count + 1, np.float32)
-    np.maximum.at(widest, labels.take(cells), 2 * (distance.take(cells) + 1))
-    return widest[1:]
+    deep = np.flatnonzero(distance_from(edge) >= least_cells / 2 - 1)
+    wide = np.zeros(count + 1, bool)
+    wide[labels.take(deep)] = True
+    return wide[1:]
 
 
 def labels_near(labels: NDArray[Label], cells: NDArray[np.intp], reach_cells: float) -> NDArray[Label]:

@@ -17,13 +17,13 @@ from rose2_logs.model.labels import (
     contacts,
     distinct_labels,
     equal_pieces,
-    greatest_widths,
     known_window,
     label_sizes,
     labels_near,
     narrow,
     numbered,
     straight_runs,
+    wide_labels,
 )
 
 
@@ -169,21 +169,26 @@ def test_the_known_window_is_the_smallest_that_holds_all_of_a_mask(mask):
         assert (rows, columns) == (slice(0, 1), slice(0, 1))
 
 
-def test_a_width_is_told_to_a_cell():
+@pytest.mark.parametrize(
+    ("least_cells", "wide"),
+    [(2, [True] * 4), (3, [True, True, False, False]), (5, [True] + [False] * 3), (11, [False] * 4)],
+)
+def test_labels_are_as_wide_as_drawn_but_for_a_cell(least_cells, wide):
     labels = np.zeros((40, 60), np.int32)
     labels[0:9, 0:30] = 1  # along the edge of the image
     labels[20:24, 5:50] = 2
     labels[24:25, 5:50] = 3  # beside another label
     labels[30:37, 10:12] = 4
-    widths = greatest_widths(labels, 5)
-    assert widths[:4] == pytest.approx([10, 4, 2, 2], abs=0.1)
-    assert widths[4] == 0
+    assert wide_labels(labels, 4, least_cells).tolist() == wide
 
 
-def test_a_square_is_as_wide_however_it_is_turned():
-    side, widths = 20, []
-    for degrees in (0, 17, 45):
-        corners = cv2.boxPoints(((40, 40), (side, side), degrees)).round().astype(np.int32)
-        labels = cv2.fillConvexPoly(np.zeros((80, 80), np.int32), corners, 1)
-        widths.append(greatest_widths(labels, 1)[0])
-    assert widths == pytest.approx([side] * 3, abs=3)
+def test_a_label_without_cells_is_not_wide():
+    assert wide_labels(np.ones((9, 9), np.int32), 2, 3.0).tolist() == [True, False]
+
+
+@pytest.mark.parametrize("degrees", [0, 17, 45, 90])
+def test_a_square_is_as_wide_however_it_is_turned(degrees):
+    corners = cv2.boxPoints(((40, 40), (20, 20), degrees)).round().astype(np.int32)
+    square = cv2.fillConvexPoly(np.zeros((80, 80), np.int32), corners, 1)
+    assert wide_labels(square, 1, 18)[0]
+    assert not wide_labels(square, 1, 24)[0]

@@ -63,7 +63,7 @@ def outside_of(
     edge_share: FloatArray,
     is_room: Strength,
     parameters: RegionParameters,
-    width_m: FloatArray | None = None,
+    narrow: BoolArray | None = None,
 ) -> BoolArray:
     """Which regions (N,) of a graph are outside.
 
@@ -76,14 +76,14 @@ def outside_of(
     is_room : callable
         Log odds (N,) of `region_features` (N, F).
     parameters : RegionParameters
-    width_m : (N,) float, optional
-        Greatest width of each region, see `greatest_widths`; regions too small for a room need none.
+    narrow : (N,) bool, optional
+        Regions that are nowhere as wide as a room: outside, but for those too small for a room.
     """
     area = graph.node_sums[:, 0]
     around = surroundings(edge_share, area, parameters)
     no_room = is_room(region_features(graph)) < parameters.room_min_log_odds
-    if width_m is not None:
-        no_room |= (width_m < parameters.room_min_width_m) & (area >= parameters.room_min_area_m2)
+    if narrow is not None:
+        no_room |= narrow & (area >= parameters.room_min_area_m2)
     outside = ~around & no_room
     # An answer by which hardly anything is left is not believed.
     if area[outside].sum() > parameters.outside_max_share * area[~around].sum():

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rose2_logs.config.parameters import Parameters
 from rose2_logs.config.regions import DETAIL_MOST, RegionParameters
-from rose2_logs.model.labels import greatest_widths, label_sizes, labels_near
+from rose2_logs.model.labels import label_sizes, labels_near, wide_labels
 from rose2_logs.model.occupancy import BoolArray, FloatArray
 from rose2_logs.segmentation.floor_plan.stage import FloorPlanResult, cut_by_lines
 from rose2_logs.segmentation.regions import fitted
@@ -18,12 +18,7 @@ from rose2_logs.segmentation.regions.atoms import cut_atoms
 from rose2_logs.segmentation.regions.borders import border_strengths
 from rose2_logs.segmentation.regions.graph import STRONG_SCORE, RegionGraph, build_graph
 from rose2_logs.segmentation.regions.joining import Joins, Strength, join_regions
-from rose2_logs.segmentation.regions.outside import (
-    edge_shares,
-    leftovers_joined,
-    outside_of,
-    room_numbers,
-)
+from rose2_logs.segmentation.regions.outside import edge_shares, leftovers_joined, outside_of, room_numbers
 from rose2_logs.segmentation.regions.own_rooms import small_region_joins
 from rose2_logs.segmentation.regions.plan_frame import Labels, PlanFrame, without_specks
 from rose2_logs.segmentation.regions.plan_raster import PlanRaster
@@ -144,15 +139,16 @@ class RegionTree:
         region = self._to_even_odds.regions(EVEN_ODDS)
         regions, _ = self.graph.joined(region)
         of_cells = np.concatenate([[0], region + 1]).astype(np.int32).take(self.cells)
-        widths = greatest_widths(of_cells, len(regions.node_sums)).astype(float)
-        return self._outside_of(regions, region, widths * self.resolution_m)[region]
+        least_cells = self.parameters.room_min_width_m / self.resolution_m
+        narrow = ~wide_labels(of_cells, len(regions.node_sums), least_cells)
+        return self._outside_of(regions, region, narrow)[region]
 
     def _outside_of(
-        self, regions: RegionGraph, region: NDArray[np.int64], width_m: FloatArray | None = None
+        self, regions: RegionGraph, region: NDArray[np.int64], narrow: BoolArray | None = None
     ) -> BoolArray:
         edge_share = np.bincount(region, self.edge_share).astype(float)
         is_room = FittedStrength.of_rooms(fitted.outside_trees(), self.parameters)
-        return outside_of(regions, edge_share, is_room, self.parameters, width_m)
+        return outside_of(regions, edge_share, is_room, self.parameters, narrow)
 
     def rooms(self, detail: float) -> RegionsResult:
         """Join the atoms as far as a detail asks for, log odds; 0 for even odds, more for more rooms."""

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rose2_logs.config.regions import RegionParameters
-from rose2_logs.model.labels import LabelRuns, greatest_widths
+from rose2_logs.model.labels import LabelRuns, wide_labels
 from rose2_logs.model.occupancy import BoolArray
 
 
@@ -54,8 +54,10 @@ def rooms_in_one_piece(
         if number <= 2:
             continue
         cells = np.bincount(components.take(np.flatnonzero(inside)), minlength=number)
-        widths_m = greatest_widths(np.where(inside, components, 0), number - 1) * resolution_m
-        wide = np.append(False, widths_m >= parameters.room_min_width_m)
+        of_pieces = np.where(inside, components, 0)
+        wide = np.append(
+            False, wide_labels(of_pieces, number - 1, parameters.room_min_width_m / resolution_m)
+        )
         large = np.flatnonzero((cells * resolution_m**2 >= parameters.room_min_area_m2) & wide)
         for other in large[large != cells.argmax()].tolist():
             piece = inside & (components == other)

@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
-from drawn_floors import corridor_of_offices, turned
+from drawn_floors import corridor_of_offices, draw_floor, turned
+from drawn_maps import snapshot
 from test_graph import drawn_graph
 
 from rose2_logs.config.regions import RegionParameters
+from rose2_logs.segmentation.pipeline import analyze
 from rose2_logs.segmentation.regions.graph import (
     BORDER_MAXIMA,
     BORDER_SUMS,
@@ -39,11 +41,11 @@ def lone_regions(*area_m2):
     )
 
 
-def rooms(area_m2, log_odds, edge_share=None, width_m=None):
+def rooms(area_m2, log_odds, edge_share=None, narrow=None):
     edge = np.zeros(len(area_m2)) if edge_share is None else np.array(edge_share)
     graph = lone_regions(*area_m2)
-    widths = None if width_m is None else np.array(width_m)
-    outside = outside_of(graph, edge, lambda _: np.array(log_odds), PARAMETERS, widths)
+    no_width = None if narrow is None else np.array(narrow)
+    outside = outside_of(graph, edge, lambda _: np.array(log_odds), PARAMETERS, no_width)
     return room_numbers(graph, outside, PARAMETERS).tolist(), float(np.array(area_m2)[outside].sum())
 
 
@@ -63,18 +65,27 @@ def test_an_answer_by_which_hardly_anything_is_left_is_not_used(outside_m2, beli
     assert left_out_m2 == (outside_m2 if believed else 0.0)
 
 
-@pytest.mark.parametrize(("width_m", "room"), [(0.6, 2), (0.59, 0)])
-def test_what_is_nowhere_as_wide_as_a_door_leaf_is_no_room(width_m, room):
-    assert rooms([20.0, 5.0], [9.0, 9.0], width_m=[3.0, width_m]) == ([1, room], 0.0 if room else 5.0)
+def test_what_is_narrow_is_no_room():
+    assert rooms([20.0, 5.0], [9.0, 9.0], narrow=[False, True]) == ([1, 0], 5.0)
+
+
+@pytest.mark.parametrize(("width_m", "rooms"), [(0.5, 2), (0.55, 3)])
+def test_a_strip_along_a_wall_is_a_room_from_the_width_of_a_door_leaf_on(width_m, rooms):
+    """A width is told to a cell of 5 cm: 0.55 m may be 0.6."""
+    strip = (0, 4.2, 5, 4.2 + width_m)
+    floor = draw_floor([(0, 0, 5, 4), strip, (5.2, 0, 8, 4.2 + width_m)])
+    found = analyze(snapshot(floor.cells, resolution_m=floor.resolution_m))
+    assert found.rooms.labels.max() == rooms
+    assert found.outside_m2 == pytest.approx(0 if rooms == 3 else 5 * width_m, abs=0.1)
 
 
 def test_small_regions_may_be_narrow():
     """They are given to rooms that they touch."""
-    assert rooms([20.0, 0.9], [9.0, 9.0], width_m=[3.0, 0.2]) == ([1, 0], 0.0)
+    assert rooms([20.0, 0.9], [9.0, 9.0], narrow=[False, True]) == ([1, 0], 0.0)
 
 
 def test_where_all_is_narrow_all_are_rooms():
-    assert rooms([5.0, 5.0], [9.0, 9.0], width_m=[0.3, 0.3]) == ([1, 2], 0.0)
+    assert rooms([5.0, 5.0], [9.0, 9.0], narrow=[True, True]) == ([1, 2], 0.0)
 
 
 def test_white_around_a_building_may_be_most_of_a_map():
