@@ -54,12 +54,13 @@ def rooms_in_one_piece(
         if number <= 2:
             continue
         cells = np.bincount(components.take(np.flatnonzero(inside)), minlength=number)
+        large = cells * resolution_m**2 >= parameters.room_min_area_m2
+        large[cells.argmax()] = False
+        if not large.any():
+            continue
         of_pieces = np.where(inside, components, 0)
-        wide = np.append(
-            False, wide_labels(of_pieces, number - 1, parameters.room_min_width_m / resolution_m)
-        )
-        large = np.flatnonzero((cells * resolution_m**2 >= parameters.room_min_area_m2) & wide)
-        for other in large[large != cells.argmax()].tolist():
+        large[1:] &= wide_labels(of_pieces, number - 1, parameters.room_min_width_m / resolution_m)
+        for other in np.flatnonzero(large).tolist():
             piece = inside & (components == other)
             is_small = cells[other] * resolution_m**2 < parameters.object_max_m2
             if is_small and _is_within_object(labels, occupied, room, box, piece, resolution_m, parameters):
