@@ -181,9 +181,10 @@ def label_sizes(labels: NDArray[np.integer], count: int) -> NDArray[np.int64]:
 
 
 def wide_labels(labels: NDArray[np.int32], count: int, least_cells: float) -> BoolArray:
-    """Whether each label 1.. is somewhere so wide: a disk of that width fits on its cells, or nearly so.
+    """Whether each label 1.. is at least `least_cells` wide somewhere: a disk of that width fits on it.
 
-    A width is twice the distance of a cell from those of other labels: up to a cell more than there is.
+    A width is twice the distance of a cell from those of other labels: up to a cell more than there is. A
+    single cell without the label counts as an edge, too.
 
     Parameters
     ----------
@@ -192,6 +193,7 @@ def wide_labels(labels: NDArray[np.int32], count: int, least_cells: float) -> Bo
     count : int
         Greatest label.
     least_cells : float
+        Width that is looked for.
 
     Returns
     -------
@@ -215,6 +217,35 @@ def wide_labels(labels: NDArray[np.int32], count: int, least_cells: float) -> Bo
     wide = np.zeros(count + 1, bool)
     wide[labels.take(deep)] = True
     return wide[1:]
+
+
+def narrow_labels(labels: NDArray[np.int32], count: int, least_cells: float, speck_cells: float) -> BoolArray:
+    """Whether each label 1.. is nowhere `least_cells` wide, whatever specks without a label there are in it.
+
+    Parameters
+    ----------
+    labels : (H, W) int32
+        0 for none.
+    count : int
+        Greatest label.
+    least_cells : float
+        Width that is looked for, see `wide_labels`.
+    speck_cells : float
+        Pieces without a label that are shorter than this have the label beside them.
+
+    Returns
+    -------
+    narrow : (count,) bool
+    """
+    too_narrow = ~wide_labels(labels, count, least_cells)
+    if too_narrow.any():
+        without = labels == 0
+        pieces = Pieces.of(without)
+        specks = np.flatnonzero(pieces.cells(pieces.sides.max(1) < speck_cells, labels.shape))
+        filled = labels.copy()
+        filled.reshape(-1)[specks] = labels_near(labels, specks, speck_cells)
+        too_narrow &= ~wide_labels(filled, count, least_cells)
+    return too_narrow
 
 
 def labels_near(labels: NDArray[Label], cells: NDArray[np.intp], reach_cells: float) -> NDArray[Label]:
@@ -297,7 +328,9 @@ def equal_pieces(mask: BoolArray, *images: NDArray[Any]) -> NDArray[np.int32]:
     They are numbered from 1 by their first cells in reading order; beside the mask there is 0. What is joined
     are the runs of equal cells within rows: there are few of them, and many cells.
     """
-    height, width = mask.shape
+    if mask.size == 0:
+        return np.zeros(mask.shape, np.int32)
+    width = mask.shape[1]
     flats = [image.ravel() for image in (mask, *images)]
     is_first = np.zeros(mask.size, bool)
     is_first[::width] = True
@@ -312,7 +345,7 @@ def equal_pieces(mask: BoolArray, *images: NDArray[Any]) -> NDArray[np.int32]:
     run = np.repeat(np.arange(len(start), dtype=np.int32), cells)
     # Where two runs lie one above the other, the one or the other of them begins.
     begin = start.compress(flats[0].take(start))
-    below, above = begin.compress(begin >= width), begin.compress(begin < (height - 1) * width)
+    below, above = begin.compress(begin >= width), begin.compress(begin < mask.size - width)
     upper, lower = np.concatenate([below - width, above]), np.concatenate([below, above + width])
     same = functools.reduce(np.logical_and, (flat.take(upper) == flat.take(lower) for flat in flats))
     ends = run.take(upper.compress(same)), run.take(lower.compress(same))

@@ -21,6 +21,7 @@ from rose2_logs.model.labels import (
     label_sizes,
     labels_near,
     narrow,
+    narrow_labels,
     numbered,
     straight_runs,
     wide_labels,
@@ -192,3 +193,19 @@ def test_a_square_is_as_wide_however_it_is_turned(degrees):
     square = cv2.fillConvexPoly(np.zeros((80, 80), np.int32), corners, 1)
     assert wide_labels(square, 1, 18)[0]
     assert not wide_labels(square, 1, 24)[0]
+
+
+def test_specks_do_not_narrow_a_label_and_lines_do():
+    speckled = np.ones((60, 60), np.int32)
+    speckled[np.random.default_rng(0).random(speckled.shape) < 0.1] = 0
+    lined = np.ones((60, 60), np.int32)
+    lined[::8] = 0
+    assert not wide_labels(speckled, 1, 12.0)[0]
+    assert not narrow_labels(speckled, 1, 12.0, 5.0)[0]
+    assert narrow_labels(lined, 1, 12.0, 5.0)[0]
+
+
+@pytest.mark.parametrize("shape", [(0, 0), (5, 0), (0, 5)])
+def test_an_image_without_cells_has_no_pieces(shape):
+    assert equal_pieces(np.zeros(shape, bool), np.zeros(shape, np.int32)).shape == shape
+    assert wide_labels(np.zeros(shape, np.int32), 2, 3.0).tolist() == [False, False]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 import shapely
@@ -15,8 +15,6 @@ from rose2_logs.segmentation.floor_plan.faces import SNAP_M
 
 LINE_SEARCH_M = 4 * SNAP_M
 """Noding moves an edge off its line by less than this."""
-TINY_M2 = 1e-24
-"""Numerical: a segment of no length has its ends alone."""
 WALL, FREE = 1, 2
 """Bits of the image that tells both."""
 Number = TypeVar("Number", bound=np.generic)
@@ -241,6 +239,7 @@ class _Image(Generic[Number]):
         self._values = np.pad(image, 1).ravel()
         self._rows, self._columns = image.shape
         self._resolution_m = resolution_m
+        self._index = np.promote_types(np.int32, np.min_scalar_type(-self._values.size))
 
     def at(self, x_m: FloatArray, y_m: FloatArray) -> NDArray[Number]:
         """Values of the cells that hold points."""
@@ -249,12 +248,12 @@ class _Image(Generic[Number]):
         index += self._padded(x_m, self._columns)
         return self._values.take(index)
 
-    def _padded(self, place_m: FloatArray, count: int) -> NDArray[np.int32]:
+    def _padded(self, place_m: FloatArray, count: int) -> NDArray[np.signedinteger[Any]]:
         """Number of the cell in the padded image; all that lies beside the image is in its margin."""
         cell = place_m / self._resolution_m
         np.floor(cell, out=cell)
         np.clip(cell, -1, count, out=cell)
-        padded = cell.astype(np.int32)
+        padded = cell.astype(self._index)
         padded += 1
         return padded
 
@@ -283,7 +282,8 @@ def _from_segments(points: FloatArray, segments_m: FloatArray) -> FloatArray:
     """Distance (N,) of points (N, 2) from segments (N, 4), each from its own, as GEOS tells it of objects."""
     (x, y), (x0, y0, x1, y1) = points.T, segments_m.T
     along_x, along_y = x1 - x0, y1 - y0
-    square = np.maximum(along_x**2 + along_y**2, TINY_M2)
+    square = along_x**2 + along_y**2
+    square[square == 0] = 1.0  # a segment of no length: every share is 0
     share = ((x - x0) * along_x + (y - y0) * along_y) / square
     beside: FloatArray = np.abs((y0 - y) * along_x - (x0 - x) * along_y) / square * np.sqrt(square)
     beyond = [np.sqrt((x - end_x) ** 2 + (y - end_y) ** 2) for end_x, end_y in ((x0, y0), (x1, y1))]

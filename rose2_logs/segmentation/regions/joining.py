@@ -47,7 +47,7 @@ class Joins:
     count: int
     pairs: NDArray[np.int64]
     strength: FloatArray
-    _known: dict[float, NDArray[np.int64]] = field(default_factory=dict)
+    _known: dict[float, NDArray[np.int64]] = field(default_factory=dict, init=False, repr=False)
 
     def regions(self, least: float) -> NDArray[np.int64]:
         """Region 0.. of each atom when only joins of at least that strength are made.
@@ -55,7 +55,7 @@ class Joins:
         A join counts only where those below it in the tree, of either region, were made.
         """
         # Whatever is asked for below the weakest join, all are made.
-        asked = max(least, float(self.strength.min(initial=least)))
+        asked = max(least, float(self.strength.min(initial=np.inf)))
         if asked not in self._known:
             self._known[asked] = self._regions(least)
         return self._known[asked]

@@ -77,17 +77,19 @@ def outside_of(
         Log odds (N,) of `region_features` (N, F).
     parameters : RegionParameters
     narrow : (N,) bool, optional
-        Regions that are nowhere as wide as a room: outside, but for those too small for a room.
+        Regions that are nowhere wide enough for a room.
     """
     area = graph.node_sums[:, 0]
     around = surroundings(edge_share, area, parameters)
-    no_room = is_room(region_features(graph)) < parameters.room_min_log_odds
+    no_room = [is_room(region_features(graph)) < parameters.room_min_log_odds]
     if narrow is not None:
-        no_room |= narrow & (area >= parameters.room_min_area_m2)
-    outside = ~around & no_room
-    # An answer by which hardly anything is left is not believed.
-    if area[outside].sum() > parameters.outside_max_share * area[~around].sum():
-        outside[:] = False
+        no_room.append(narrow)
+    outside = np.zeros(len(area), bool)
+    for answer in no_room:
+        with_answer = outside | (answer & ~around)
+        # An answer by which hardly anything is left is not believed.
+        if area[with_answer].sum() <= parameters.outside_max_share * area[~around].sum():
+            outside = with_answer
     return outside | around
 
 

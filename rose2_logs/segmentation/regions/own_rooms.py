@@ -84,7 +84,8 @@ def small_region_joins(
 ) -> Joins:
     """Joins of small regions that are no rooms of their own with the neighbors they are likeliest of.
 
-    A small region is not joined to another one that is a room: of two side by side, each may be a toilet.
+    A small region is not joined to another one that is a room (of two side by side, each may be a toilet) or
+    that is outside.
 
     The strength of such a join is by how much its region misses the least odds of a room, so that more detail
     undoes the least sure ones first.
@@ -108,12 +109,13 @@ def small_region_joins(
     missed = np.zeros(0)
     if len(which):
         missed = parameters.small_room_min_log_odds - is_own_room(found.features[which])
+        may_be_room = small & (area >= parameters.room_min_area_m2)
         part = np.zeros(len(small), bool)
         part[which] = missed > 0
         # The largest first: whether these are rooms is known when one beside them asks.
         for number in which[np.argsort(-area[which], kind="stable")].tolist():
             neighbor = found.region[number]
-            part[number] &= not small[neighbor] or part[neighbor]
+            part[number] &= not may_be_room[neighbor] or part[neighbor]
         which, missed = which[part[which]], missed[part[which]]
     pairs = np.column_stack([found.region[which], which])
     return Joins(len(graph.node_sums), pairs, missed)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rose2_logs.config.parameters import Parameters
 from rose2_logs.config.regions import DETAIL_MOST, RegionParameters
-from rose2_logs.model.labels import label_sizes, labels_near, wide_labels
+from rose2_logs.model.labels import label_sizes, labels_near, narrow_labels
 from rose2_logs.model.occupancy import BoolArray, FloatArray
 from rose2_logs.segmentation.floor_plan.stage import FloorPlanResult, cut_by_lines
 from rose2_logs.segmentation.regions import fitted
@@ -138,10 +138,21 @@ class RegionTree:
         """Which atoms (N,) are outside, whatever the detail: regions at even odds tell it best."""
         region = self._to_even_odds.regions(EVEN_ODDS)
         regions, _ = self.graph.joined(region)
-        of_cells = np.concatenate([[0], region + 1]).astype(np.int32).take(self.cells)
-        least_cells = self.parameters.room_min_width_m / self.resolution_m
-        narrow = ~wide_labels(of_cells, len(regions.node_sums), least_cells)
-        return self._outside_of(regions, region, narrow)[region]
+        return self._outside_of(regions, region, self._narrow(regions, region))[region]
+
+    def _narrow(self, regions: RegionGraph, region: NDArray[np.int64]) -> BoolArray:
+        """Regions (N,) that are large enough for a room, but nowhere wide enough."""
+        large = regions.node_sums[:, 0] >= self.parameters.room_min_area_m2
+        number = np.cumsum(large) * large
+        of_cells = np.concatenate([[0], number[region]]).astype(np.int32).take(self.cells)
+        narrow = np.zeros(len(large), bool)
+        narrow[large] = narrow_labels(
+            of_cells,
+            int(large.sum()),
+            self.parameters.room_min_width_m / self.resolution_m,
+            self.parameters.speck_max_m / self.resolution_m,
+        )
+        return narrow
 
     def _outside_of(
         self, regions: RegionGraph, region: NDArray[np.int64], narrow: BoolArray | None = None

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rose2_logs.config.regions import RegionParameters
-from rose2_logs.model.labels import LabelRuns, wide_labels
+from rose2_logs.model.labels import LabelRuns, narrow_labels
 from rose2_logs.model.occupancy import BoolArray
 
 
@@ -31,8 +31,8 @@ def rooms_in_one_piece(
     resolution_m : float
         Side of a cell.
     parameters : RegionParameters
-        How wide a gap pieces hang together across, and what is within an object; pieces smaller or
-        narrower than any room stay with the largest one of theirs.
+        How wide a gap pieces hang together across, and what is within an object; pieces smaller
+        than any room stay with the largest one of theirs, and what is nowhere wide enough is no room.
 
     Returns
     -------
@@ -59,11 +59,14 @@ def rooms_in_one_piece(
         if not large.any():
             continue
         of_pieces = np.where(inside, components, 0)
-        large[1:] &= wide_labels(of_pieces, number - 1, parameters.room_min_width_m / resolution_m)
+        width, speck = parameters.room_min_width_m / resolution_m, parameters.speck_max_m / resolution_m
+        narrow = np.append(False, narrow_labels(of_pieces, number - 1, width, speck))
         for other in np.flatnonzero(large).tolist():
             piece = inside & (components == other)
             is_small = cells[other] * resolution_m**2 < parameters.object_max_m2
-            if is_small and _is_within_object(labels, occupied, room, box, piece, resolution_m, parameters):
+            if narrow[other] or (
+                is_small and _is_within_object(labels, occupied, room, box, piece, resolution_m, parameters)
+            ):
                 pieces[box][piece] = 0
                 continue
             pieces[box][piece] = len(rooms)

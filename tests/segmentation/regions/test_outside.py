@@ -79,9 +79,22 @@ def test_a_strip_along_a_wall_is_a_room_from_the_width_of_a_door_leaf_on(width_m
     assert found.outside_m2 == pytest.approx(0 if rooms == 3 else 5 * width_m, abs=0.1)
 
 
-def test_small_regions_may_be_narrow():
-    """They are given to rooms that they touch."""
-    assert rooms([20.0, 0.9], [9.0, 9.0], narrow=[False, True]) == ([1, 0], 0.0)
+@pytest.mark.parametrize("value", [-1, 100])
+@pytest.mark.parametrize("share", [0.1, 0.15])
+def test_a_room_is_as_wide_with_specks_in_it(share, value):
+    floor = draw_floor([(0, 0, 8, 5), (8.2, 0, 16.2, 5), (16.4, 0, 21.4, 5)])
+    cells = floor.cells.copy()
+    specks = np.random.default_rng(5).random(cells.shape) < share
+    cells[specks & (floor.rooms == 3)] = value
+    found = analyze(snapshot(cells, resolution_m=floor.resolution_m))
+    assert found.outside_m2 == 0
+    assert set(np.unique(floor.rooms[found.rooms.labels > 0])) == {1, 2, 3}
+
+
+def test_narrow_regions_do_not_bring_back_what_is_outside():
+    """30 m2 of 101 are outside; with 11 narrow ones it would be more than is believed."""
+    found = rooms([60.0, 30.0, 11.0], [9.0, -9.0, 9.0], narrow=[False, False, True])
+    assert found == ([1, 0, 2], 30.0)
 
 
 def test_where_all_is_narrow_all_are_rooms():

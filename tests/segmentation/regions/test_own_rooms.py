@@ -83,9 +83,23 @@ def test_a_small_region_is_joined_to_another_only_where_that_is_no_room(odds_of_
         np.zeros(len(graph.node_sums), bool),
         by_contact,
         lambda features: np.array([odds_of_closet, -9.0]),
-        replace(PARAMETERS, small_room_max_m2=0.1),
+        replace(PARAMETERS, small_room_max_m2=0.1, room_min_area_m2=0.01),
     )
     assert sorted(found.pairs.tolist()) == joined
+
+
+def test_what_is_too_small_for_a_room_takes_its_pockets_along():
+    """Closet 2 may be taken for a room by its odds, but not where the least room is larger."""
+    graph = drawn_graph(["111111######", "111111######", "111111222233", "111111222233", "111111######"])
+    for least_m2, joined in ((0.07, []), (0.09, [[1, 2]])):
+        found = small_region_joins(
+            graph,
+            np.zeros(len(graph.node_sums), bool),
+            by_contact,
+            lambda features: np.array([9.0, -9.0]),
+            replace(PARAMETERS, small_room_max_m2=0.1, room_min_area_m2=least_m2),
+        )
+        assert found.pairs.tolist() == joined
 
 
 def test_half_of_all_floor_lies_in_regions_up_to_the_typical_area():

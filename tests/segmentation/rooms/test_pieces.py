@@ -52,10 +52,12 @@ def test_pieces_below_the_least_area_stay(columns, rooms):
 
 
 @pytest.mark.parametrize(("columns", "rooms"), [(11, 3), (10, 2)])
-def test_pieces_that_are_nowhere_wide_enough_stay(columns, rooms):
+def test_pieces_that_are_nowhere_wide_enough_are_no_rooms(columns, rooms):
     """A width is told to a cell: 11 columns of 5 cm may be 0.6 m, 10 are less."""
-    pieces, _ = in_one_piece(two_pieces(20, columns), 0.05, GAP_M, PIECE_M2, width_m=0.6)
+    labels = two_pieces(20, columns)
+    pieces, _ = in_one_piece(labels, 0.05, GAP_M, PIECE_M2, width_m=0.6)
     assert pieces.max() == rooms
+    assert (pieces[:, 50 : 50 + columns] == (3 if rooms == 3 else 0)).all()
 
 
 def test_the_largest_piece_keeps_the_number_and_the_rest_its_cells():
