@@ -5,10 +5,11 @@ from __future__ import annotations
 import atexit
 import gc
 import importlib
+import os
 import re
 import sys
 from contextlib import suppress
-from typing import Annotated, Any
+from typing import Annotated, Any, NoReturn
 
 import typer
 
@@ -128,11 +129,14 @@ def main() -> None:
             exec("")  # noqa: S102
             if came:
                 sys.exit(EXIT_SIGNALED + came[0])
+        try:
+            if sys.stdout is not None and not sys.stdout.closed:
+                sys.stdout.flush()
+        except OSError as error:
+            _end_by(error)
         raise
     except OSError as error:
-        where = f"{error.filename}: " if error.filename else ""
-        messages.error(f"{where}{error.strerror or error}", file=error.filename)
-        sys.exit(EXIT_KNOWN)
+        _end_by(error)
     except MemoryError:
         messages.error("out of memory; use fewer --workers, or a lower --set reading.map_max_cells")
         sys.exit(EXIT_KNOWN)
@@ -144,6 +148,20 @@ def main() -> None:
             sys.exit(EXIT_KNOWN)
         messages.error(f"{type(error).__name__}: {error} (internal error of rose2-logs; --debug shows where)")
         sys.exit(EXIT_FAULT)
+
+
+def _end_by(error: OSError) -> NoReturn:
+    """Tell what the system refused, and exit."""
+    where = f"{error.filename}: " if error.filename else ""
+    messages.error(f"{where}{error.strerror or error}", file=error.filename)
+    try:
+        sys.stdout.flush()
+    except OSError:
+        # What cannot be written is dropped: Python would try once more at its end, and say so in its own way.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except (AttributeError, ValueError):
+        pass  # there is no output, or it is closed
+    sys.exit(EXIT_KNOWN)
 
 
 def _show_version(value: bool) -> None:

@@ -142,11 +142,16 @@ def test_without_space_in_shared_memory_a_line_says_what_helps(log: Path, tmp_pa
     assert (done.returncode, errors(done.stderr)) == (0, [])
 
 
-def test_an_output_that_is_full_is_told(log: Path, tmp_path: Path):
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+@pytest.mark.parametrize("command", ["info", "report --help"])
+def test_an_output_that_is_full_is_told(log: Path, command: str, unbuffered: str):
+    """By one line, also where Python keeps output until it ends."""
     if not Path("/dev/full").exists():
         pytest.skip("there is no /dev/full")
-    done = run('exec "$@" >/dev/full', "info", log)
-    assert (done.returncode, len(errors(done.stderr))) == (2, 1)
+    words = [*command.split(), *([log] if command == "info" else [])]
+    done = run('exec "$@" >/dev/full', *words, PYTHONUNBUFFERED=unbuffered)
+    assert (done.returncode, errors(done.stderr)) == (2, ["error: No space left on device"])
+    assert "ignored" not in done.stderr
 
 
 def test_an_output_folder_that_is_removed_is_told(tmp_path: Path):
