@@ -12,6 +12,7 @@ from shapely.geometry.base import BaseGeometry
 from rose2_logs.comparison.final_layout import FinalLayout
 from rose2_logs.config.comparison import ComparisonParameters
 from rose2_logs.model.occupancy import BoolArray, FloatArray
+from rose2_logs.model.regions import connected
 from rose2_logs.tracking.matching import assign
 from rose2_logs.tracking.overlap import share_of
 from rose2_logs.tracking.registration import RigidMotion
@@ -144,14 +145,8 @@ def _groups(
 
 
 def _components(links: set[tuple[int, int]], rows: int, columns: int) -> list[tuple[list[int], list[int]]]:
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    if rows + columns == 0:
-        return []
-    ends = np.array(sorted(links), np.int64).reshape(-1, 2)
-    graph = coo_array((np.ones(len(ends)), (ends[:, 0], rows + ends[:, 1])), shape=(rows + columns,) * 2)
-    count, of_room = connected_components(graph, directed=False)
+    row, column = np.array(sorted(links), np.int64).reshape(-1, 2).T
+    count, of_room = connected(rows + columns, row, rows + column)
     return [
         (np.flatnonzero(of_room[:rows] == part).tolist(), np.flatnonzero(of_room[rows:] == part).tolist())
         for part in range(count)
