@@ -105,6 +105,8 @@ def _beyond_cut(
     parameters: TopologyParameters,
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]] | None:
     """Rows and columns of the cells beyond the cut through a room, in its window; None if it stays whole."""
+    if np.count_nonzero(inside) * resolution_m**2 < 2 * parameters.split_min_area_m2:
+        return None  # too small for two parts
     part = parts_of_room(inside, clear[window], resolution_m, parameters)
     if part is None:
         return None
