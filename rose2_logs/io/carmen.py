@@ -7,7 +7,7 @@ import math
 import zlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +32,8 @@ EPOCH_OF_UNSTAMPED_S = 1_000_000_000
 """Where a log starts whose own stamps cannot be used: any fixed time."""
 DEFAULT_MAX_RANGE_M = 80.0
 """No return of a SICK LMS reads 81.83 or 81.91; used where a log does not say its laser's range."""
+KEPT_BEARINGS = 16
+"""Lidars whose angles are kept: a robot has one or two, but a damaged log may name others in each line."""
 MIN_DISTINCT_STAMPS = 0.9
 """Share of scans with a stamp of their own below which a log's stamps are taken for damaged."""
 
@@ -227,7 +229,7 @@ def _front_laser(words: list[str], max_range_m: float, odometry: FloatArray | No
     )
 
 
-@cache
+@lru_cache(maxsize=KEPT_BEARINGS)
 def _bearings(start_rad: float, step_rad: float, count: int) -> FloatArray:
     """Angles (count,) of the beams; one array for all scans of a lidar."""
     bearings = start_rad + step_rad * np.arange(count, dtype=float)

@@ -7,6 +7,7 @@ import json
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rose2_logs.errors import InvalidMapError
 from rose2_logs.io.foxglove_grid import NUMERIC_NAMES, PackedField, PackedGrid, grid_of
@@ -82,7 +83,7 @@ def _occupancy_grid(message: dict[str, Any], most_cells: int) -> Grid | None:
     if isinstance(given, str):  # rosbridge writes arrays of bytes in base 64
         cells = np.frombuffer(base64.b64decode(given, validate=True), np.int8)
     else:
-        cells = np.array(given, np.int64).astype(np.int8)
+        cells = _cells_of(given)
     if cells.shape != (rows * columns,):
         raise InvalidMapError(f"it claims {columns} x {rows} cells, but its data has {cells.size}")
     frame = str(header["frame_id"])
@@ -92,6 +93,21 @@ def _occupancy_grid(message: dict[str, Any], most_cells: int) -> Grid | None:
     return make_grid(
         _stamp_ns(header["stamp"]), frame, resolution, _pose(info["origin"]), cells.reshape(rows, columns), []
     )
+
+
+def _cells_of(given: list[Any]) -> NDArray[np.int8]:
+    """Cells of a list of numbers; bytes may be given without a sign.
+
+    Raises
+    ------
+    InvalidMapError
+        If one is no number of a byte.
+    """
+    numbers = np.asarray(given, float)
+    wrong = ~((numbers == np.rint(numbers)) & (numbers >= -128) & (numbers <= 255))
+    if wrong.any():
+        raise InvalidMapError(f"its cell {int(wrong.argmax())} is {given[int(wrong.argmax())]}, not a byte")
+    return numbers.astype(np.int64).astype(np.int8)
 
 
 def _stamp_ns(stamp: dict[str, Any]) -> int:

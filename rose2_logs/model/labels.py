@@ -239,9 +239,11 @@ def narrow_labels(labels: NDArray[np.int32], count: int, least_cells: float, spe
     """
     too_narrow = ~wide_labels(labels, count, least_cells)
     if too_narrow.any():
-        without = labels == 0
+        # Beyond the image there is no label: what reaches its edge is no speck.
+        without = np.pad(labels == 0, 1, constant_values=True)
         pieces = Pieces.of(without)
-        specks = np.flatnonzero(pieces.cells(pieces.sides.max(1) < speck_cells, labels.shape))
+        is_speck = pieces.cells(pieces.sides.max(1) < speck_cells, without.shape)
+        specks = np.flatnonzero(is_speck[1:-1, 1:-1])
         filled = labels.copy()
         filled.reshape(-1)[specks] = labels_near(labels, specks, speck_cells)
         too_narrow &= ~wide_labels(filled, count, least_cells)
@@ -287,7 +289,7 @@ class Pieces:
     count : int
         One more than the highest number.
     sides : (count, 2) int
-        Width and height in cells of each piece's box, with the margin that it was grown by; 0 for number 0.
+        Width and height in cells of each piece's box; 0 for number 0.
     """
 
     cell: NDArray[np.intp]
@@ -311,7 +313,7 @@ class Pieces:
             low, high = np.full(count, size), np.zeros(count, np.int64)
             np.minimum.at(low, number, place)
             np.maximum.at(high, number, place)
-            sides[:, axis] = np.minimum(high + margin, size - 1) - np.maximum(low - margin, 0) + 1
+            sides[:, axis] = high - low + 1
         sides[0] = 0
         return cls(cell, number, count, sides)
 

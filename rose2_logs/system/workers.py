@@ -470,7 +470,7 @@ def _work(packed: Packed) -> Packed:
 
 
 def _call_on_one_thread(function: Callable[[Item], Result], item: Item) -> Result:
-    with _one_thread():
+    with _LIMIT:
         return function(item)
 
 
@@ -486,6 +486,33 @@ def _one_thread() -> Iterator[None]:
             yield
     finally:
         cv2.setNumThreads(threads)
+
+
+class _OneThreadLimit:
+    """Limits the libraries as `_one_thread` does while any thread of this process is within.
+
+    They are limits of the process: the first thread sets them, and the last one puts back what was there.
+    """
+
+    def __init__(self) -> None:
+        self._counting = threading.Lock()
+        self._within = 0
+        self._limit = ExitStack()
+
+    def __enter__(self) -> None:
+        with self._counting:
+            if self._within == 0:
+                self._limit.enter_context(_one_thread())
+            self._within += 1
+
+    def __exit__(self, *_error: object) -> None:
+        with self._counting:
+            self._within -= 1
+            if self._within == 0:
+                self._limit.close()
+
+
+_LIMIT = _OneThreadLimit()
 
 
 @lru_cache(maxsize=1)

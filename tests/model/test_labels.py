@@ -205,6 +205,14 @@ def test_specks_do_not_narrow_a_label_and_lines_do():
     assert narrow_labels(lined, 1, 12.0, 5.0)[0]
 
 
+@pytest.mark.parametrize("margin", [0, 3])
+def test_gaps_between_spikes_at_the_edge_of_an_image_are_no_specks(margin):
+    ragged = np.zeros((14, 60), np.int32)
+    ragged[2:11, 5:55] = 1
+    ragged[11:14, 5:55:3] = 1
+    assert narrow_labels(np.pad(ragged, margin), 1, 12.0, 5.0)[0]
+
+
 @pytest.mark.parametrize("shape", [(0, 0), (5, 0), (0, 5)])
 def test_an_image_without_cells_has_no_pieces(shape):
     assert equal_pieces(np.zeros(shape, bool), np.zeros(shape, np.int32)).shape == shape

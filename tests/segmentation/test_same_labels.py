@@ -6,6 +6,7 @@ import hashlib
 import os
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -35,6 +36,15 @@ def fingerprint_of_all() -> str:
         digest.update(np.ascontiguousarray(found.labels).tobytes())
         digest.update(repr(found.borders).encode())
     return digest.hexdigest()
+
+
+def test_labels_are_the_same_when_threads_segment_at_once():
+    """The network is one for all threads of a process."""
+    maps = [snapshot(office(turn_rad=turn, clutter=25)[0]) for turn in (0.0, 0.1, 0.2, 0.3)]
+    wanted = [rl.segment(each).labels for each in maps]
+    with ThreadPoolExecutor(4) as threads:
+        found = list(threads.map(rl.segment, maps * 3))
+    assert all(np.array_equal(a.labels, b) for a, b in zip(found, wanted * 3, strict=True))
 
 
 def run(threads: int, **environment: str) -> str:

@@ -7,6 +7,7 @@ import re
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -21,6 +22,7 @@ import pytest
 from rose2_logs.errors import InvalidMapError
 from rose2_logs.system import shared_memory as packed
 from rose2_logs.system.workers import (
+    _LIMIT,
     LOOK_AHEAD_PER_WORKER,
     WorkerError,
     WorkerProcess,
@@ -166,6 +168,28 @@ def test_work_in_this_process_is_held_to_one_thread_and_lets_go():
 
     before = cv2.getNumThreads()
     assert [result for _, result in ordered_map(threads, [0])] == [1]
+    assert cv2.getNumThreads() == before
+
+
+def test_threads_that_work_at_once_are_held_to_one_thread_each_and_let_go_together():
+    import cv2
+
+    before = cv2.getNumThreads()
+    first_is_within, second_is_done = threading.Event(), threading.Event()
+
+    def first() -> int:
+        with _LIMIT:
+            first_is_within.set()
+            assert second_is_done.wait(10)
+            return threads(0)
+
+    with ThreadPoolExecutor(1) as other:
+        found = other.submit(first)
+        assert first_is_within.wait(10)
+        with _LIMIT:
+            assert threads(0) == 1
+        second_is_done.set()
+        assert found.result() == 1
     assert cv2.getNumThreads() == before
 
 

@@ -8,7 +8,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, Any
 
 from mcap.records import Attachment, ChunkIndex, Metadata
 
@@ -19,9 +19,6 @@ from rose2_logs.io.mcap.records import INDEX, INDEX_ENTRY, Summary
 from rose2_logs.io.source import MessageSource
 from rose2_logs.outputs.mcap.ros_messages import ros2_typestore
 from rose2_logs.system.warnings import log_warning
-
-if TYPE_CHECKING:
-    pass
 
 logger = logging.getLogger(__name__)
 

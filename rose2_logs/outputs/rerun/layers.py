@@ -21,6 +21,8 @@ CHUNK_BYTES = 1 << 20
 """Rows of an entity are written together from this size on; as Rerun's own batcher does."""
 ROW_BYTES = 1 << 10
 """What a row counts for besides its arrays: several times what it takes, so that a thousand wait at most."""
+ROUNDING_DIGITS = 9
+"""Numerical: 100 times 0.29 is 28.999999999999996; no map has so many cells that one of them counts less."""
 WAITING_BYTES = 1 << 24
 """Rows of all entities that wait at most: some large pictures, or outlines of a large building's rooms."""
 
@@ -36,7 +38,7 @@ class Instant(NamedTuple):
 
 def whole_percent(coverage: float) -> int:
     """Return the place of a coverage on its timeline: rounded down, so that only the whole is 100."""
-    return math.floor(100 * coverage)
+    return math.floor(round(100 * coverage, ROUNDING_DIGITS))
 
 
 @dataclass

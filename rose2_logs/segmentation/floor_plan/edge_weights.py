@@ -102,8 +102,9 @@ def edge_evidence(
     # In the order of the samples, since what lies between two edges is gone through as well.
     some = some[np.argsort(first[some], kind="stable")]
     if len(some):
-        bounds = np.minimum(np.column_stack([first[some], last[some]]).ravel(), len(run_share) - 1)
-        share[some] = np.maximum.reduceat(run_share, bounds)[::2]
+        # One share more, since the last edge may end behind the last sample.
+        bounds = np.column_stack([first[some], last[some]]).ravel()
+        share[some] = np.maximum.reduceat(np.append(run_share, 0.0), bounds)[::2]
     wall_m, blind_m, open_m = lengths
     return EdgeEvidence(wall_m, blind_m, open_m, length, share)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from itertools import product
 from pathlib import Path
 
@@ -40,6 +41,8 @@ class AnsweringNetwork:
         # OpenCV 4 knows no other engine; in OpenCV 5 it is the faster one here.
         classic = {"engine": cv2.dnn.ENGINE_CLASSIC} if hasattr(cv2.dnn, "ENGINE_CLASSIC") else {}
         self._network = cv2.dnn.readNetFromONNX(str(path), **classic)
+        self._asked = threading.Lock()
+        """Held from question to answer: a network has one input, whichever thread gave it."""
 
     def __call__(self, raster: PlanRaster, views: int = RegionParameters.answer_views) -> NDArray[np.float32]:
         """Answers (OUTPUTS, H, W) in [0, 1] for a raster (H, W).
@@ -86,10 +89,11 @@ class AnsweringNetwork:
     def _forward(self, inputs: FloatImage) -> FloatImage:
         channels, rows, columns = inputs.shape
         blocks = inputs.reshape(channels, rows // BLOCK, BLOCK, columns // BLOCK, BLOCK)
-        self._network.setInput(
-            blocks.transpose(0, 2, 4, 1, 3).reshape(1, -1, rows // BLOCK, columns // BLOCK)
-        )
-        odds = np.clip(np.asarray(self._network.forward(), np.float32), -LOG_ODDS_MAX, LOG_ODDS_MAX)
+        given = blocks.transpose(0, 2, 4, 1, 3).reshape(1, -1, rows // BLOCK, columns // BLOCK)
+        with self._asked:
+            self._network.setInput(given)
+            # The output is the network's own memory until it is clipped into another array.
+            odds = np.clip(np.asarray(self._network.forward(), np.float32), -LOG_ODDS_MAX, LOG_ODDS_MAX)
         np.exp(odds, out=odds)
         odds /= odds + 1
         answers = odds.reshape(OUTPUTS, BLOCK, BLOCK, rows // BLOCK, columns // BLOCK)

@@ -85,6 +85,38 @@ class Joins:
             region = further
         return np.unique(region, return_inverse=True)[1]
 
+    def levels(self, one: NDArray[np.integer], other: NDArray[np.integer]) -> FloatArray:
+        """Log odds (K,) down to which pairs of atoms (K,) are in different regions; -inf for always.
+
+        They are those of the weakest join on the way to the region that holds both.
+        """
+        top = self.count + len(self.pairs)
+        parent, level = np.full(top + 1, top), np.append(np.full(self.count, np.inf), self.strength)
+        level = np.append(level, -np.inf)
+        of_atom = list(range(self.count))
+        node = list(range(self.count))
+        """The tree's node that an atom stands for, of those that stand for themselves."""
+
+        def root(n: int) -> int:
+            while of_atom[n] != n:
+                of_atom[n] = of_atom[of_atom[n]]
+                n = of_atom[n]
+            return n
+
+        for number, pair in enumerate(self.pairs.tolist(), start=self.count):
+            a, b = (root(atom) for atom in pair)
+            below = [node[a], node[b]]
+            parent[below] = number
+            level[number] = min(level[number], *level[below])
+            of_atom[b], node[a] = a, number
+        low, high = np.array(one, np.intp), np.array(other, np.intp)
+        # A node above has a higher number: the lower one of two goes up until they meet.
+        while (apart := low != high).any():
+            low, high = np.minimum(low, high), np.maximum(low, high)
+            low[apart] = parent[low[apart]]
+        found: FloatArray = level[low]
+        return found
+
     def then(self, later: Joins) -> Joins:
         """Add joins of the regions that all of these give."""
         first_atom = np.unique(self.regions(-np.inf), return_index=True)[1]

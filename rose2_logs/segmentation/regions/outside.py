@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +17,8 @@ from rose2_logs.segmentation.regions.joining import Strength
 from rose2_logs.segmentation.regions.plan_frame import Labels
 from rose2_logs.segmentation.regions.plan_raster import PlanRaster
 
+Together = Callable[[NDArray[np.int64], NDArray[np.int64]], tuple[FloatArray, ...]]
+"""Which pairs of regions (K,), (K,) belong together most: numbers (K,), the most important ones first."""
 EDGE_REACH_CELLS = 1.5
 """An atom reaches the edge of the map from the cell beside it: turned edges are ragged."""
 
@@ -93,39 +97,71 @@ def outside_of(
     return outside | around
 
 
-def room_numbers(graph: RegionGraph, outside: BoolArray, parameters: RegionParameters) -> NDArray[np.int64]:
-    """Room 1.. of each region (N,), 0 for those that are outside or too small."""
-    room = ~outside & (graph.node_sums[:, 0] >= parameters.room_min_area_m2)
-    return np.where(room, np.cumsum(room), 0)
+def rooms_among(graph: RegionGraph, outside: BoolArray, parameters: RegionParameters) -> BoolArray:
+    """Which regions (N,) are large enough for a room, and not outside."""
+    room: BoolArray = ~outside & (graph.node_sums[:, 0] >= parameters.room_min_area_m2)
+    return room
 
 
 def leftovers_joined(
-    graph: RegionGraph, room: NDArray[np.int64], outside: BoolArray, strength: Strength
-) -> NDArray[np.int64]:
-    """Give regions too small for a room, such as the floor of a doorway, to the room they most likely are of.
+    graph: RegionGraph,
+    room: BoolArray,
+    outside: BoolArray,
+    strength: Strength,
+    parameters: RegionParameters,
+    together: Together | None = None,
+    narrow: BoolArray | None = None,
+) -> tuple[NDArray[np.int64], BoolArray]:
+    """Give regions that are no rooms, such as the floor of a doorway, to the room they most likely are of.
+
+    The border of such a region that comes first is removed, again and again, but for those between two rooms.
+    Small regions that are together as large as a room are one.
 
     Parameters
     ----------
     graph : RegionGraph
-    room : (N,) int64
-        Room 1.. of each region, 0 for none.
-    outside : (N,) bool
+    room, outside : (N,) bool
+        Regions that are rooms, and those that no room gets.
     strength : callable
         Log odds that two regions are one room.
+    parameters : RegionParameters
+    together : callable, optional
+        What comes before the strength.
+    narrow : (N,) bool, optional
+        Regions too narrow for a room, that make none together.
 
     Returns
     -------
     region : (N,) int64
         Region that each is part of; itself but for those that are given away.
+    room : (N,) bool
+        Regions that are rooms now.
     """
-    region = np.arange(len(room))
-    left = (room == 0) & ~outside
+    least_m2 = parameters.room_min_area_m2
+    area = graph.node_sums[:, 0]
+    size = (area if narrow is None else np.where(narrow, 0.0, area)).tolist()
+    is_room, region = room.tolist(), list(range(len(room)))
+
+    def holder(number: int) -> int:
+        while region[number] != number:
+            region[number] = region[region[number]]
+            number = region[number]
+        return number
+
     which = np.flatnonzero(joinable(graph))
     ends = graph.ends[which]
-    ends = np.where(left[ends[:, :1]], ends, ends[:, ::-1])
-    beside = left[ends[:, 0]] & (room[ends[:, 1]] > 0)
-    if beside.any():
-        small, large = ends[beside].T
-        order = np.argsort(strength(join_features(graph, which[beside])), kind="stable")
-        region[small[order]] = large[order]
-    return region
+    asked = ~room[ends].all(1) & ~outside[ends].any(1)
+    which, ends = which[asked], ends[asked]
+    if len(which):
+        before = together(*ends.T) if together else ()
+        order = np.lexsort([-value for value in (strength(join_features(graph, which)), *before[::-1])])
+        for pair in ends[order].tolist():
+            target, given = sorted(holder(number) for number in pair)
+            if target == given or (is_room[target] and is_room[given]):
+                continue
+            if is_room[given]:
+                target, given = given, target
+            region[given] = target
+            size[target] += size[given]
+            is_room[target] = is_room[target] or size[target] >= least_m2
+    return np.array([holder(number) for number in range(len(region))], np.int64), np.array(is_room, bool)

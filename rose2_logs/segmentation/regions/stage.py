@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -18,7 +18,13 @@ from rose2_logs.segmentation.regions.atoms import cut_atoms
 from rose2_logs.segmentation.regions.borders import border_strengths
 from rose2_logs.segmentation.regions.graph import STRONG_SCORE, RegionGraph, build_graph
 from rose2_logs.segmentation.regions.joining import Joins, Strength, join_regions
-from rose2_logs.segmentation.regions.outside import edge_shares, leftovers_joined, outside_of, room_numbers
+from rose2_logs.segmentation.regions.outside import (
+    Together,
+    edge_shares,
+    leftovers_joined,
+    outside_of,
+    rooms_among,
+)
 from rose2_logs.segmentation.regions.own_rooms import small_region_joins
 from rose2_logs.segmentation.regions.plan_frame import Labels, PlanFrame, without_specks
 from rose2_logs.segmentation.regions.plan_raster import PlanRaster
@@ -88,6 +94,26 @@ class RegionsResult:
 
 
 @dataclass(frozen=True, eq=False)
+class _Split:
+    """The atoms of a map joined to regions.
+
+    Attributes
+    ----------
+    of_atom : (A,) int
+        Region 0.. of each atom.
+    graph : RegionGraph
+        Of the regions.
+    room, outside : (N,) bool
+        Regions that are large enough for rooms, and those outside.
+    """
+
+    of_atom: NDArray[np.int64]
+    graph: RegionGraph
+    room: BoolArray
+    outside: BoolArray
+
+
+@dataclass(frozen=True, eq=False)
 class RegionTree:
     """The atoms of a map and the order in which they are joined: from it follow the rooms at any detail.
 
@@ -129,16 +155,45 @@ class RegionTree:
 
     @cached_property
     def _to_the_end(self) -> Joins:
+        # What is no room by itself stays with its room when that is joined to others.
         joins = self._to_even_odds
+        first_atom = np.unique(joins.regions(EVEN_ODDS), return_index=True)[1]
+        home = self._home[first_atom]
+        given = np.flatnonzero(home != np.arange(len(home)))
+        pairs = np.column_stack([home[given], given])
+        joins = joins.then(Joins(len(home), pairs, np.full(len(pairs), DETAIL_MOST)))
         regions, _ = self.graph.joined(joins.regions(EVEN_ODDS))
         return joins.then(join_regions(regions, self.strength, -DETAIL_MOST))
+
+    @cached_property
+    def _narrow_atoms(self) -> BoolArray:
+        """Which atoms (N,) are of regions at even odds that are large enough for a room, but too narrow."""
+        region = self._to_even_odds.regions(EVEN_ODDS)
+        return self._narrow(self.graph.joined(region)[0], region)[region]
 
     @cached_property
     def _outside(self) -> BoolArray:
         """Which atoms (N,) are outside, whatever the detail: regions at even odds tell it best."""
         region = self._to_even_odds.regions(EVEN_ODDS)
         regions, _ = self.graph.joined(region)
-        return self._outside_of(regions, region, self._narrow(regions, region))[region]
+        narrow = np.zeros(len(regions.node_sums), bool)
+        narrow[region] = self._narrow_atoms
+        return self._outside_of(regions, region, narrow)[region]
+
+    @cached_property
+    def _home(self) -> NDArray[np.int64]:
+        """Region (N,) of each atom at even odds, what is no room by itself with the room it is part of."""
+        found = self._split(self._to_even_odds, EVEN_ODDS)
+        return self._leftovers_joined(found)[0][found.of_atom]
+
+    def _split(self, joins: Joins, detail: float) -> _Split:
+        """Join the atoms as far as a detail asks for, what is outside apart from the rest."""
+        # With less detail, floor that is outside may be joined to a room: it is cut off again.
+        of_atom = np.unique(2 * joins.regions(detail) + self._outside, return_inverse=True)[1]
+        graph, _ = self.graph.joined(of_atom)
+        outside = np.zeros(len(graph.node_sums), bool)
+        outside[of_atom] = self._outside
+        return _Split(of_atom, graph, rooms_among(graph, outside, self.parameters), outside)
 
     def _narrow(self, regions: RegionGraph, region: NDArray[np.int64]) -> BoolArray:
         """Regions (N,) that are large enough for a room, but nowhere wide enough."""
@@ -161,22 +216,52 @@ class RegionTree:
         is_room = FittedStrength.of_rooms(fitted.outside_trees(), self.parameters)
         return outside_of(regions, edge_share, is_room, self.parameters, narrow)
 
+    def _given(self, found: _Split, joins: Joins) -> tuple[NDArray[np.int64], BoolArray]:
+        """Region that each is part of, and which are rooms, where there is more detail than at even odds.
+
+        What is no room by itself, and what is nowhere wide enough though its room at even odds was, stays in
+        that room, and there with what it is joined to first.
+        """
+        first_atom = np.unique(found.of_atom, return_index=True)[1]
+
+        def together(one: NDArray[np.int64], other: NDArray[np.int64]) -> tuple[FloatArray, ...]:
+            ends = first_atom[one], first_atom[other]
+            return (self._home[ends[0]] == self._home[ends[1]]).astype(float), joins.levels(*ends)
+
+        may_be_narrow = self._narrow_atoms[first_atom]
+        narrow = self._narrow(found.graph, found.of_atom) & ~may_be_narrow
+        while True:
+            wide = replace(found, room=found.room & ~narrow)
+            given, room = self._leftovers_joined(wide, together, narrow)
+            kept, number = np.unique(given, return_inverse=True)
+            joined, _ = found.graph.joined(number)
+            # Small regions that are large enough together may be narrow, too.
+            too_narrow = (self._narrow(joined, number[found.of_atom]) & room[kept])[number] & ~may_be_narrow
+            if not (too_narrow & ~narrow).any():
+                # What is narrow, but beside no room, stays one.
+                return given, room | (found.room & (given == np.arange(len(given))))
+            narrow |= too_narrow
+
+    def _leftovers_joined(
+        self, found: _Split, together: Together | None = None, narrow: BoolArray | None = None
+    ) -> tuple[NDArray[np.int64], BoolArray]:
+        return leftovers_joined(
+            found.graph, found.room, found.outside, self.strength, self.parameters, together, narrow
+        )
+
     def rooms(self, detail: float) -> RegionsResult:
         """Join the atoms as far as a detail asks for, log odds; 0 for even odds, more for more rooms."""
         if not len(self.graph.node_sums):
             return RegionsResult(np.zeros(self.free.shape, np.int32), {}, 0.0)
         joins = self._to_even_odds if detail >= EVEN_ODDS else self._to_the_end
-        # With less detail, floor that is outside may be joined to a room: it is cut off again.
-        region = np.unique(2 * joins.regions(detail) + self._outside, return_inverse=True)[1]
-        outside = np.zeros(int(region.max()) + 1, bool)
-        outside[region] = self._outside
-        regions, _ = self.graph.joined(region)
-        room = room_numbers(regions, outside, self.parameters)
-        kept, number = np.unique(leftovers_joined(regions, room, outside, self.strength), return_inverse=True)
-        regions, _ = regions.joined(number)
-        region, room, outside = number[region], room[kept], outside[kept]
+        found = self._split(joins, detail)
+        given, is_room = self._given(found, joins) if detail > EVEN_ODDS else self._leftovers_joined(found)
+        kept, number = np.unique(given, return_inverse=True)
+        regions, _ = found.graph.joined(number)
+        region = number[found.of_atom]
+        room = np.where(is_room, np.cumsum(is_room), 0)[kept]
         cells_of_atom = label_sizes(self.cells, len(region))[1:]
-        outside_m2 = float(cells_of_atom[outside[region]].sum()) * self.resolution_m**2
+        outside_m2 = float(cells_of_atom[found.outside[kept][region]].sum()) * self.resolution_m**2
         labels = room_labels(
             self.cells, room[region], self.free, self.resolution_m, self.parameters.loose_reach_m
         )

@@ -37,7 +37,8 @@ def rooms_in_one_piece(
     Returns
     -------
     pieces : (H, W) int32
-        The largest piece of each room and what is small have the number of the room, others new ones.
+        The largest piece of each room that is wide enough and what is small have the number of the room,
+        others new ones.
     room_of_piece : (P,) int32
         Room of each of these numbers, 0 first.
     """
@@ -55,12 +56,13 @@ def rooms_in_one_piece(
             continue
         cells = np.bincount(components.take(np.flatnonzero(inside)), minlength=number)
         large = cells * resolution_m**2 >= parameters.room_min_area_m2
-        large[cells.argmax()] = False
-        if not large.any():
+        if np.count_nonzero(large) < 2:
             continue
         of_pieces = np.where(inside, components, 0)
         width, speck = parameters.room_min_width_m / resolution_m, parameters.speck_max_m / resolution_m
         narrow = np.append(False, narrow_labels(of_pieces, number - 1, width, speck))
+        # The largest that is wide enough stays the room, with what is small.
+        large[(np.where(large & ~narrow, cells, 0) if (large & ~narrow).any() else cells).argmax()] = False
         for other in np.flatnonzero(large).tolist():
             piece = inside & (components == other)
             is_small = cells[other] * resolution_m**2 < parameters.object_max_m2

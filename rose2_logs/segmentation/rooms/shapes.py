@@ -11,7 +11,15 @@ from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from rose2_logs.config.parameters import FloorPlanParameters
-from rose2_logs.model.labels import Label, LabelRuns, distinct_labels, label_sizes, labels_near, narrow
+from rose2_logs.model.labels import (
+    Label,
+    LabelRuns,
+    distinct_labels,
+    equal_pieces,
+    label_sizes,
+    labels_near,
+    narrow,
+)
 from rose2_logs.model.occupancy import BoolArray
 from rose2_logs.model.outlines import room_outlines
 from rose2_logs.segmentation.floor_plan.stage import FloorPlanResult
@@ -159,7 +167,7 @@ def predicted_cells(
     beside = _dilated(cells > 0, np.ones((2 * reach + 1, 2 * reach + 1), np.uint8))
     beside &= (claim > 0) & (pocket == 0)
     np.copyto(cells, claim, where=beside)
-    part = _parts(cells, cells > 0)
+    part = equal_pieces(cells > 0, cells)
     was_seen = np.zeros(part.max() + 1, bool)
     was_seen[LabelRuns.of(part * (seen > 0)).label] = True
     predicted = np.flatnonzero((cells > 0) & (seen == 0))

@@ -84,9 +84,9 @@ def supported_cells(
     pieces = Pieces.of(occupied, margin)
     total = np.bincount(pieces.number, score.take(pieces.cell), minlength=pieces.count)
     mean = total / np.maximum(np.bincount(pieces.number, minlength=pieces.count), 1)
-    # The box of a grown piece is wider by the margin.
-    sides = (pieces.sides - 2 * margin) * resolution_m
-    wall = (np.hypot(*sides.T) >= parameters.piece_min_extent_m) | (mean >= parameters.piece_min_score)
+    wall = (np.hypot(*(pieces.sides * resolution_m).T) >= parameters.piece_min_extent_m) | (
+        mean >= parameters.piece_min_score
+    )
     return pieces.cells(wall, occupied.shape)
 
 

@@ -123,9 +123,10 @@ def long_pieces(
 
     A piece is what hangs together over gaps at least as wide as a segment bridges.
     """
-    # The box of a grown piece is wider than the piece, at whose cells' far sides a segment ends.
     pieces = Pieces.of(occupied, int(np.ceil((parameters.segment_max_gap_m / resolution_m + 1) / 2)))
-    return pieces.cells(np.hypot(*(pieces.sides * resolution_m).T) >= min_length_m, occupied.shape)
+    # A segment ends at the far sides of cells, and a cell further where it is rounded up to steps.
+    sides_m = (pieces.sides + 1) * resolution_m
+    return pieces.cells(np.hypot(*sides_m.T) >= min_length_m, occupied.shape)
 
 
 def local_directions(dominant_rad: FloatArray, parameters: WallParameters) -> FloatArray:

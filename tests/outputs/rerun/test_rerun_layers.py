@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import rerun as rr
 from commands import WAIT_S
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from rerun.chunk import RrdReader
 
@@ -195,9 +195,9 @@ def test_no_more_rows_wait_than_were_allowed():
     assert rows == [("/picture", 6), ("/picture", 3), ("/label", 4), ("/label", 1)]
 
 
-@given(st.floats(0.0, 1.0))
-def test_coverage_in_whole_percent_is_never_too_much(coverage: float):
-    """And less than one percent too little; only the whole is 100."""
-    percent = whole_percent(coverage)
-    assert percent <= 100 * coverage < percent + 1
-    assert (percent == 100) == (100 * coverage >= 100)
+@given(st.integers(1, 10**8).flatmap(lambda cells: st.tuples(st.integers(0, cells), st.just(cells))))
+@example((29, 100))
+def test_coverage_in_whole_percent_is_that_of_the_cells_rounded_down(seen: tuple[int, int]):
+    """Only the whole is 100; 29 of 100 cells are 29 %, though 100 times 0.29 is less."""
+    cells, of_cells = seen
+    assert whole_percent(cells / of_cells) == 100 * cells // of_cells

@@ -79,6 +79,16 @@ def test_the_mouth_of_a_narrow_corridor_is_a_doorway_of_the_hall():
     assert mouth_of_corridor(corridor_cells=48) > PARAMETERS.join_min_passage
 
 
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_the_last_sample_of_a_line_counts_as_the_first_one_does(mirrored):
+    walls = np.zeros((40, 40), bool)
+    walls[20, :39] = True
+    walls = walls[:, ::-1] if mirrored else walls
+    line = np.array([[0, 20.5 * 0.05, 2.0, 20.5 * 0.05]])
+    found = edge_evidence(line, line, walls, distance_from(walls), ~walls, 0.05, PARAMETERS)
+    assert found.passage_share[0] == pytest.approx(0.2276, abs=0.001)
+
+
 def test_a_line_across_a_narrow_corridor_is_no_doorway_though_walls_go_on_at_both_sides():
     walls = np.zeros((160, 160), bool)
     walls[:, 60:62] = walls[:, 86:88] = True  # the corridor

@@ -9,8 +9,10 @@ import pickle
 import numpy as np
 import pytest
 from drawn_maps import office, snapshot
+from finished_runs import SAMPLE_LOGS
 
 import rose2_logs as rl
+from rose2_logs.model.labels import narrow_labels
 from rose2_logs.segmentation.pipeline import RoomTree, analyze_with_tree
 
 DETAILS = (-20.0, -6.0, -2.0, -0.5, 0.0, 0.5, 2.0, 6.0, 20.0)
@@ -41,6 +43,36 @@ def test_more_detail_never_joins_what_less_detail_parts(grown: RoomTree, strengt
         pairs = np.unique(np.column_stack([fine[both], coarse[both]]), axis=0)
         assert len(np.unique(pairs[:, 0])) == len(pairs)
     assert found[0].max() < found[-1].max()
+
+
+@pytest.fixture(scope="module", params=["office.mcap", "ring", "wing.bag"])
+def last_map(request) -> tuple[rl.Snapshot, RoomTree]:
+    with rl.open_log(SAMPLE_LOGS / request.param) as reader:
+        last = reader.last()
+    tree = analyze_with_tree(last)[1]
+    assert tree is not None
+    return last, tree
+
+
+def test_more_detail_joins_at_most_what_is_no_room_by_itself(last_map):
+    """Of the maps of the sample logs: floor that is cut off, too small for a room, may change its room."""
+    last, tree = last_map
+    found = [tree.tree.rooms(detail).labels for detail in DETAILS]
+    for coarse, fine in itertools.pairwise(found):
+        both = (coarse > 0) & (fine > 0)
+        overlap = np.zeros((fine.max() + 1, coarse.max() + 1))
+        np.add.at(overlap, (fine[both], coarse[both]), last.geometry.cell_area_m2)
+        assert np.sort(overlap, axis=1)[:, -2].max() < tree.parameters.regions.room_min_area_m2
+        assert fine.max() >= coarse.max()
+
+
+def test_no_room_is_narrow_at_any_detail(last_map):
+    last, tree = last_map
+    cell_m, regions = last.geometry.resolution_m, tree.parameters.regions
+    for detail in DETAILS:
+        labels = tree.rooms(detail).rooms.labels
+        limits = regions.room_min_width_m / cell_m, regions.speck_max_m / cell_m
+        assert not narrow_labels(labels, int(labels.max()), *limits).any()
 
 
 def test_detail_parts_surer_joins_step_by_step(grown: RoomTree):

@@ -1,5 +1,7 @@
 """What is outside: white around a building, and what the fitted rule says, unless hardly anything is left."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from drawn_floors import corridor_of_offices, draw_floor, turned
@@ -19,7 +21,7 @@ from rose2_logs.segmentation.regions.outside import (
     edge_shares,
     leftovers_joined,
     outside_of,
-    room_numbers,
+    rooms_among,
     surroundings,
 )
 from rose2_logs.segmentation.regions.plan_frame import PlanFrame
@@ -46,7 +48,8 @@ def rooms(area_m2, log_odds, edge_share=None, narrow=None):
     graph = lone_regions(*area_m2)
     no_width = None if narrow is None else np.array(narrow)
     outside = outside_of(graph, edge, lambda _: np.array(log_odds), PARAMETERS, no_width)
-    return room_numbers(graph, outside, PARAMETERS).tolist(), float(np.array(area_m2)[outside].sum())
+    room = rooms_among(graph, outside, PARAMETERS)
+    return np.where(room, np.cumsum(room), 0).tolist(), float(np.array(area_m2)[outside].sum())
 
 
 def test_rooms_are_numbered_and_what_is_outside_is_measured():
@@ -157,11 +160,41 @@ def test_a_map_of_which_nothing_is_known_has_no_edge():
 
 def test_the_floor_of_a_doorway_goes_to_the_room_it_is_likeliest_of():
     graph = drawn_graph(["1111#2222", "111133222", "1111#2222", "1111#2222"])
-    room, outside = np.array([1, 2, 0]), np.zeros(3, bool)
+    room, outside = np.array([True, True, False]), np.zeros(3, bool)
     for likeliest in (0, 1):
 
         def strength(features, likeliest=likeliest):
             return np.where(np.arange(len(features)) == likeliest, 1.0, -1.0)
 
-        assert leftovers_joined(graph, room, outside, strength).tolist() == [0, 1, likeliest]
-    assert leftovers_joined(graph, room, np.array([False, False, True]), strength).tolist() == [0, 1, 2]
+        region, is_room = leftovers_joined(graph, room, outside, strength, PARAMETERS)
+        assert region.tolist() == [0, 1, likeliest]
+        assert is_room.tolist() == room.tolist()
+    outside[2] = True
+    assert leftovers_joined(graph, room, outside, strength, PARAMETERS)[0].tolist() == [0, 1, 2]
+
+
+def test_what_belongs_together_comes_before_the_strength_of_a_border():
+    graph = drawn_graph(["1111#2222", "111133222", "1111#2222", "1111#2222"])
+    room, outside = np.array([True, True, False]), np.zeros(3, bool)
+    for wanted in (0, 1):
+
+        def together(one, other, wanted=wanted):
+            return (((one == wanted) | (other == wanted)).astype(float),)
+
+        for sign in (1.0, -1.0):
+            region, _ = leftovers_joined(
+                graph, room, outside, lambda f, sign=sign: sign * np.arange(len(f)), PARAMETERS, together
+            )
+            assert region.tolist() == [0, 1, wanted]
+
+
+@pytest.mark.parametrize("narrow", [False, True])
+def test_small_regions_that_are_as_large_as_a_room_together_are_one_unless_they_are_narrow(narrow):
+    graph = drawn_graph(["11112222"] * 4)
+    one_room = replace(PARAMETERS, room_min_area_m2=float(graph.node_sums[:, 0].sum()))
+    room = outside = np.zeros(2, bool)
+    region, is_room = leftovers_joined(
+        graph, room, outside, lambda f: np.zeros(len(f)), one_room, narrow=np.array([narrow, False])
+    )
+    assert region.tolist() == [0, 0]
+    assert is_room.tolist() == [not narrow, False]

@@ -18,6 +18,19 @@ def in_one_piece(labels, resolution_m, gap_m, piece_min_m2, occupied=None, width
     return rooms_in_one_piece(labels, occupied, resolution_m, parameters)
 
 
+def test_the_piece_that_is_wide_enough_is_the_room_though_a_narrow_one_is_larger():
+    labels = np.zeros((80, 260), np.int32)
+    labels[5:13, 5:255] = 1  # 0.4 m wide, 5 m2
+    labels[40:70, 5:35] = 1  # 2.25 m2
+    labels[75:79, 5:9] = 1  # too small for a room: stays with it
+    pieces, room_of_piece = in_one_piece(labels, 0.05, GAP_M, PIECE_M2, width_m=0.6)
+    assert room_of_piece.tolist() == [0, 1]
+    assert (pieces[:20] == 0).all()
+    assert (pieces[20:] == labels[20:]).all()
+    only_narrow = labels[:20]
+    assert (in_one_piece(only_narrow, 0.05, GAP_M, PIECE_M2, width_m=0.6)[0] == only_narrow).all()
+
+
 def test_what_a_wall_closes_is_no_gap():
     labels = two_pieces(4)
     wall = np.zeros(labels.shape, bool)

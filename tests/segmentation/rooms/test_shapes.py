@@ -6,8 +6,10 @@ import cv2
 import numpy as np
 import pytest
 import shapely
+from finished_runs import SAMPLE_LOGS
 from shapely.affinity import rotate
 
+import rose2_logs as rl
 from rose2_logs.config.parameters import FloorPlanParameters
 from rose2_logs.segmentation.rooms.shapes import room_shapes, seen_cells
 
@@ -186,3 +188,17 @@ def test_every_room_has_a_valid_shape_that_holds_its_cells(seed: int):
 
 def test_a_map_without_rooms_has_no_shapes():
     assert Drawing().shapes() == []
+
+
+def test_every_part_of_a_shape_was_seen_somewhere():
+    """Also beside other rooms, where parts of shapes meet."""
+    with rl.open_log(SAMPLE_LOGS / "office.mcap") as reader:
+        first = next(iter(reader.snapshots()))
+    found = rl.segment(first)
+    row, column = np.nonzero(found.labels)
+    points = shapely.points(found.geometry.cell_centers(row, column))
+    seen = shapely.STRtree(points)
+    for number, polygon in enumerate(found.polygons, start=1):
+        for part in shapely.get_parts(polygon):
+            near = seen.query(part, predicate="dwithin", distance=found.geometry.resolution_m)
+            assert (found.labels[row[near], column[near]] == number).any()

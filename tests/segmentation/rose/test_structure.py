@@ -90,6 +90,15 @@ def test_small_pieces_are_left_out_unless_they_lie_in_line_with_walls():
     assert supported[80].sum() == 10
 
 
+def test_a_piece_at_the_edge_of_the_map_is_as_long_as_elsewhere():
+    occupied = np.zeros((40, 120), bool)
+    longest = int(np.ceil(PARAMETERS.piece_min_extent_m / 0.05))
+    occupied[0, :longest] = True
+    assert supported_cells(np.zeros(occupied.shape, np.float32), occupied, 0.05, PARAMETERS).any()
+    occupied[0, longest - 2 :] = False
+    assert not supported_cells(np.zeros(occupied.shape, np.float32), occupied, 0.05, PARAMETERS).any()
+
+
 @pytest.mark.parametrize("turn_deg", [0, 30, 75])
 def test_the_picture_of_the_spectrum_has_a_ridge_across_the_walls(turn_deg):
     """Bright along the line at right angles to the walls; the same turned by half a circle."""
