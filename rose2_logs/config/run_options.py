@@ -272,7 +272,7 @@ class RunOptions:
     )
     start_s: float | None = option(
         None,
-        "Skip the first S seconds of the log.",
+        "Skip the first S seconds of the log. Times in the results count from the first map instead.",
         panel=MAPS,
         commands=BOTH,
         flag="--start",
@@ -283,7 +283,7 @@ class RunOptions:
     )
     end_s: float | None = option(
         None,
-        "Stop S seconds after the beginning of the log.",
+        "Stop S seconds after the beginning of the log, not of its maps.",
         panel=MAPS,
         commands=BOTH,
         flag="--end",

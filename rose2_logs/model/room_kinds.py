@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from rose2_logs.config.kinds import KindParameters
+from rose2_logs.model.mitred import mitred
 from rose2_logs.model.occupancy import BoolArray
 
 Shapes = NDArray[np.object_]
@@ -62,7 +63,8 @@ def _are_compact(shapes: Shapes, elongation: float) -> BoolArray:
 
 def _are_corridors(shapes: Shapes, parameters: KindParameters) -> BoolArray:
     filled = _filled(shapes, parameters)
-    are_corridors = ~_are_compact(filled, parameters.corridor_min_elongation)
+    # What grew from slivers that cross themselves may shrink to nothing.
+    are_corridors = ~_are_compact(filled, parameters.corridor_min_elongation) & ~shapely.is_empty(filled)
     smooth = _cut_back(filled[are_corridors], parameters.detail_m)
     circles = shapely.maximum_inscribed_circle(smooth, tolerance=parameters.detail_m / 10)
     width_m = 2 * shapely.length(circles)
@@ -87,12 +89,7 @@ def _filled(shapes: Shapes, parameters: KindParameters) -> Shapes:
         parts[number] = _without_islands(parts[number], parameters.island_max_m2)
     pieces = np.full((len(shapes), np.bincount(shape).max(initial=0)), None)
     pieces[shape, np.arange(len(shape)) - np.searchsorted(shape, shape)] = parts
-    return _grown(_grown(shapely.union_all(pieces, axis=1), detail_m), -detail_m)
-
-
-def _grown(shapes: Shapes, by_m: float) -> Shapes:
-    grown: Shapes = shapely.buffer(shapes, by_m, join_style="mitre")
-    return grown
+    return mitred(mitred(shapely.union_all(pieces, axis=1), detail_m), -detail_m)
 
 
 def _without_islands(part: shapely.Polygon, most_m2: float) -> shapely.Polygon:
@@ -103,6 +100,6 @@ def _without_islands(part: shapely.Polygon, most_m2: float) -> shapely.Polygon:
 
 def _cut_back(filled: Shapes, detail_m: float) -> Shapes:
     """Take away what juts out, up to twice a detail in width; shapes that are nowhere wider stay."""
-    smooth = _grown(_grown(filled, -detail_m), detail_m)
+    smooth = mitred(mitred(filled, -detail_m), detail_m)
     are_wider = shapely.area(smooth) > shapely.area(filled) / 2
     return np.where(are_wider, shapely.simplify(smooth, detail_m), filled)

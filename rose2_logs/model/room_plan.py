@@ -13,6 +13,7 @@ from rose2_logs.config.parameters import OccupancyParameters
 from rose2_logs.model.analysis import SnapshotAnalysis
 from rose2_logs.model.borders import Border, unsure_of
 from rose2_logs.model.labels import known_window
+from rose2_logs.model.mitred import mitred
 from rose2_logs.model.occupancy import UNKNOWN, BoolArray, FloatArray, GridGeometry, OccupancySnapshot
 from rose2_logs.model.outlines import outline
 from rose2_logs.model.room_names import room_name
@@ -225,8 +226,8 @@ def wall_outlines(plan: RoomPlan) -> list[shapely.Polygon]:
     if plan.walls_m is None or not len(plan.walls_m):
         return []
     lines = shapely.linestrings(plan.walls_m)
-    wide = shapely.union_all(shapely.buffer(lines, WALL_JOIN_M, cap_style="square", join_style="mitre"))
-    walls = shapely.buffer(wide, WALL_EDGE_M - WALL_JOIN_M, join_style="mitre").simplify(WALL_DETAIL_M)
+    wide = shapely.union_all(mitred(lines, WALL_JOIN_M, cap_style="square"))
+    walls = mitred(wide, WALL_EDGE_M - WALL_JOIN_M).simplify(WALL_DETAIL_M)
     return sorted(shapely.get_parts(walls), key=lambda wall: wall.bounds)
 
 
@@ -259,7 +260,7 @@ def _unknown_within(shape: BaseGeometry, below: PlanMap) -> BaseGeometry:
         return shapely.Polygon()
     in_cells = shapely.transform(shape, lambda xy: geometry.world_to_grid(xy) / geometry.resolution_m)
     # A little smaller: a cell whose side is on the outline is in or out by its middle, not by rounding.
-    in_cells = in_cells.buffer(-ROUNDING_CELLS, join_style="mitre")
+    in_cells = mitred(in_cells, -ROUNDING_CELLS)
     if in_cells.is_empty:
         return in_cells
     x0, y0, x1, y1 = (int(value) for value in np.round(in_cells.bounds))

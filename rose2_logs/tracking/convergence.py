@@ -197,7 +197,7 @@ def _follow_tracks(
             measured.area_settled.setdefault(track, snapshot_refs[snapshot])
         if iou >= parameters.last_shape_min_iou and track not in measured.shape_right:
             measured.shape_right[track] = snapshot_refs[snapshot]
-            measured.shape_right_seen[track] = area / last if last > 0 else 0.0
+            measured.shape_right_seen[track] = min(area / last, 1.0) if last > 0 else 0.0
 
 
 def _since(

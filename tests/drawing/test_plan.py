@@ -16,7 +16,15 @@ from PIL import Image
 
 from rose2_logs.drawing.drawing import Drawing
 from rose2_logs.drawing.fonts import text_width
-from rose2_logs.drawing.map_painter import FREE_GRAY, OCCUPIED_GRAY, UNKNOWN_GRAY, UNSURE_COLOR, tinted_cells
+from rose2_logs.drawing.map_painter import (
+    FREE_GRAY,
+    HOLE_MIN,
+    OCCUPIED_GRAY,
+    UNKNOWN_GRAY,
+    UNSURE_COLOR,
+    simpler,
+    tinted_cells,
+)
 from rose2_logs.drawing.palette import track_color
 from rose2_logs.drawing.pixels import as_pixels
 from rose2_logs.drawing.plan import (
@@ -269,3 +277,13 @@ def test_tint_fades_where_a_cell_is_occupied():
     pixels = tinted_cells(cells, np.array([[1, 1, 1, 2]]), {1: (255, 0, 0)}, 1.0)
     assert pixels[0].tolist() == [[255, 0, 0], [OCCUPIED_GRAY] * 3, [255, 0, 0], [FREE_GRAY] * 3]
     assert tinted_cells(cells)[0, 2].tolist() == [UNKNOWN_GRAY] * 3
+
+
+def test_a_part_within_a_hole_too_small_to_be_seen_is_part_of_what_is_around_it():
+    side = 0.9 * HOLE_MIN**0.5
+    around = shapely.box(-10, -10, 10, 10) - shapely.box(0, 0, side, side)
+    within = shapely.box(side / 4, side / 4, side / 2, side / 2)
+    found = simpler(shapely.MultiPolygon([around, within]), 0.0)
+    assert found.is_valid
+    assert found.equals(shapely.box(-10, -10, 10, 10))
+    assert simpler(shapely.MultiPolygon(), 1.0).is_empty

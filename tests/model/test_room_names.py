@@ -58,3 +58,11 @@ def test_kinds_are_guessed_from_shapes(shape, kind):
     if kind == "room":
         teeth = shapely.union_all([shapely.box(x, 3.4, x + 0.3, 4) for x in (0.5, 1.3, 2.1, 2.9, 3.7)])
         assert guess_kinds([shapely.difference(shape, teeth)], KindParameters()) == [kind]
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_shape_at_whose_corners_geos_divides_by_zero_has_a_kind_and_no_warning():
+    points = [(0.1, 0.1), (0.2, 0.0), (0.15, 0.15), (0.15, 0.05), (0.15, 0.05)]
+    exact = [(x, 0.15000000000000002 if y == 0.15 else y) for x, y in points]
+    exact = [(0.15000000000000002 if x == 0.15 else x, y) for x, y in exact]
+    assert len(guess_kinds([shapely.Polygon(exact)], KindParameters())) == 1

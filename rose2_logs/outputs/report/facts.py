@@ -258,7 +258,7 @@ def meanings(results: Run) -> list[tuple[str, str]]:
             "room to about 90%.",
         ),
         ("Hatched", "Part of a room's shape that no map has shown: predicted from its walls."),
-        ("Orange line", "A doorway between two rooms."),
+        ("Red line", "A doorway between two rooms."),
         (
             "Purple line",
             "An unsure border: that its rooms are two has a probability below "

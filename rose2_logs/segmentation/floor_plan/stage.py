@@ -11,6 +11,7 @@ from shapely.affinity import rotate
 
 from rose2_logs.config.parameters import FloorPlanParameters
 from rose2_logs.model.labels import LabelRuns, distance_from, row_ends
+from rose2_logs.model.mitred import mitred
 from rose2_logs.model.occupancy import BoolArray, FloatArray
 from rose2_logs.segmentation.floor_plan.edge_weights import EdgeEvidence, edge_evidence
 from rose2_logs.segmentation.floor_plan.faces import FaceGraph, build_faces, label_faces
@@ -134,6 +135,6 @@ def frame_along(
         return shapely.box(0, 0, known.shape[1] * resolution_m, known.shape[0] * resolution_m)
     corners = np.concatenate([np.column_stack([x, y]) for x in (first, last + 1) for y in (rows, rows + 1)])
     turned = rotate(shapely.linestrings(corners * resolution_m), -direction_rad, (0, 0), use_radians=True)
-    box = shapely.buffer(shapely.envelope(turned), margin_m, join_style="mitre")
+    box = mitred(shapely.envelope(turned), margin_m)
     frame: shapely.Polygon = rotate(box, direction_rad, (0, 0), use_radians=True)
     return frame
