@@ -64,7 +64,8 @@ def _are_compact(shapes: Shapes, elongation: float) -> BoolArray:
 def _are_corridors(shapes: Shapes, parameters: KindParameters) -> BoolArray:
     filled = _filled(shapes, parameters)
     # What grew from slivers that cross themselves may shrink to nothing.
-    are_corridors = ~_are_compact(filled, parameters.corridor_min_elongation) & ~shapely.is_empty(filled)
+    are_corridors: BoolArray = ~shapely.is_empty(filled)
+    are_corridors &= ~_are_compact(filled, parameters.corridor_min_elongation)
     smooth = _cut_back(filled[are_corridors], parameters.detail_m)
     circles = shapely.maximum_inscribed_circle(smooth, tolerance=parameters.detail_m / 10)
     width_m = 2 * shapely.length(circles)

@@ -375,7 +375,7 @@ def _floor_plan(
 ) -> FloorPlan:
     return FloorPlan(
         edges_m=explored.segments(plan.graph.edges_m),
-        edge_weight=plan.evidence.weight,
+        edge_weight=plan.cover.weight,
         edge_faces=plan.graph.edge_faces,
         faces_wkb=tuple(shapely.to_wkb(shapely.transform(plan.graph.polygons, explored.points)).tolist()),
         face_inside=plan.seen >= parameters.face_min_seen,

@@ -21,29 +21,19 @@ Number = TypeVar("Number", bound=np.generic)
 
 
 @dataclass(frozen=True, eq=False)
-class EdgeEvidence:
-    """Lengths (E,) in meters of each edge; what is neither was not seen or is clutter.
+class WallCover:
+    """Lengths (E,) in meters of each edge.
 
     Attributes
     ----------
     wall_m : (E,) float
         Covered by walls.
-    blind_m : (E,) float
-        Of these, what shows no free space on one of its sides, see `_read_lines`.
-    open_m : (E,) float
-        Open free space.
     length_m : (E,) float
         All of the edge.
-    passage_share : (E,) float
-        Width of the best passage through the edge (a stretch of its line without a wall) over the width of
-        the room next to it: about 1 across a corridor, less in a doorway, 0 where the edge is not open.
     """
 
     wall_m: FloatArray
-    blind_m: FloatArray
-    open_m: FloatArray
     length_m: FloatArray
-    passage_share: FloatArray
 
     @property
     def weight(self) -> FloatArray:
@@ -52,6 +42,49 @@ class EdgeEvidence:
             self.wall_m, self.length_m, out=np.zeros_like(self.wall_m), where=self.length_m > 0
         )
         return np.minimum(share, 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class EdgeEvidence(WallCover):
+    """All that the map says along each edge; what is neither wall nor open was not seen or is clutter.
+
+    Attributes
+    ----------
+    blind_m : (E,) float
+        Of what walls cover, in meters, what shows no free space on one of its sides, see `_Samples.blind`.
+    open_m : (E,) float
+        Open free space, meters.
+    passage_share : (E,) float
+        Width of the best passage through the edge (a stretch of its line without a wall) over the width of
+        the room next to it: about 1 across a corridor, less in a doorway, 0 where the edge is not open.
+    """
+
+    blind_m: FloatArray
+    open_m: FloatArray
+    passage_share: FloatArray
+
+
+def wall_cover(
+    edges_m: FloatArray,
+    lines_m: FloatArray,
+    walls: BoolArray,
+    resolution_m: float,
+    parameters: FloorPlanParameters,
+) -> WallCover:
+    """Read the walls along the representative lines and share what is found among their edges.
+
+    Parameters
+    ----------
+    edges_m : (E, 4) float
+        Edges in the grid frame, meters; those that are on no line get zeros.
+    lines_m : (L, 4) float
+        Representative lines.
+    walls : (H, W) bool
+    """
+    if len(lines_m) == 0:
+        return WallCover(np.zeros(len(edges_m)), _lengths(edges_m))
+    samples = _Samples.of(lines_m, walls.view(np.uint8), resolution_m, parameters)
+    return WallCover(_Places.of(edges_m, lines_m, samples).length_m(samples.is_wall), _lengths(edges_m))
 
 
 def edge_evidence(
@@ -63,14 +96,12 @@ def edge_evidence(
     resolution_m: float,
     parameters: FloorPlanParameters,
 ) -> EdgeEvidence:
-    """Read the map along the representative lines and share what is found among their edges.
+    """Read all of the map along the lines, as `wall_cover` reads its walls: what grouping asks for.
 
     Parameters
     ----------
-    edges_m : (E, 4) float
-        Edges in the grid frame, meters; those that are on no line get zeros.
-    lines_m : (L, 4) float
-        Representative lines.
+    edges_m, lines_m
+        As for `wall_cover`.
     walls, free : (H, W) bool
         Cells of walls and free cells.
     distance : (H, W) float32
@@ -78,35 +109,79 @@ def edge_evidence(
     """
     if len(lines_m) == 0:
         nothing = np.zeros(len(edges_m))
-        length = np.hypot(edges_m[:, 2] - edges_m[:, 0], edges_m[:, 3] - edges_m[:, 1])
-        return EdgeEvidence(nothing, nothing, nothing, length, nothing)
-    line, step_m, is_wall, is_blind, is_free = _read_lines(lines_m, walls, free, resolution_m, parameters)
-    offset = np.concatenate([[0], np.cumsum(np.bincount(line, minlength=len(lines_m)))])
-    owner, start, end = _place_edges(edges_m, lines_m)
-    length = np.hypot(edges_m[:, 2] - edges_m[:, 0], edges_m[:, 3] - edges_m[:, 1])
-    on_line = owner >= 0
-    lengths = []
-    for flag in (is_wall, is_blind, is_free & ~is_wall):
+        return EdgeEvidence(nothing, _lengths(edges_m), nothing, nothing, nothing)
+    # Both masks are looked up at once, one in each bit.
+    kinds = walls * np.uint8(WALL) | free * np.uint8(FREE)
+    samples = _Samples.of(lines_m, kinds, resolution_m, parameters)
+    places, is_wall, is_free = _Places.of(edges_m, lines_m, samples), samples.is_wall, samples.free()
+    share = _passages(
+        samples.line, is_wall, is_free, samples.step_m, lines_m, distance, resolution_m, parameters
+    )
+    return EdgeEvidence(
+        places.length_m(is_wall),
+        _lengths(edges_m),
+        places.length_m(samples.blind(resolution_m, parameters)),
+        places.length_m(is_free & ~is_wall),
+        places.greatest(share),
+    )
+
+
+def _lengths(edges_m: FloatArray) -> FloatArray:
+    return np.hypot(edges_m[:, 2] - edges_m[:, 0], edges_m[:, 3] - edges_m[:, 1])
+
+
+@dataclass(frozen=True, eq=False)
+class _Places:
+    """Where edges lie on the samples of the lines.
+
+    Attributes
+    ----------
+    on_line : (E,) bool
+        Edges that lie on a line.
+    offset : (E,) int
+        First sample of an edge's line.
+    start, end : (E,) float
+        From where to where the edge goes, in samples of its line.
+    step_m : (E,) float
+        Distance between the samples of an edge's line.
+    """
+
+    on_line: BoolArray
+    offset: NDArray[np.intp]
+    start: FloatArray
+    end: FloatArray
+    step_m: FloatArray
+
+    @classmethod
+    def of(cls, edges_m: FloatArray, lines_m: FloatArray, samples: _Samples) -> _Places:
+        offset = np.concatenate([[0], np.cumsum(np.bincount(samples.line, minlength=len(lines_m)))])
+        owner, start, end = _place_edges(edges_m, lines_m)
+        step_m = samples.step_m[owner]
+        return cls(owner >= 0, offset[owner], start / step_m, end / step_m, step_m)
+
+    def length_m(self, flag: BoolArray) -> FloatArray:
+        """Length (E,) of the samples (S,) with a flag on each edge."""
         total = np.concatenate([[0.0], np.cumsum(flag)])
         samples = np.arange(len(total), dtype=float)
-        base, step = offset[owner[on_line]], step_m[owner[on_line]]
-        spans = [np.interp(base + at[on_line] / step, samples, total) for at in (start, end)]
-        value = np.zeros(len(edges_m))
-        value[on_line] = (spans[1] - spans[0]) * step
-        lengths.append(value)
-    run_share = _passages(line, is_wall, is_free, step_m, lines_m, distance, resolution_m, parameters)
-    share = np.zeros(len(edges_m))
-    first = offset[owner] + np.floor(start / step_m[owner] + 0.5).astype(np.int64)
-    last = offset[owner] + np.floor(end / step_m[owner] + 0.5).astype(np.int64)
-    some = np.flatnonzero(on_line & (last > first))
-    # In the order of the samples, since what lies between two edges is gone through as well.
-    some = some[np.argsort(first[some], kind="stable")]
-    if len(some):
-        # One share more, since the last edge may end behind the last sample.
-        bounds = np.column_stack([first[some], last[some]]).ravel()
-        share[some] = np.maximum.reduceat(np.append(run_share, 0.0), bounds)[::2]
-    wall_m, blind_m, open_m = lengths
-    return EdgeEvidence(wall_m, blind_m, open_m, length, share)
+        start, end = (
+            np.interp((self.offset + at)[self.on_line], samples, total) for at in (self.start, self.end)
+        )
+        value = np.zeros(len(self.on_line))
+        value[self.on_line] = (end - start) * self.step_m[self.on_line]
+        return value
+
+    def greatest(self, values: FloatArray) -> FloatArray:
+        """Greatest (E,) of the values (S,) of each edge's samples, 0 for edges without any."""
+        found = np.zeros(len(self.on_line))
+        first, last = (self.offset + np.floor(at + 0.5).astype(np.int64) for at in (self.start, self.end))
+        some = np.flatnonzero(self.on_line & (last > first))
+        # In the order of the samples, since what lies between two edges is gone through as well.
+        some = some[np.argsort(first[some], kind="stable")]
+        if len(some):
+            # One value more, since the last edge may end behind the last sample.
+            bounds = np.column_stack([first[some], last[some]]).ravel()
+            found[some] = np.maximum.reduceat(np.append(values, 0.0), bounds)[::2]
+        return found
 
 
 def _passages(
@@ -187,50 +262,73 @@ def _between_jambs(
     return between
 
 
-def _read_lines(
-    lines_m: FloatArray,
-    walls: BoolArray,
-    free: BoolArray,
-    resolution_m: float,
-    parameters: FloorPlanParameters,
-) -> tuple[NDArray[np.intp], FloatArray, BoolArray, BoolArray, BoolArray]:
-    """Sample each line in steps of one cell; a sample is wall if a wall cell is within the tolerance across.
+@dataclass(frozen=True, eq=False)
+class _Samples:
+    """Points along each line, in steps of one cell.
 
-    A wall is blind where no free cell lies within `blind_look_m` on one of its sides, unless another wall
-    runs there: what is behind was not seen, or is a piece of furniture.
-
-    Returns
-    -------
+    Attributes
+    ----------
     line : (S,) int
         Line of each sample, in order along the lines.
     step_m : (L,) float
         Distance between the samples of a line.
-    is_wall, is_blind, is_free : (S,) bool
+    points : four of (S,) float
+        x and y of each sample, and of the unit vector across its line.
+    kinds : _Image
+        What the cells are, in bits.
+    is_wall : (S,) bool
+        Samples with a wall cell within the tolerance across.
     """
-    vector = lines_m[:, 2:] - lines_m[:, :2]
-    length = np.hypot(vector[:, 0], vector[:, 1])
-    count = np.maximum(np.ceil(length / resolution_m).astype(np.int64), 1)
-    line = np.repeat(np.arange(len(lines_m)), count)
-    position = np.arange(len(line)) - np.repeat(np.cumsum(count) - count, count)
-    share = (position + 0.5) / count[line]
-    (begin_x, begin_y), (along_x, along_y) = lines_m[:, :2].T, vector.T
-    x, y = begin_x[line] + along_x[line] * share, begin_y[line] + along_y[line] * share
-    across = np.stack([-along_y, along_x]) / np.maximum(length, 1e-12)
-    across_x, across_y = across[0][line], across[1][line]
-    # Both masks are looked up at once, one in each bit.
-    kinds = _Image(walls * np.uint8(WALL) | free * np.uint8(FREE), resolution_m)
-    reach = round(parameters.wall_tolerance_m / resolution_m)
-    steps = np.arange(-reach, reach + 1)[:, None] * resolution_m
-    met = np.bitwise_or.reduce(kinds.at(x + across_x * steps, y + across_y * steps), axis=0)
-    is_wall = (met & WALL) > 0
-    is_blind = np.zeros(len(line), bool)
-    wall_x, wall_y, across_x, across_y = (values.compress(is_wall) for values in (x, y, across_x, across_y))
-    steps = np.arange(1, round(parameters.blind_look_m / resolution_m) + 1)[:, None] * resolution_m
-    for side in (1, -1):
-        found = kinds.at(wall_x + across_x * (side * steps), wall_y + across_y * (side * steps))
-        any_of, all_of = np.bitwise_or.reduce(found, axis=0), np.bitwise_and.reduce(found, axis=0)
-        is_blind[is_wall] |= ((any_of & FREE) == 0) & ((all_of & WALL) == 0)
-    return line, length / count, is_wall, is_blind, (kinds.at(x, y) & FREE) > 0
+
+    line: NDArray[np.intp]
+    step_m: FloatArray
+    points: tuple[FloatArray, FloatArray, FloatArray, FloatArray]
+    kinds: _Image[np.uint8]
+    is_wall: BoolArray
+
+    @classmethod
+    def of(
+        cls,
+        lines_m: FloatArray,
+        kinds: NDArray[np.uint8],
+        resolution_m: float,
+        parameters: FloorPlanParameters,
+    ) -> _Samples:
+        vector = lines_m[:, 2:] - lines_m[:, :2]
+        length = np.hypot(vector[:, 0], vector[:, 1])
+        count = np.maximum(np.ceil(length / resolution_m).astype(np.int64), 1)
+        line = np.repeat(np.arange(len(lines_m)), count)
+        position = np.arange(len(line)) - np.repeat(np.cumsum(count) - count, count)
+        share = (position + 0.5) / count[line]
+        (begin_x, begin_y), (along_x, along_y) = lines_m[:, :2].T, vector.T
+        x, y = begin_x[line] + along_x[line] * share, begin_y[line] + along_y[line] * share
+        across = np.stack([-along_y, along_x]) / np.maximum(length, 1e-12)
+        across_x, across_y = across[0][line], across[1][line]
+        image = _Image(kinds, resolution_m)
+        reach = round(parameters.wall_tolerance_m / resolution_m)
+        steps = np.arange(-reach, reach + 1)[:, None] * resolution_m
+        met = np.bitwise_or.reduce(image.at(x + across_x * steps, y + across_y * steps), axis=0)
+        return cls(line, length / count, (x, y, across_x, across_y), image, (met & WALL) > 0)
+
+    def free(self) -> BoolArray:
+        """Whether each sample (S,) lies on a free cell."""
+        x, y, _, _ = self.points
+        is_free: BoolArray = (self.kinds.at(x, y) & FREE) > 0
+        return is_free
+
+    def blind(self, resolution_m: float, parameters: FloorPlanParameters) -> BoolArray:
+        """Walls (S,) without a free cell within `blind_look_m` on one side, unless another wall runs there.
+
+        What is behind them was not seen, or is a piece of furniture.
+        """
+        is_blind = np.zeros(len(self.line), bool)
+        x, y, across_x, across_y = (values.compress(self.is_wall) for values in self.points)
+        steps = np.arange(1, round(parameters.blind_look_m / resolution_m) + 1)[:, None] * resolution_m
+        for side in (1, -1):
+            found = self.kinds.at(x + across_x * (side * steps), y + across_y * (side * steps))
+            any_of, all_of = np.bitwise_or.reduce(found, axis=0), np.bitwise_and.reduce(found, axis=0)
+            is_blind[self.is_wall] |= ((any_of & FREE) == 0) & ((all_of & WALL) == 0)
+        return is_blind
 
 
 class _Image(Generic[Number]):

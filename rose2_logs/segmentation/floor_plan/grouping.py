@@ -24,8 +24,8 @@ def group_faces(
 ) -> NDArray[np.int32]:
     """Join faces that no wall divides.
 
-    By default the two groups with the best connection are joined, again and again, until no connection is
-    good enough; the paper's DBSCAN over pairs of faces is available for comparison.
+    With `walls` the two groups with the best connection are joined, again and again, until no connection is
+    good enough; with `dbscan` pairs of faces are clustered as in the paper, for comparison.
 
     The openness of a border is its open length over its known length, wall or open, taken over the whole
     border between two groups, so that a door in a long wall never joins what the wall divides. The best

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from shapely.affinity import rotate
 
 from rose2_logs.config.parameters import FloorPlanParameters
-from rose2_logs.model.labels import LabelRuns, distance_from, row_ends
+from rose2_logs.model.labels import LabelRuns, row_ends
 from rose2_logs.model.mitred import mitred
 from rose2_logs.model.occupancy import BoolArray, FloatArray
-from rose2_logs.segmentation.floor_plan.edge_weights import EdgeEvidence, edge_evidence
+from rose2_logs.segmentation.floor_plan.edge_weights import WallCover, edge_evidence, wall_cover
 from rose2_logs.segmentation.floor_plan.faces import FaceGraph, build_faces, label_faces
 from rose2_logs.segmentation.floor_plan.grouping import group_faces
 
@@ -29,7 +29,7 @@ class FloorPlanResult:
         1 + index of the face that holds each cell.
     free_faces : LabelRuns
         The same of the free cells, 0 elsewhere.
-    evidence : EdgeEvidence
+    cover : WallCover
     seen : (F,) float
         Share of each face that is known to be free.
     group : (F,) int32
@@ -41,7 +41,7 @@ class FloorPlanResult:
     graph: FaceGraph
     face_of_cell: NDArray[np.int32]
     free_faces: LabelRuns
-    evidence: EdgeEvidence
+    cover: WallCover
     seen: FloatArray
     group: NDArray[np.int32]
     labels: NDArray[np.int32]
@@ -72,8 +72,10 @@ def make_floor_plan(
     direction_rad, resolution_m : float
     parameters : FloorPlanParameters
     """
-    plan = cut_by_lines(lines_m, walls, free, direction_rad, resolution_m, parameters, distance)
-    graph, seen = plan.graph, plan.seen
+    graph = _faces(lines_m, walls, free, direction_rad, resolution_m, parameters)
+    evidence = edge_evidence(graph.edges_m, lines_m, walls, distance, free, resolution_m, parameters)
+    plan = _ungrouped(graph, evidence, free, resolution_m)
+    seen = plan.seen
     count = len(graph.polygons)
     # Without any line the map is one face, however little of it was seen.
     inside = (seen >= parameters.face_min_seen) | (count == 1)
@@ -81,7 +83,7 @@ def make_floor_plan(
     area = runs.sizes(count)[1:].astype(float) * resolution_m**2
     area[~inside] = 0
     widest = runs.greatest(distance, count)[1:].astype(float) * resolution_m
-    group = 1 + group_faces(graph.edge_faces, plan.evidence, area, seen, widest, parameters)
+    group = 1 + group_faces(graph.edge_faces, evidence, area, seen, widest, parameters)
     labels = runs.renumbered(np.concatenate([np.zeros(1, np.int32), group]))
     return replace(plan, group=group, labels=labels)
 
@@ -93,25 +95,34 @@ def cut_by_lines(
     direction_rad: float,
     resolution_m: float,
     parameters: FloorPlanParameters,
-    distance: NDArray[np.float32] | None = None,
 ) -> FloorPlanResult:
-    """Faces between lines (L, 4), with the weights of their edges, in no group yet.
+    """Faces between lines (L, 4), with the weights of their edges, in no group yet."""
+    graph = _faces(lines_m, walls, free, direction_rad, resolution_m, parameters)
+    cover = wall_cover(graph.edges_m, lines_m, walls, resolution_m, parameters)
+    return _ungrouped(graph, cover, free, resolution_m)
 
-    The distance (H, W) of cells from the nearest wall cell, in cells, is found here unless it is known.
-    """
-    graph = build_faces(
+
+def _faces(
+    lines_m: FloatArray,
+    walls: BoolArray,
+    free: BoolArray,
+    direction_rad: float,
+    resolution_m: float,
+    parameters: FloorPlanParameters,
+) -> FaceGraph:
+    return build_faces(
         lines_m, frame_along(free | walls, direction_rad, resolution_m, parameters.frame_margin_m)
     )
+
+
+def _ungrouped(graph: FaceGraph, cover: WallCover, free: BoolArray, resolution_m: float) -> FloorPlanResult:
     count = len(graph.polygons)
-    if distance is None:
-        distance = distance_from(walls)
-    evidence = edge_evidence(graph.edges_m, lines_m, walls, distance, free, resolution_m, parameters)
     face_of_cell = label_faces(graph, (free.shape[0], free.shape[1]), resolution_m)
     free_faces = LabelRuns.of(face_of_cell * free)
     area = free_faces.sizes(count)[1:].astype(float) * resolution_m**2
     seen = area / np.maximum(shapely.area(graph.polygons), 1e-12)
     no_group, no_labels = np.zeros(count, np.int32), np.zeros(free.shape, np.int32)
-    return FloorPlanResult(graph, face_of_cell, free_faces, evidence, seen, no_group, no_labels)
+    return FloorPlanResult(graph, face_of_cell, free_faces, cover, seen, no_group, no_labels)
 
 
 def frame_along(

@@ -120,7 +120,7 @@ def test_how_much_of_a_face_was_seen_does_not_hang_on_the_raster(turn_deg):
 
 def make_quality(wall, is_open, passage, blind=0.0):
     wall, is_open = np.array(wall, float), np.array(is_open, float)
-    return EdgeEvidence(wall, blind * wall, is_open, wall + is_open, np.array(passage, float))
+    return EdgeEvidence(wall, wall + is_open, blind * wall, is_open, np.array(passage, float))
 
 
 @pytest.mark.parametrize("grouping", ["walls", "dbscan"])
