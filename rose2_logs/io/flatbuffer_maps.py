@@ -10,7 +10,7 @@ import struct
 
 from rose2_logs.errors import InvalidMapError
 from rose2_logs.io.foxglove_grid import PackedField, PackedGrid, grid_of
-from rose2_logs.io.grids import LONGEST_NAME_BYTES, MOST_CELLS, Decoder, Grid
+from rose2_logs.io.grids import LONGEST_NAME_BYTES, MOST_CELLS, MOST_CHANNELS, Decoder, Grid
 
 TIMESTAMP, FRAME_ID, POSE, COLUMN_COUNT, CELL_SIZE, ROW_STRIDE, CELL_STRIDE, FIELDS, DATA = range(9)
 """Numbers of the fields of ``foxglove.Grid``."""
@@ -24,8 +24,6 @@ MOST_OBJECTS = 4096
 """Objects of a schema, and fields of an object, that are read; more are damage."""
 LONG_TIME_BYTES = 16
 """A time with seconds of 64 bits takes so many bytes; with 32 bits, as others write it, half of them."""
-MOST_CHANNELS = 256
-"""Channels of a packed grid that are read; more are damage."""
 Defaults = dict[tuple[str, int], float]
 """Numbers that are left out where they are these, by the object's name and the field's number."""
 

@@ -17,6 +17,8 @@ from rose2_logs.model.occupancy import UNKNOWN, GridGeometry
 Cells = NDArray[np.int8]
 
 
+GRID_TYPE = "nav_msgs/msg/OccupancyGrid"
+"""Type of maps in ROS 2: of those that are built from scans, and of those that are written."""
 FOXGLOVE_GRID_TYPE = "foxglove.Grid"
 MOST_CELLS = ReadingParameters().map_max_cells
 
@@ -31,6 +33,10 @@ UNIT_TOLERANCE = 0.01
 
 LONGEST_NAME_BYTES = 1024
 """Longest name of a frame; anything longer is treated as damage."""
+
+
+MOST_CHANNELS = 256
+"""Channels of a packed grid that are read; more are damage."""
 
 
 class MapWarning(NamedTuple):

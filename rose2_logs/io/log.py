@@ -125,9 +125,9 @@ class LogReader:
             for each in times
             if len(each)
         ]
-        for message in self.source.read(
-            self._topics, distinct(np.concatenate([[], *spread]).astype(np.int64))
-        ):
+        # Nanoseconds since 1970 are no floats, which an empty list would make of them.
+        looked_at = distinct(np.concatenate([np.zeros(0, np.int64), *spread]))
+        for message in self.source.read(self._topics, looked_at):
             with suppress(LogError):  # it is told of where the map is needed
                 if (decoded := message.decode()) is not None:
                     yield decoded.cells

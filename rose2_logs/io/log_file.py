@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Collection, Iterator
@@ -15,6 +16,9 @@ from rose2_logs.io.decompression import decompress
 from rose2_logs.io.discovery import ZSTD_MAGIC
 from rose2_logs.io.messages import is_map_type, is_patch_type
 from rose2_logs.io.source import DamagedMessageError
+from rose2_logs.system.warnings import log_warning
+
+logger = logging.getLogger(__name__)
 
 LATEST_NS = 2**63 - 1
 """A later log time (after the year 2262) is treated as damage."""
@@ -149,6 +153,16 @@ class LogFile(ABC):
     @abstractmethod
     def close(self) -> None:
         """Close the file; may be called more than once."""
+
+
+def warn_of_times(path: Path, count: int) -> None:
+    """Tell of messages that are left out for their log time, if there are any."""
+    if count:
+        text = (
+            f"{path}: {count} messages have an impossible log time (before 1970 or after 2262); they are "
+            "left out"
+        )
+        log_warning(logger, "damaged_message", text, file=path)
 
 
 def check_count(path: Path, count: int, most: int) -> None:

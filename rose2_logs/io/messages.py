@@ -17,6 +17,7 @@ from rose2_logs.io.grids import (
     FOXGLOVE_GRID_TYPE,
     LONGEST_NAME_BYTES,
     MOST_CELLS,
+    MOST_CHANNELS,
     Cells,
     Decoder,
     Grid,
@@ -30,8 +31,6 @@ from rose2_logs.io.grids import (
 GRID_TYPES = ("nav_msgs/OccupancyGrid", "nav2_msgs/Costmap")
 FOXGLOVE_ROS_TYPE = "foxglove_msgs/Grid"
 PATCH_TYPES = ("map_msgs/OccupancyGridUpdate", "nav2_msgs/CostmapUpdate")
-MOST_CHANNELS = 256
-"""Channels of a packed grid that are read; more are damage."""
 PADDING_BYTES = 8
 """Fewer bytes than this may follow the last field: some writers pad to the largest alignment."""
 

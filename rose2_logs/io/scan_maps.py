@@ -17,7 +17,7 @@ import zstandard
 from rose2_logs.config.mapping import MappingParameters
 from rose2_logs.config.selection import Selection, Times
 from rose2_logs.errors import InvalidMapError, LogError
-from rose2_logs.io.grids import Grid
+from rose2_logs.io.grids import GRID_TYPE, Grid
 from rose2_logs.io.placed_scans import PlacedScans
 from rose2_logs.io.source import LoggedBytes, LoggedMap, MessageSource, TopicInfo
 from rose2_logs.mapping.log_odds import MapBuilder
@@ -29,7 +29,6 @@ logger = logging.getLogger(__name__)
 
 BUILT = "built from scans"
 """What stands in the place of the encoding of a topic whose maps are built."""
-GRID_TYPE = "nav_msgs/msg/OccupancyGrid"
 
 
 @dataclass(frozen=True)

@@ -78,13 +78,14 @@ class Walls:
     segments_m : (N, 4) float
         Line segments x0, y0, x1, y1.
     segment_direction : (N,) int
-        Index of each segment's dominant direction.
+        Index of each segment's direction: of a dominant one into `Structure.directions_rad`; from their
+        number on, of a local one, which is not kept: segments of one index are parallel.
     segment_cluster : (N,) int
         Index of each segment's wall cluster, which is that of its representative line; -1 for none.
     lines_m : (L, 4) float
         Representative lines x0, y0, x1, y1 as far as they divide the map.
     line_direction : (L,) int
-        Index of each line's dominant direction.
+        Index of each line's direction, as of the segments.
     line_weight : (L,) float
         Share of each line that walls cover, in [0, 1].
 

@@ -9,7 +9,6 @@ from rose2_logs.model.rooms import Doorway
 
 UNSURE_BORDER_BELOW = 0.8
 """Borders of less strength are marked as unsure. A matter of display: no stored result depends on it."""
-BORDER_KINDS = ("wall", "door", "opening")
 
 
 @dataclass(frozen=True)

@@ -220,7 +220,8 @@ class OccupancySnapshot:
                 f"map {self.index} of {self.topic}: cells must lie between {UNKNOWN} and {HIGHEST_PERCENT}, "
                 f"not from {given.min()} to {given.max()}"
             )
-        cells = given.astype(np.int8, copy=False).view()
+        # What can be written to may hold the next map when this one is looked at.
+        cells = given.astype(np.int8, copy=given.flags.writeable).view()
         cells.flags.writeable = False
         object.__setattr__(self, "cells", cells)
 

@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack, contextmanager, suppress
-from functools import lru_cache
+from functools import cache, lru_cache
 from itertools import islice
 from multiprocessing.context import BaseContext
 from multiprocessing.reduction import ForkingPickler
@@ -479,6 +479,7 @@ def _one_thread() -> Iterator[None]:
     """Limit OpenCV and the linear algebra libraries to one thread while the context lasts."""
     import cv2
 
+    _end_threads_before_forks()
     threads = cv2.getNumThreads()
     cv2.setNumThreads(1)
     try:
@@ -513,6 +514,24 @@ class _OneThreadLimit:
 
 
 _LIMIT = _OneThreadLimit()
+
+
+@cache
+def _end_threads_before_forks() -> None:
+    """Let OpenCV end its threads before this process is copied: the copy would wait for them forever."""
+    import cv2
+
+    threads: list[int] = []
+
+    def end() -> None:
+        threads.append(cv2.getNumThreads())
+        cv2.setNumThreads(1)
+
+    def begin_again() -> None:
+        cv2.setNumThreads(threads.pop())
+
+    if hasattr(os, "register_at_fork"):
+        os.register_at_fork(before=end, after_in_parent=begin_again, after_in_child=begin_again)
 
 
 @lru_cache(maxsize=1)

@@ -10,14 +10,12 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
-from skimage.measure import label as connected
 
 from rose2_logs.config.parameters import OccupancyParameters, Parameters
 from rose2_logs.config.tracking import TrackingParameters
-from rose2_logs.model.labels import known_window, label_sizes
+from rose2_logs.model.labels import equal_pieces, known_window, label_sizes, labels_near
 from rose2_logs.model.occupancy import BoolArray, FloatArray, GridGeometry, OccupancySnapshot, classify
 from rose2_logs.model.rooms import RoomMap
 from rose2_logs.tracking.registration import RigidMotion, WallFit, wall_faces
@@ -72,7 +70,9 @@ class BackProjector:
         self._geometry, self._count = rooms.geometry, len(rooms)
         labels = rooms.labels[self._window]
         free, occupied = classify(last.cells, self._occupancy)
-        self._nearest = np.where(free[self._window], labels, _filled(labels))
+        not_free = ~free[self._window]
+        self._nearest = labels.copy()
+        self._nearest[not_free] = labels_near(labels, np.flatnonzero(not_free), np.inf)
         points = wall_faces(free, occupied, last.geometry)
         enough = len(points) >= tracking.fit_min_points
         self._fit = WallFit(points, last.geometry.resolution_m, tracking) if enough else None
@@ -137,24 +137,13 @@ def motions_to_last(motions: Sequence[RigidMotion | None]) -> list[RigidMotion]:
 
 def _join_small_pieces(labels: NDArray[np.int32], free: NDArray[np.bool_], min_cells: float) -> None:
     """Give the cells (H, W) of pieces smaller than so many to the nearest larger piece, if there is one."""
-    piece: NDArray[np.int64] = connected(labels, background=0, connectivity=1)  # type: ignore[no-untyped-call]
+    piece = equal_pieces(labels > 0, labels)
     small = np.bincount(piece.ravel()) < min_cells
     small[0] = False
     kept = np.where(small[piece], 0, labels)
     if small.any() and kept.any():
-        np.copyto(labels, _filled(kept), where=small[piece] & free)
-
-
-def _filled(labels: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Give each cell (H, W) without a room that of the nearest cell that has one."""
-    if not labels.any():
-        return labels
-    _, nearest = cv2.distanceTransformWithLabels(
-        (labels == 0).view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
-    )
-    room_of = np.zeros(int(nearest.max()) + 1, np.int32)
-    room_of[nearest[labels > 0]] = labels[labels > 0]
-    return room_of[nearest]
+        joining = small[piece] & free
+        labels[joining] = labels_near(kept, np.flatnonzero(joining), np.inf)
 
 
 @dataclass(frozen=True, eq=False)

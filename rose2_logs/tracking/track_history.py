@@ -76,7 +76,7 @@ class TrackHistories:
 
     Attributes
     ----------
-    histories : dict
+    tracks : dict
         By track, in the order of their numbers.
     last : SnapshotRef or None
         The last map.

@@ -13,6 +13,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from rose2_logs.config.run_options import RunOptions
 from rose2_logs.errors import AlreadyWholeError, InvalidMapError, OutputError, ParameterError
 from rose2_logs.io import open_log
@@ -20,6 +22,7 @@ from rose2_logs.io.discovery import stem_of
 from rose2_logs.io.log import LogReader
 from rose2_logs.io.room_names import read_room_names
 from rose2_logs.model.analysis import left_out_note
+from rose2_logs.model.occupancy import OccupancySnapshot
 from rose2_logs.model.room_names import RoomNames, TrackNames
 from rose2_logs.outputs.mcap.viewer_layouts import bag_metadata_path, foxglove_path, rviz_path
 from rose2_logs.runs.history import RunHistory, RunSummary
@@ -289,12 +292,26 @@ def _follow(
         if note is not None:
             where = info.origin or info.log_path
             log_warning(logger, "outside", f"{where}: in the last map, {note}", file=where)
+        _warn_if_far(step.snapshot, info)
         if options.names is not None and names is not None:
             tell_unused(Path(options.names), names.unused(used, tracks))
         summary = store.finish(history, usable_processes(options.workers))
         for sink in sinks:
             sink.finish(summary)
     return summary
+
+
+def _warn_if_far(last: OccupancySnapshot, info: RunInfo) -> None:
+    """Tell that a map is so far from its frame's origin that viewers, which count in 32 bits, round it."""
+    farthest_m = float(np.abs(last.geometry.corners_m()).max())
+    step_m = float(np.spacing(np.float32(farthest_m)))
+    if step_m > last.geometry.resolution_m / 2:
+        where = info.origin or info.log_path
+        text = (
+            f"{where}: the map is {farthest_m / 1000:.0f} km from the origin of its frame, where viewers "
+            f"round to {step_m:.2g} m; the tables are exact. Publish maps in a frame nearby"
+        )
+        log_warning(logger, "far_origin", text, file=where)
 
 
 def _project_back(reader: LogReader, history: RunHistory, store: RunStore, sinks: Sequence[Sink]) -> None:

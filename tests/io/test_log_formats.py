@@ -254,6 +254,28 @@ def test_foxglove_grids_and_nav2_costmaps_in_mcap_are_maps(tmp_path):
     assert read(path, topic="/costmap_raw")[0].cells.tolist() == [[0, 100], [-1, 1]]
 
 
+@pytest.mark.parametrize("index", [IndexType.ALL, IndexType.NONE])
+def test_messages_with_times_that_no_clock_shows_are_left_out_and_counted(index, tmp_path):
+    log = McapLog(tmp_path / "run.mcap", index_types=index)
+    for time in (START_NS, 2**63 + 5, 2**64 - 1):
+        log.add("/map", time, Map(np.zeros((4, 6), np.int8)))
+    with collect_warnings() as warnings:
+        snapshots = read(log.close())
+    assert [each.log_time_ns for each in snapshots] == [START_NS]
+    assert warnings.kinds
+
+
+def test_messages_of_a_database_from_before_1970_are_left_out_and_told(tmp_path):
+    maps = [("/map", START_NS + k * 10**10, Map(np.full((4, 6), k, np.int8))) for k in range(4)]
+    path = next(write_rosbag2(tmp_path / "run", maps).glob("*.db3"))
+    with sqlite3.connect(path) as base:
+        base.execute("update messages set timestamp = timestamp - ?", (START_NS + 15 * 10**9,))
+    with collect_warnings() as warnings:
+        snapshots = read(path)
+    assert [each.log_time_ns for each in snapshots] == [5 * 10**9, 15 * 10**9]
+    assert list(warnings.kinds) == ["damaged_message"]
+
+
 def cut(path: Path, share: float) -> Path:
     data = path.read_bytes()
     path.write_bytes(data[: int(len(data) * share)])

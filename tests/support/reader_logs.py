@@ -14,7 +14,7 @@ from mcap.writer import CompressionType, Writer
 from rosbags import rosbag1, rosbag2
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-START_NS = 1_700_000_000_000_000_000
+START_NS = 1_700_000_000_123_456_789
 SHARED = Path(__file__).parents[3] / "shared"
 
 UPDATE = "std_msgs/Header header\nint32 x\nint32 y\nuint32 width\nuint32 height\nint8[] data\n"

@@ -14,7 +14,7 @@ from mcap.writer import CompressionType, Writer
 from rosbags import rosbag1, rosbag2
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-START_NS = 1_700_000_000_000_000_000
+START_NS = 1_700_000_000_123_456_789
 LEVEL = (0.0, 0.0, 0.0, 1.0)
 
 

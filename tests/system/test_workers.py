@@ -193,6 +193,26 @@ def test_threads_that_work_at_once_are_held_to_one_thread_each_and_let_go_togeth
     assert cv2.getNumThreads() == before
 
 
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system does not copy processes")
+def test_a_process_that_is_forked_after_work_can_work_as_well():
+    """OpenCV's threads are not copied; the copy would wait for them."""
+    script = (
+        "import os, cv2, numpy as np\n"
+        "from rose2_logs.system.workers import ordered_map\n"
+        "cv2.setNumThreads(2)\n"
+        "blur = lambda side: cv2.GaussianBlur(np.ones((side, side), np.float32), (0, 0), 9).sum()\n"
+        "blur(4000)\n"
+        "first = list(ordered_map(blur, [900]))\n"
+        "blur(4000)\n"
+        "child = os.fork()\n"
+        "if child == 0:\n"
+        "    os._exit(0 if list(ordered_map(blur, [900])) == first else 1)\n"
+        "assert os.waitpid(child, 0)[1] == 0\n"
+        "assert cv2.getNumThreads() == 2\n"
+    )
+    subprocess.run([sys.executable, "-c", script], check=True, timeout=60)
+
+
 def test_an_error_of_the_work_arrives_as_it_is():
     """A known error in a worker process stays a known error."""
     with pytest.raises(InvalidMapError, match="two is bad"):

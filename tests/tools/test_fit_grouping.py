@@ -109,10 +109,11 @@ def test_rule_fitted_without_anything_outside_keeps_every_room(prepared):
 
 
 def test_maps_without_free_floor_have_no_rooms():
-    from fit_grouping.fit_tree import examples_of, scores_at
+    from fit_grouping.fit_tree import examples_of, gather
     from fit_grouping.maps_with_truth import TruthMap
     from fit_grouping.preparing import prepare
     from fit_grouping.sampling import by_hand
+    from fit_grouping.scores import upper_bound
 
     from rose2_logs.config.parameters import Parameters
 
@@ -121,8 +122,9 @@ def test_maps_without_free_floor_have_no_rooms():
     nothing = np.zeros(occupied.shape, bool)
     one = TruthMap("drawn", "wall", "wall", 0.05, nothing, occupied, (nothing.astype(np.int32),))
     map_without_floor = prepare(one, Parameters(), 0)
-    examples = examples_of([map_without_floor], [None])
-    assert scores_at(examples, [by_hand], [0.0]).tolist() == [[0.0]]
+    assert upper_bound(map_without_floor.tables) == 0
+    samples = gather(examples_of([map_without_floor], [None]), by_hand, 0.0, 0)
+    assert (len(samples.right), len(samples.weight)) == (0, 0)
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -467,11 +469,16 @@ def test_targets_ask_about_pairs_of_rooms_only_where_truths_agree():
     assert weights[level, 10, 15] > 0
 
 
-def test_score_of_a_grouping_is_that_of_its_label_image(two_rooms, prepared):
-    from fit_grouping.scores import best_iou_sym, iou_sym, perfect_grouping, upper_bound
+def test_score_of_a_grouping_is_that_of_its_label_image():
+    from fit_grouping.scores import grouped, iou_sym, overlap_table
 
-    grouping = perfect_grouping(prepared.tables[0])
-    assert best_iou_sym(prepared.tables, grouping) == upper_bound(prepared.tables)
+    rng = np.random.default_rng(0)
+    atoms, truth = rng.integers(0, 9, (2, 20, 30)).astype(np.int32) // [[[1]], [[3]]]
+    region_of_atom = np.array([1, 1, 2, 0, 3, 3, 2, 1])
+    drawn = np.append(0, region_of_atom)[atoms]
+    of_image = overlap_table(drawn, truth)
+    assert np.array_equal(grouped(overlap_table(atoms, truth), region_of_atom), of_image)
+    assert 0 < iou_sym(of_image) < 100
     assert iou_sym(np.array([[0.0, 0, 0], [0, 8, 0], [0, 0, 8]])) == 100
 
 

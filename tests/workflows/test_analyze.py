@@ -201,3 +201,14 @@ def test_one_run_in_three_formats_gives_the_same_tables(tmp_path: Path):
         analyze_log(SHARED_BAGS / name, tmp_path / name, options)
         written.append(table_bytes(tmp_path / name))
     assert written[0] == written[1] == written[2]
+
+
+@pytest.mark.parametrize(
+    ("origin_m", "told"), [((432100.37, 5412345.11), {"far_origin": 1}), ((1e4, 2e4), {})]
+)
+def test_a_map_in_a_frame_so_far_away_that_viewers_round_it_is_told_of(origin_m, told, tmp_path):
+    saved = save_map(tmp_path, "map", two_rooms())
+    text = saved.read_text().replace("[1.0, 2.0, 0.0]", f"[{origin_m[0]}, {origin_m[1]}, 0.0]")
+    saved.write_text(text)
+    result = analyze_log(saved, tmp_path / "out", RunOptions(recording=False, annotated_log=False))
+    assert {kind: each.count for kind, each in result.warnings.kinds.items() if kind == "far_origin"} == told

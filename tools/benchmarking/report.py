@@ -41,7 +41,7 @@ def write_report(accuracy: Accuracy, folder: Path) -> Path:
     for group in accuracy.groups:
         lines += [f"## {group}", "", *_methods(accuracy, group), *_along(accuracy, group, folder)]
         lines += [*_maps(accuracy, group, folder), *_sheets(accuracy, group, folder)]
-    lines += [*_ablations(accuracy), *_robustness(accuracy), *_elsewhere(accuracy), *_made_with(accuracy)]
+    lines += [*_ablations(accuracy), *_robustness(accuracy), *_elsewhere(accuracy), *_made_with()]
     path = folder / "report.md"
     path.write_text("\n".join(lines), encoding="utf-8")
     return path
@@ -214,7 +214,7 @@ def _elsewhere(accuracy: Accuracy) -> list[str]:
     return ["## The paper's implementation on other maps, published", "", *table(["maps", *IOU], rows)]
 
 
-def _made_with(accuracy: Accuracy) -> list[str]:
+def _made_with() -> list[str]:
     versions = ", ".join(f"{name} {version}" for name, version in software_versions().items())
     return [
         "## Made with",

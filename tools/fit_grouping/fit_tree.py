@@ -1,4 +1,4 @@
-"""Fits the strength of joins on prepared maps, and measures it with buildings left out."""
+"""Fits the strength of joins on prepared maps."""
 
 from __future__ import annotations
 
@@ -11,12 +11,11 @@ from numpy.typing import NDArray
 from sklearn.ensemble import HistGradientBoostingClassifier
 
 from fit_grouping.preparing import PreparedMap
-from fit_grouping.sampling import Samples, by_hand, sample_joins
-from fit_grouping.scores import best_iou_sym
+from fit_grouping.sampling import Samples, sample_joins
 from fit_grouping.tree_files import trees_of
 from rose2_logs.segmentation.regions.features import FEATURES
 from rose2_logs.segmentation.regions.graph import RegionGraph
-from rose2_logs.segmentation.regions.joining import Joins, Strength, join_regions
+from rose2_logs.segmentation.regions.joining import Strength
 from rose2_logs.segmentation.regions.strengths import BoostedTrees
 
 FloatArray = NDArray[np.float64]
@@ -35,7 +34,6 @@ class TreeParameters:
     least_samples: int = 60
     penalty: float = 5.0
     features_at_once: float = 0.5
-    rounds: int = 2
     noise: float = 1.5
 
 
@@ -105,69 +103,3 @@ def fit_trees(
 def columns_of(names: Sequence[str]) -> NDArray[np.intp]:
     """Numbers of features by name."""
     return np.array([FEATURES.index(name) for name in names])
-
-
-def fit_along_joins(
-    examples: Sequence[Example], columns: NDArray[np.intp], parameters: TreeParameters, seed: int = 0
-) -> BoostedTrees:
-    """Fit on the decisions of a strength by hand, then also on those of what was fitted."""
-    gathered = [gather(examples, by_hand, 0.0, 0), gather(examples, by_hand, parameters.noise, seed + 1)]
-    for round_ in range(parameters.rounds):
-        samples = Samples(
-            *(np.concatenate([getattr(s, f) for s in gathered]) for f in ("features", "right", "weight"))
-        )
-        trees = fit_trees(samples, columns, parameters, seed)
-        if round_ + 1 < parameters.rounds:
-            gathered.append(gather(examples, trees, 0.0, seed + round_ + 2))
-    return trees
-
-
-def regions_at(example: Example, joins: Joins, least: float, outside_max: float = 0.5) -> NDArray[np.int64]:
-    """Room 1.. of each atom (N,), 0 for regions that are too small or outside.
-
-    Where nearly all is outside, that answer is not believed.
-    """
-    region = joins.regions(least)
-    sums = np.stack([np.bincount(region, example.graph.node_sums[:, k]) for k in (0, 4)])
-    outside = sums[1] / sums[0] > outside_max
-    if sums[0][outside].sum() > 0.8 * sums[0].sum():
-        outside[:] = False
-    room = (sums[0] >= ROOM_MIN_M2) & ~outside
-    number = np.where(room, np.cumsum(room), 0)
-    found: NDArray[np.int64] = number[region]
-    return found
-
-
-def scores_at(
-    examples: Sequence[Example], strengths: Sequence[Strength], levels: Sequence[float]
-) -> FloatArray:
-    """iou_sym (maps, levels) of each map joined by its strength down to each level."""
-    out = np.zeros((len(examples), len(levels)))
-    for k, (example, strength) in enumerate(zip(examples, strengths, strict=True)):
-        joins = join_regions(example.graph, strength, min(levels))
-        for j, level in enumerate(levels):
-            out[k, j] = best_iou_sym(example.one.tables, regions_at(example, joins, level))
-    return out
-
-
-def group_means(maps: Sequence[PreparedMap], scores: FloatArray) -> dict[str, float]:
-    """Mean score of each group, and of the groups."""
-    groups = list(dict.fromkeys(one.group for one in maps))
-    means = {
-        g: float(np.mean([s for one, s in zip(maps, scores, strict=True) if one.group == g])) for g in groups
-    }
-    return means | {"mean": float(np.mean(list(means.values())))}
-
-
-def left_out_scores(maps: Sequence[PreparedMap], table: FloatArray) -> tuple[FloatArray, dict[int, int]]:
-    """Scores at the level that is best for the other folds (mean of groups), and that level by fold."""
-    chosen, best = np.zeros(len(maps)), {}
-    fold = np.array([one.fold for one in maps])
-    for k in sorted(set(fold.tolist())):
-        others = np.flatnonzero(fold != k).tolist()
-        means = [
-            group_means([maps[i] for i in others], table[others, j])["mean"] for j in range(table.shape[1])
-        ]
-        best[k] = int(np.argmax(means))
-        chosen[fold == k] = table[fold == k, best[k]]
-    return chosen, best

@@ -45,11 +45,6 @@ def grouped(table: FloatArray, region_of_atom: NDArray[np.integer]) -> FloatArra
     return out
 
 
-def best_iou_sym(tables: Iterable[FloatArray], region_of_atom: NDArray[np.integer]) -> float:
-    """iou_sym of a grouping of atoms against the truth that it agrees with better."""
-    return max(iou_sym(grouped(table, region_of_atom)) for table in tables)
-
-
 def best_ious(tables: Iterable[FloatArray], region_of_atom: NDArray[np.integer]) -> FloatArray:
     """Greatest IoU of each region (R,) with a true room of any truth.
 

@@ -24,7 +24,15 @@ from rose2_logs.config.reading import NO_TYPE, ReadingParameters
 from rose2_logs.errors import LogError
 from rose2_logs.io.checked_file import CheckedFile
 from rose2_logs.io.decompression import REMEDY
-from rose2_logs.io.log_file import LATEST_NS, Channel, LogFile, Place, StoredMessage, check_count
+from rose2_logs.io.log_file import (
+    LATEST_NS,
+    Channel,
+    LogFile,
+    Place,
+    StoredMessage,
+    check_count,
+    warn_of_times,
+)
 from rose2_logs.io.mcap.records import (
     INDEX,
     INDEX_ENTRY,
@@ -119,12 +127,14 @@ class McapFile(LogFile):
         """Where the messages of some channels are stored, in log time order."""
         if self.summary is None:
             return sorted(place for place in self._scanned if place.channel_id in channel_ids)
-        places: list[Place] = []
+        found: list[Place] = []
         for chunk in self.summary.chunks:
             if wanted := set(channel_ids) & set(chunk.message_index_offsets):
-                places += self._places_in(chunk, wanted)
-                check_count(self.path, len(places), self.limits.map_max_messages)
-        return sorted(places)
+                found += self._places_in(chunk, wanted)
+                check_count(self.path, len(found), self.limits.map_max_messages)
+        places = sorted(place for place in found if place.log_time_ns <= LATEST_NS)
+        warn_of_times(self.path, len(found) - len(places))
+        return places
 
     def _places_in(self, chunk: ChunkIndex, channel_ids: set[int]) -> list[Place]:
         """Places of the messages in a chunk, from its index, or from the chunk if the index is damaged."""
@@ -134,7 +144,6 @@ class McapFile(LogFile):
                 Place(time, begin, offset, channel)
                 for channel in channel_ids
                 for time, offset in self._message_index(chunk, channel)
-                if time <= LATEST_NS
             ]
         except DAMAGE:
             pass
@@ -143,7 +152,7 @@ class McapFile(LogFile):
             for record in records_in(self._chunk(begin)):
                 if record.opcode == Opcode.MESSAGE:
                     channel, _, time, _ = MESSAGE.unpack_from(record.content)
-                    if channel in channel_ids and time <= LATEST_NS:
+                    if channel in channel_ids:
                         found.append(Place(time, begin, record.offset, channel))
         except DAMAGE as error:
             self._warn_damaged(begin, error)

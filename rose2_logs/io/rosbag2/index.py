@@ -18,7 +18,15 @@ import numpy as np
 
 from rose2_logs.config.reading import ReadingParameters
 from rose2_logs.errors import LogError
-from rose2_logs.io.log_file import LATEST_NS, Channel, LogFile, Place, StoredMessage, check_count
+from rose2_logs.io.log_file import (
+    LATEST_NS,
+    Channel,
+    LogFile,
+    Place,
+    StoredMessage,
+    check_count,
+    warn_of_times,
+)
 from rose2_logs.io.source import DamagedMessageError
 from rose2_logs.system.files import OnFailure
 from rose2_logs.system.warnings import log_warning
@@ -67,6 +75,7 @@ class SqliteFile(LogFile):
                 self._read_channels()
                 rows = self._read_rows()
                 self._rows = rows[rows["channel"] != _NO_CHANNEL]
+                warn_of_times(path, len(rows) - len(self._rows))
             except _DAMAGE as error:
                 raise LogError(
                     f"{path}: cannot be read as a bag: {error}; try `sqlite3 {path.name} .recover`", file=path

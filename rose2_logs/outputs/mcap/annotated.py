@@ -17,6 +17,7 @@ from rose2_logs.drawing.extent import Extent
 from rose2_logs.drawing.robot_trail import RobotTrail
 from rose2_logs.errors import OutputError
 from rose2_logs.io import open_source
+from rose2_logs.io.grids import GRID_TYPE
 from rose2_logs.io.mcap.index import DAMAGE
 from rose2_logs.io.source import MessageSource
 from rose2_logs.outputs.mcap.bag_metadata import RECORD_NAME, version_record, write_bag_metadata
@@ -42,7 +43,6 @@ from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot
 logger = logging.getLogger(__name__)
 
 PREFIX = "/rose2/"
-GRID_TYPE = "nav_msgs/msg/OccupancyGrid"
 ADDED = {
     "/rose2/segmented_map": GRID_TYPE,
     "/rose2/clean_map": GRID_TYPE,

@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 
 from rose2_logs.config.parameters import OccupancyParameters
 from rose2_logs.drawing.palette import track_color
+from rose2_logs.io.grids import GRID_TYPE
+from rose2_logs.model.mitred import mitred
 from rose2_logs.model.occupancy import UNKNOWN, FloatArray, classify
 from rose2_logs.model.per_shape import PerShape
 from rose2_logs.model.room_quality import unsure_sign
@@ -27,7 +29,7 @@ if TYPE_CHECKING:
 
 ROOMS_TYPE = "rose2_msgs/msg/Rooms"
 ROOM_TYPE = "rose2_msgs/msg/Room"
-WRITTEN_TYPES = ("nav_msgs/msg/OccupancyGrid", "visualization_msgs/msg/MarkerArray", ROOMS_TYPE)
+WRITTEN_TYPES = (GRID_TYPE, "visualization_msgs/msg/MarkerArray", ROOMS_TYPE)
 HEADER_TYPE = "std_msgs/msg/Header"
 DEFINITIONS = Path(__file__).parent / "definitions"
 """Schemas of the written types: what `ros2_typestore` says of them, without loading all types of ROS 2."""
@@ -37,6 +39,8 @@ VALUE_STEP = 37
 """From one track's value to the next one's, modulo 98: viewers draw values as shades, and neighboring rooms
 often have neighboring tracks. It has no factor in common with 98, so the first 98 tracks differ."""
 FILL_OPACITY = 0.45
+OUTLINE_SHADE = 0.7
+"""A room's outline has its color, darker by this factor, so that it stands out from the fill."""
 MARKER_LAYERS = ("rooms", "lines", "walls", "outlines", "path", "doorways", "unsure_borders", "labels")
 """Namespaces of markers, the lowest first."""
 VIEW_PX = 700
@@ -237,7 +241,8 @@ class MessageMaker:
         corners = self._triangles.corners_of(rooms.polygons)
         for track, number in sorted(zip(step.track_ids, range(len(rooms)), strict=True)):
             red, green, blue = (value / 255 for value in track_color(track))
-            fill, line = (red, green, blue, FILL_OPACITY), (red * 0.7, green * 0.7, blue * 0.7, 1.0)
+            fill = (red, green, blue, FILL_OPACITY)
+            line = (red * OUTLINE_SHADE, green * OUTLINE_SHADE, blue * OUTLINE_SHADE, 1.0)
             x, y = points[number]
             sign = unsure_sign(quality_of(step, number)[0])
             markers += [
@@ -423,7 +428,7 @@ def _triangulated(parts: NDArray[np.object_]) -> list[FloatArray]:
     except shapely.errors.GEOSException:
         if len(parts) > 1:
             return [corners for part in parts for corners in _triangulated(np.array([part]))]
-        wider = shapely.buffer(parts, TOUCH_M, join_style="mitre")
+        wider = mitred(parts, TOUCH_M)
         found = shapely.constrained_delaunay_triangles(wider)
     triangles, part = shapely.get_parts(found, return_index=True)
     corners = shapely.get_coordinates(shapely.orient_polygons(triangles)).reshape(-1, 4, 2)[:, :3]

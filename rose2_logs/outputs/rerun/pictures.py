@@ -26,13 +26,7 @@ UNKNOWN_SHADE = 205
 
 
 class MapPictures:
-    """The known part of one map, painted in several ways.
-
-    Attributes
-    ----------
-    corners_m : (4, 2) float
-        World corners of the known part.
-    """
+    """The known part of one map, painted in several ways."""
 
     def __init__(self, snapshot: OccupancySnapshot) -> None:
         rows, columns = known_window(snapshot.cells >= 0)
@@ -41,7 +35,6 @@ class MapPictures:
         # As an unsigned byte unknown is 255, which is what the RViz colors expect.
         self._cells = np.ascontiguousarray(snapshot.cells[self._part]).view(np.uint8)
         self._place = snapshot.geometry.part((rows, columns))
-        self.corners_m = self._place.corners_m()
 
     def map(self, height_m: float) -> Picture:
         """Draw the map as RViz does, at a height in the world."""

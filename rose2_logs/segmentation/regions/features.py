@@ -35,14 +35,30 @@ NO_ANSWER = -1.0
 CONTACT_MIN_M = 0.05
 """Regions that touch along less, but face one another across noise, may still be joined."""
 FACING_MIN_M = 0.3
+"""Regions that face one another along this much, with nothing known between, may be joined, too."""
+NEIGHBOR_MIN_M = 0.1
+"""Regions that touch along more count as neighbors of one another."""
 OCTAGON_CORNER = 0.5
 """Area that an octagon's slanting side cuts off a corner, per squared distance of the side from it."""
+LEAST_M, LEAST_M2 = 0.01, 0.01
+"""Added to lengths and areas, or the least of them, so that no logarithm is of zero and no divisor is."""
+LOG_LENGTH_M = 0.05
+"""Added to lengths before their logarithm, half a cell of the plan frame, as a contact may be 0."""
+CLEAR_LEAST_M = 0.02
+"""Added to clearances that are divided by: that of a region that no cell of the plan frame meets is 0."""
+MOST_STRAIGHTNESS = 4.0
+"""Straightness of a border is at most this: its length along the axes per distance between its ends."""
+MOST_SADDLE_M = 4.0
+"""Clearance of a passage is at most this: what is twice as wide is no passage."""
+MOST_SADDLE_SHARE = 1.5
+"""Clearance of a passage is at most this share of a region's."""
 
 
 def joinable(graph: RegionGraph) -> NDArray[np.bool_]:
     """Borders (M,) along which regions touch, or face one another with nothing known between."""
     contact = _contact(graph)
-    can: NDArray[np.bool_] = (contact >= CONTACT_MIN_M) | (graph.border_sums[:, 3] >= FACING_MIN_M)
+    facing = graph.border_sums[:, BORDER_SUMS.index("facing_unknown")]
+    can: NDArray[np.bool_] = (contact >= CONTACT_MIN_M) | (facing >= FACING_MIN_M)
     return can
 
 
@@ -75,17 +91,17 @@ def _contact_columns(
     contact = s["upright"] + s["level"]
     per_contact = np.where(contact > 0, 1 / np.maximum(contact, 1e-9), 0.0)
     width, height = (np.where(contact > 0, m[f"{a}_high"] + m[f"{a}_low"], 0.0) for a in "xy")
-    chord = np.hypot(width, height) + 0.01
+    chord = np.hypot(width, height) + LEAST_M
     side = np.hypot(s["upright"], s["level"])
     facing = s["facing_wall"] + s["facing_unknown"]
     return [
-        np.log(contact + 0.05),
+        np.log(contact + LOG_LENGTH_M),
         contact / outline[small],
         contact / outline[large],
         side / np.sqrt(n["area"][small]),
-        contact / (contact + facing + 0.01),
-        np.minimum(side / chord, 4.0),
-        np.log(chord + 0.05),
+        contact / (contact + facing + LEAST_M),
+        np.minimum(side / chord, MOST_STRAIGHTNESS),
+        np.log(chord + LOG_LENGTH_M),
         s["on_face"] * per_contact,
         s["line_0"] * per_contact,
         s["line_1"] * per_contact,
@@ -103,12 +119,13 @@ def _clearance_columns(
     per_contact = np.where(contact > 0, 1 / np.maximum(contact, 1e-9), 0.0)
     columns = []
     for saddle_name, clear_name in (("saddle", "clear"), ("saddle_strong", "clear_strong")):
-        saddle = np.minimum(np.where(contact > 0, m[saddle_name], 0.0), 4.0)
+        saddle = np.minimum(np.where(contact > 0, m[saddle_name], 0.0), MOST_SADDLE_M)
         low = np.minimum(top[clear_name][small], top[clear_name][large])
         high = np.maximum(top[clear_name][small], top[clear_name][large])
-        columns += [saddle, np.minimum(saddle / (low + 0.02), 1.5), np.minimum(saddle / (high + 0.02), 1.5)]
+        shares = [np.minimum(saddle / (clear + CLEAR_LEAST_M), MOST_SADDLE_SHARE) for clear in (low, high)]
+        columns += [saddle, *shares]
         if saddle_name == "saddle":
-            columns.append(s["clear"] * per_contact / (saddle + 0.02))
+            columns.append(s["clear"] * per_contact / (saddle + CLEAR_LEAST_M))
     return columns
 
 
@@ -117,7 +134,7 @@ def _form_columns(
 ) -> list[FloatArray]:
     """Sizes and forms of two regions and of what they would be together: from `log_area_small` on."""
     n, s = _named(graph.node_sums, NODE_SUMS), _named(graph.border_sums[which], BORDER_SUMS)
-    outline, neighbors = _outline(graph), _at_ends(graph, (_contact(graph) > 0.1).astype(float))
+    outline, neighbors = _outline(graph), _at_ends(graph, (_contact(graph) > NEIGHBOR_MIN_M).astype(float))
     box = _boxes(graph.node_maxima)
     box_small, box_large = box[small], box[large]
     union_maxima = np.maximum(graph.node_maxima[small], graph.node_maxima[large])
@@ -137,8 +154,8 @@ def _form_columns(
     # A border that takes the whole side of a region leaves no wall beside it.
     spans = [np.maximum(s["upright"] / b[:, 1], s["level"] / b[:, 0]) for b in (box_small, box_large)]
     return [
-        np.log(area_small + 0.01),
-        np.log(area_large + 0.01),
+        np.log(area_small + LEAST_M2),
+        np.log(area_large + LEAST_M2),
         area_small / area_large,
         *rectangle,
         gain(rectangle),
@@ -179,14 +196,15 @@ def _answer_columns(
 
 def _contact(graph: RegionGraph) -> FloatArray:
     """Length (M,) along which the regions of each border touch."""
-    contact: FloatArray = graph.border_sums[:, 0] + graph.border_sums[:, 1]
+    s = _named(graph.border_sums, BORDER_SUMS)
+    contact: FloatArray = s["upright"] + s["level"]
     return contact
 
 
 def _outline(graph: RegionGraph) -> FloatArray:
     """Length (N,) of the outline of each region."""
     n = _named(graph.node_sums, NODE_SUMS)
-    outline: FloatArray = n["wall_edges"] + n["unknown_edges"] + _at_ends(graph, _contact(graph)) + 0.01
+    outline: FloatArray = n["wall_edges"] + n["unknown_edges"] + _at_ends(graph, _contact(graph)) + LEAST_M
     return outline
 
 
@@ -204,8 +222,8 @@ def _ratio(part: FloatArray, whole: FloatArray) -> FloatArray:
 
 def _boxes(maxima: FloatArray) -> FloatArray:
     """Width, height, area (K, 3) of the boxes along the plan frame's axes."""
-    width = np.maximum(maxima[:, 2] + maxima[:, 3], 0.01)
-    height = np.maximum(maxima[:, 4] + maxima[:, 5], 0.01)
+    m = _named(maxima, NODE_MAXIMA)
+    width, height = (np.maximum(m[f"{a}_high"] + m[f"{a}_low"], LEAST_M) for a in "xy")
     return np.stack([width, height, width * height], axis=1)
 
 
@@ -215,7 +233,7 @@ def _octagons(maxima: FloatArray) -> FloatArray:
     area = (x1 + x0) * (y1 + y0)
     for cut in (x1 + y1 - s1, x0 + y0 - s0, x1 + y0 - d1, x0 + y1 - d0):
         area = area - OCTAGON_CORNER * np.maximum(cut, 0.0) ** 2
-    least: FloatArray = np.maximum(area, 0.01)
+    least: FloatArray = np.maximum(area, LEAST_M2)
     return least
 
 
@@ -228,13 +246,13 @@ REGION_FEATURES = (
 
 def region_features(graph: RegionGraph) -> FloatArray:
     """Features (N, len(REGION_FEATURES)) of the regions of a graph."""
-    n = _named(graph.node_sums, NODE_SUMS)
+    n, top = _named(graph.node_sums, NODE_SUMS), _named(graph.node_maxima, NODE_MAXIMA)
     open_edges, outline, area = _at_ends(graph, _contact(graph)), _outline(graph), n["area"]
     columns = [
-        np.log(area + 0.01),
+        np.log(area + LEAST_M2),
         n["outside"] / area,
-        graph.node_maxima[:, 0],
-        graph.node_maxima[:, 1],
+        top["clear"],
+        top["clear_strong"],
         n["wall_edges"] / outline,
         n["unknown_edges"] / outline,
         open_edges / outline,

@@ -274,5 +274,8 @@ def _share_along(
 
 
 def _clearance(blocked: BoolArray, cell_m: float) -> NDArray[np.float32]:
-    distance = distance_from(blocked)
-    return (distance * np.float32(cell_m)).astype(np.float32)
+    # Where nothing is blocked, OpenCV says the greatest number that there is.
+    with np.errstate(over="ignore"):
+        clearance = distance_from(blocked) * np.float32(cell_m)
+    finite: NDArray[np.float32] = np.minimum(clearance, np.finfo(np.float32).max).astype(np.float32)
+    return finite

@@ -16,6 +16,9 @@ Labels = NDArray[np.int32]
 Number = TypeVar("Number", bound=np.integer)
 
 PLAN_CELL_M = 0.1
+LEAST_PLAN_CELL = 0.5
+"""A plan cell is at least this much of a map's cell: finer ones would tell nothing of a coarse map, but their
+number would grow with the length that a header claims for a cell."""
 """Side of a plan cell, meters. The network and the trees were fitted on cells of this size."""
 POINTS_PER_SIDE = 3
 """A plan cell is looked at in this many points squared, so that walls of one map cell are met."""
@@ -59,6 +62,7 @@ class PlanFrame:
         It lies down, and most of the floor lies towards its first row and column: so a map that is mirrored
         or turned by quarters looks the same on it.
         """
+        cell_m = max(cell_m, LEAST_PLAN_CELL * resolution_m)
         # The extreme cells of each row hold the corners of the frame.
         rows, first, last = row_ends(known)
         if len(rows) == 0:

@@ -23,7 +23,7 @@ class RepresentativeLines:
     ends_m : (L, 4) float
         x0, y0, x1, y1: the evidence and as far beyond as a wall may go on unseen.
     direction : (L,) int32
-        Index of the direction.
+        Index of each line's direction, as of the segments.
     weight : (L,) float
         Share of the line that segments cover.
     of_cluster : (C,) int32

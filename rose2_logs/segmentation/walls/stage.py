@@ -30,11 +30,9 @@ class WallResult:
     segments_m : (N, 4) float
         All segments.
     segment_direction : (N,) int32
-        Index into `directions_rad`.
+        Index of each segment's direction: first the dominant ones, then local ones, see `Segments`.
     segment_line : (N,) int32
         Representative line of each segment's wall cluster, -1 for none.
-    directions_rad : (D,) float
-        Dominant directions first, then local ones.
     lines : RepresentativeLines
         The representative lines.
     walls : (H, W) bool
@@ -44,7 +42,6 @@ class WallResult:
     segments_m: FloatArray
     segment_direction: NDArray[np.int32]
     segment_line: NDArray[np.int32]
-    directions_rad: FloatArray
     lines: RepresentativeLines
     walls: BoolArray
 
@@ -72,7 +69,6 @@ def find_walls(count_walls: WallCounter, clean: BoolArray, attached: BoolArray) 
         segments.ends_m,
         segments.direction,
         lines.of_cluster[clusters.of_segment],
-        segments.directions_rad,
         lines,
         attached | local_walls,
     )

@@ -2,7 +2,9 @@
 
 import numpy as np
 import pytest
+from drawn_maps import snapshot
 
+from rose2_logs.segmentation.pipeline import analyze
 from rose2_logs.segmentation.regions.plan_frame import (
     POINTS_PER_SIDE,
     PlanFrame,
@@ -81,3 +83,18 @@ def test_specks_go_and_what_is_as_long_as_asked_stays():
     occupied = np.zeros((10, 10), bool)
     occupied[1, 1:4], occupied[5, 1:5] = True, True
     assert np.array_equal(without_specks(occupied, 4), np.where(np.arange(10)[:, None] == 5, occupied, False))
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("resolution_m", [0.05, 0.2, 1.0, 100.0])
+def test_a_plan_has_no_more_cells_than_the_map_has_for_coarse_maps(resolution_m):
+    """A header may claim any length for a cell; the number of cells must not grow with it."""
+    cells = np.full((40, 60), -1, np.int8)
+    cells[3:37, 3:57] = 100
+    cells[4:36, 4:30] = cells[4:36, 31:56] = 0
+    frame = PlanFrame.of(cells >= 0, 0.3, resolution_m)
+    assert frame.cell_m == max(0.1, resolution_m / 2)
+    found = analyze(snapshot(cells, resolution_m=resolution_m))
+    assert (found.rooms.labels > 0).sum() <= (cells == 0).sum()
+    empty = np.where(cells == 100, -1, cells).astype(np.int8)
+    analyze(snapshot(empty, resolution_m=resolution_m))
