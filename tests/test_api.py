@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import copy
+import gc
 import json
+import pickle
 from pathlib import Path
 
 import numpy as np
 import pytest
 from drawn_maps import office, snapshot
+from finished_runs import SAMPLE_LOGS
 from PIL import Image
 from saved_maps import WALL, save_map, save_run, two_rooms
 
@@ -18,6 +22,7 @@ from rose2_logs.errors import (
     LogError,
     NoMapTopicError,
     ParameterError,
+    ResultsError,
     Rose2LogsError,
 )
 
@@ -150,3 +155,18 @@ def test_maps_with_known_rooms_are_evaluated(tmp_path: Path):
     assert found.method == "rose2"
     with pytest.raises(CasesError):
         rl.evaluate(tmp_path / "none.json")
+
+
+def test_a_run_in_a_temporary_folder_is_copied_but_not_sent_away():
+    run = rl.analyze(SAMPLE_LOGS / "office.mcap", max_snapshots=2)
+    rooms = run.rooms.arrow
+    copies = copy.copy(run), copy.deepcopy(run)
+    with pytest.raises(ResultsError, match=r"to hand it to another process, analyze with out=\.\.\."):
+        pickle.dumps(run)
+    folder = Path(run.folder)
+    del run
+    gc.collect()
+    assert all(each.rooms.arrow.equals(rooms) for each in copies)
+    del copies
+    gc.collect()
+    assert not folder.exists()

@@ -88,6 +88,8 @@ class ParameterBlock:
         Groups of parameters whose values must not fall from one to the next.
     implied : mapping of str to mapping
         What naming a parameter decides of others that are not named with it.
+    groupings : mapping of str to tuple of str
+        With which `floor_plan.grouping` a parameter has an effect, for those that have none with others.
 
     Raises
     ------
@@ -98,6 +100,7 @@ class ParameterBlock:
     block: ClassVar[str]
     ascending: ClassVar[tuple[tuple[str, ...], ...]] = ()
     implied: ClassVar[Mapping[str, Mapping[str, Any]]] = {}
+    groupings: ClassVar[Mapping[str, tuple[str, ...]]] = {}
 
     def __post_init__(self) -> None:
         for declared in dataclasses.fields(self):  # type: ignore[arg-type]

@@ -40,6 +40,10 @@ LONGEST_SHOWN = 100
 """Signs of a setting that a message shows."""
 
 
+BY_FACES = ("walls", "dbscan")
+"""Groupings that join faces; the other one joins atoms by fitted borders."""
+
+
 @dataclass(frozen=True, repr=False)
 class OccupancyParameters(ParameterBlock):
     """Which cells count as occupied and which as free.
@@ -224,6 +228,28 @@ class FloorPlanParameters(ParameterBlock):
     """Stage C: edge weights, faces, rooms (paper, III-C)."""
 
     block: ClassVar[str] = "floor_plan"
+    groupings: ClassVar[Mapping[str, tuple[str, ...]]] = dict.fromkeys(
+        (
+            "blind_look_m",
+            "known_power",
+            "dbscan_max_weight",
+            "join_min_openness",
+            "join_min_open_m",
+            "join_min_passage",
+            "passage_wide",
+            "passage_look_widths",
+            "passage_look_max_m",
+            "passage_look_points",
+            "passage_look_samples",
+            "doorway_max_width_m",
+            "jamb_length_m",
+            "jamb_min_fill",
+            "leak_max_width_m",
+            "room_min_area_m2",
+            "room_min_clearance_m",
+        ),
+        BY_FACES,
+    )
 
     wall_tolerance_m: float = number(
         0.15, "m", "A wall counts for an edge within this distance: half a wall's thickness, plus drift.", 0.0
@@ -351,6 +377,18 @@ class TopologyParameters(ParameterBlock):
     """Stage D: Voronoi graph, splitting of rooms, doorways (paper, III-D)."""
 
     block: ClassVar[str] = "topology"
+    groupings: ClassVar[Mapping[str, tuple[str, ...]]] = dict.fromkeys(
+        (
+            "summit_reach_m",
+            "passage_min_ratio",
+            "split_min_clearance_m",
+            "split_min_area_m2",
+            "split_min_purity",
+            "cut_tail_share",
+            "max_rounds",
+        ),
+        BY_FACES,
+    )
 
     clearance_blur_cells: float = number(
         1.0,
@@ -471,6 +509,31 @@ class Parameters:
             )
         return cls().replaced(value or {})
 
+    def without_effect(self) -> list[str]:
+        """Say of each parameter that differs from its default, but that the grouping does not ask for, so.
+
+        Examples
+        --------
+        >>> import rose2_logs as rl
+        >>> rl.Parameters.from_any({"floor_plan.known_power": 1}).without_effect()
+        ['floor_plan.known_power has no effect with floor_plan.grouping=fitted; it has with walls and dbscan']
+        """
+        grouping, told = self.floor_plan.grouping, []
+        blocks = [getattr(self, block.name) for block in dataclasses.fields(self)]
+        for block in blocks:
+            for name in block.changed():
+                groupings = block.groupings.get(name, (grouping,))
+                if grouping in groupings:
+                    continue
+                others = [
+                    f"{other.block}.{name}"
+                    for other in blocks
+                    if grouping in other.groupings.get(name, ()) and hasattr(other, name)
+                ]
+                hint = f"{others[0]} has" if others else f"it has with {' and '.join(groupings)}"
+                told.append(f"{block.block}.{name} has no effect with floor_plan.grouping={grouping}; {hint}")
+        return told
+
     def resolved(self) -> dict[str, dict[str, float | int | str]]:
         """Every parameter with its value, block by block, as written with the results."""
         return dataclasses.asdict(self)
@@ -529,7 +592,8 @@ def _replaced_block(block_name: str, block: Any, values: Mapping[str, Any]) -> A
 def _meant(name: str) -> str:
     """Ask for the parameter, in the named block or else in any, whose name is next to one there is not."""
     block, _, own = name.rpartition(".")
-    rows = describe_parameters()
+    # Of two of one name, the one that has an effect by default is meant.
+    rows = sorted(describe_parameters(), key=lambda row: not row["has_effect"])
     for among in ([row for row in rows if row["block"] == block], rows):
         if near := difflib.get_close_matches(own, [row["name"] for row in among], 1):
             closest = next(row for row in among if row["name"] == near[0])
@@ -592,9 +656,13 @@ def _parsed_setting(setting: str) -> dict[str, Any]:
 
 
 def describe_parameters() -> list[dict[str, Any]]:
-    """List every parameter: block, name, default, unit, bounds and reason."""
-    rows = []
+    """List every parameter: block, name, default, unit, bounds, reason, whether it counts by default."""
+    rows, defaults = [], Parameters()
+    grouping = defaults.floor_plan.grouping
     for block in dataclasses.fields(Parameters):
-        for item in dataclasses.fields(getattr(Parameters(), block.name)):
-            rows.append({"block": block.name, "name": item.name, "default": item.default, **item.metadata})
+        values = getattr(defaults, block.name)
+        for item in dataclasses.fields(values):
+            has_effect = grouping in values.groupings.get(item.name, (grouping,))
+            row = {"block": block.name, "name": item.name, "default": item.default, "has_effect": has_effect}
+            rows.append(row | item.metadata)
     return rows

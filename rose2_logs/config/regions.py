@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import ClassVar
 
 from rose2_logs.config.fields import ParameterBlock, number
@@ -152,3 +152,6 @@ class RegionParameters(ParameterBlock):
         0.9, "share", "A piece with this much of its own room around it lies in its midst.", 0, 1
     )
     door_max_width_m: float = number(1.4, "m", "Wider openings between rooms are not doors.", 0.0)
+
+
+RegionParameters.groupings = dict.fromkeys((each.name for each in fields(RegionParameters)), ("fitted",))

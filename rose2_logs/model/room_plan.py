@@ -150,7 +150,7 @@ class RoomPlan:
     >>> run = rl.analyze("sample_logs/office.mcap", max_snapshots=3)
     >>> plan = run[-1].plan()
     >>> plan.title, len(plan.rooms), len(plan.doorways)
-    ('office, snapshot 2, coverage 100%', 18, 19)
+    ('office, snapshot 2, coverage 100%', 18, 17)
     """
 
     title: str

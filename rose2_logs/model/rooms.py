@@ -70,7 +70,7 @@ class RoomMap:
     >>> with rl.open_log("sample_logs/office.mcap") as reader:
     ...     found = rl.segment(reader.last())
     >>> found.rooms
-    RoomMap(18 rooms, 19 doorways, 704 x 512 cells of 0.05 m)
+    RoomMap(18 rooms, 17 doorways, 704 x 512 cells of 0.05 m)
     """
 
     geometry: GridGeometry

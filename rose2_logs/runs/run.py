@@ -8,11 +8,12 @@ from collections.abc import Iterator, Sequence
 from functools import cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any, NoReturn, Self, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rose2_logs.errors import ResultsError
 from rose2_logs.model.occupancy import UNKNOWN, GridGeometry
 from rose2_logs.model.room_plan import PlanMap, RoomPlan
 from rose2_logs.runs.parquet_table import Row
@@ -23,6 +24,23 @@ from rose2_logs.system.text import counted, percent
 
 if TYPE_CHECKING:
     from rose2_logs.drawing.drawing import Drawing
+
+
+class _TemporaryResults:
+    """Removes a folder when the last run that shows it, or copy of it, is gone."""
+
+    def __init__(self, temporary: TemporaryDirectory[str]) -> None:
+        # Without this, Python warns that the folder is removed implicitly.
+        weakref.finalize(self, temporary.cleanup)
+
+    def __deepcopy__(self, _memory: object) -> Self:
+        return self
+
+    def __reduce__(self) -> NoReturn:
+        raise ResultsError(
+            "these results lie in a temporary folder that goes with their Run; to hand it to another "
+            "process, analyze with out=..."
+        )
 
 
 class Run(StoredRun, Sequence["RunSnapshot"]):
@@ -73,9 +91,7 @@ class Run(StoredRun, Sequence["RunSnapshot"]):
         part: int | None = None,
     ) -> None:
         super().__init__(Path(folder), part)
-        if temporary is not None:
-            # Without this, Python warns that the folder is removed implicitly.
-            weakref.finalize(self, temporary.cleanup)
+        self._temporary = None if temporary is None else _TemporaryResults(temporary)
 
     @property
     def snapshots(self) -> Table:

@@ -241,6 +241,8 @@ def usable_processes(count: int, platform: str = sys.platform, cpus: int | None 
     cpus : int, optional
         Number of processors; by default those that this process may use.
     """
+    if multiprocessing.current_process().daemon:
+        return 1  # a process of a pool may not start any
     useful = PROCESSES_PER_CPU * (cpus or usable_cpus())
     return min(count, useful, MOST_ON_WINDOWS) if platform == "win32" else min(count, useful)
 

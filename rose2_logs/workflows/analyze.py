@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from rose2_logs.config.baselines import METHODS
 from rose2_logs.config.run_options import RunOptions
 from rose2_logs.errors import AlreadyWholeError, InvalidMapError, OutputError, ParameterError
 from rose2_logs.io import open_log
@@ -132,6 +133,9 @@ def _analyze_log(
     warnings: WarningLog,
 ) -> RunResult:
     start = time.perf_counter()
+    if options.method == METHODS[0]:
+        for text in options.parameters.without_effect():
+            log_warning(logger, "no_effect", text)
     for named in (path, folder):
         require_utf8(named)
     output = OutputFolder(folder, [file.name for file in _planned_files(folder, path, options).values()])

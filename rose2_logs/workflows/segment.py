@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from rose2_logs.config.baselines import METHODS
 from rose2_logs.config.parameters import Parameters
 from rose2_logs.config.run_options import with_detail
 from rose2_logs.drawing.drawing import Drawing
@@ -76,8 +77,8 @@ class Segmentation(SnapshotAnalysis):
     def at_detail(self, detail: float) -> Segmentation:
         """Divide the same map into more or fewer rooms, without analyzing it again.
 
-        More detail never joins what less detail parts. The result is that of `segment` with this detail,
-        but for the Voronoi graph, which stays as it is.
+        More detail never joins what less detail parts, but for floor too small for a room. The result is
+        that of `segment` with this detail, but for the Voronoi graph, which stays as it is.
 
         Parameters
         ----------
@@ -157,6 +158,8 @@ def segment_snapshot(
 
     It is warned of what was left out, of a map that is odd, and of coarser cells that a large map took.
     """
+    for text in parameters.without_effect() if method == METHODS[0] else ():
+        log_warning(logger, "no_effect", text)
     far = find_far_cells(snapshot.cells, snapshot.geometry.resolution_m, parameters.occupancy)
     if far is not None:
         log_warning(logger, "far_cells", f"{name}: {far.note}")

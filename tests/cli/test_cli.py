@@ -377,9 +377,9 @@ def test_help_shows_flags_as_flags_and_cuts_nothing(cli, command: str):
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        (["--set", "room_min_area=2"], "did you mean floor_plan.room_min_area_m2?"),
+        (["--set", "room_min_area=2"], "did you mean regions.room_min_area_m2?"),
         (["--set", "floor_plan.room_area_m2=2"], "did you mean floor_plan.room_min_area_m2?"),
-        (["--set", "rooms.room_min_area_m2=2"], "did you mean floor_plan.room_min_area_m2?"),
+        (["--set", "rooms.room_min_area_m2=2"], "did you mean regions.room_min_area_m2?"),
         (["--set", "color=2"], "write it as block.name=value"),
         (["--start", "9000"], "20.0 to 596.7 s after the start of the log"),
     ],

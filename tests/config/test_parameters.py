@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from drawn_maps import office, snapshot
 
 from rose2_logs.config.comparison import ComparisonParameters
 from rose2_logs.config.parameters import (
@@ -22,6 +23,7 @@ from rose2_logs.config.parameters import (
 )
 from rose2_logs.config.tracking import TrackingParameters
 from rose2_logs.errors import ParameterError
+from rose2_logs.segmentation.pipeline import analyze
 
 
 def test_every_number_has_finite_bounds_that_hold_its_default():
@@ -182,3 +184,27 @@ def test_a_file_that_is_no_toml_is_refused(tmp_path):
     path.write_text("[walls", encoding="utf-8")
     with pytest.raises(ParameterError, match="cannot be read as TOML"):
         load_parameters(path)
+
+
+@pytest.mark.parametrize("grouping", ["fitted", "walls"])
+def test_what_is_said_to_have_no_effect_has_none_and_is_told(grouping):
+    drawn = snapshot(office(clutter=25)[0])
+    defaults = {"floor_plan.grouping": grouping}
+    wanted = analyze(drawn, defaults)
+    for block in (Parameters().floor_plan, Parameters().topology, Parameters().regions):
+        for name, groupings in block.groupings.items():
+            if grouping in groupings:
+                continue
+            declared = next(each for each in dataclasses.fields(block) if each.name == name)
+            given = declared.default
+            other = given + 1 if isinstance(given, int) else 0.5 * given or 0.2
+            changed = Parameters.from_any(defaults | {f"{block.block}.{name}": other})
+            (told,) = changed.without_effect()
+            assert told.startswith(f"{block.block}.{name} has no effect with floor_plan.grouping={grouping};")
+            assert np.array_equal(analyze(drawn, changed).rooms.labels, wanted.rooms.labels)
+
+
+def test_a_parameter_that_counts_elsewhere_is_named():
+    (told,) = Parameters.from_any({"floor_plan.room_min_area_m2": 8}).without_effect()
+    assert told.endswith("; regions.room_min_area_m2 has")
+    assert not Parameters.from_any({"regions.room_min_area_m2": 8, "walls.extension_m": 6}).without_effect()

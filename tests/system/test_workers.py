@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import re
 import signal
@@ -364,3 +365,13 @@ def test_sockets_lie_in_a_private_folder_where_their_names_would_be_too_long():
             )  # fmt: skip
             assert (done.stdout, done.stderr) == (f"[1, 1, 2, 6, 24] {folders}\n", "")
             assert not [*sockets.iterdir(), *temporary.iterdir()]
+
+
+def _two_asked_for(_: int) -> int:
+    return len(list(ordered_map(int, range(4), 2))) * usable_processes(2)
+
+
+def test_a_process_of_a_pool_does_the_work_itself():
+    """It may not start processes of its own."""
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        assert pool.map(_two_asked_for, [0]) == [4]
