@@ -163,5 +163,8 @@ def simpler(shape: BaseGeometry, detail: float) -> BaseGeometry:
         rings = shapely.polygons(shapely.get_rings(part))
         holes = [ring.exterior for ring in rings[1:] if ring.area >= HOLE_MIN]
         parts.append(shapely.Polygon(rings[0].exterior, holes))
+    simple = shapely.MultiPolygon(parts)
+    if simple.is_valid:
+        return simple
     # Without a hole that is too small, a part that lies in it is part of what is around it.
     return shapely.multipolygons(shapely.get_parts(shapely.union_all(parts)))
