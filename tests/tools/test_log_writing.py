@@ -7,7 +7,7 @@ from rosbags.highlevel import AnyReader
 from rose2_logs.model.occupancy import GridGeometry
 
 KINDS = ["run.mcap", "run.bag", "run"]
-START_NS = 1_700_000_000_123_456_789
+START_NS = 1_700_000_000_000_000_000
 GEOMETRY = GridGeometry(0.05, (-3.2, 1.6), 0.3, "map", (3, 4))
 CELLS = np.arange(12, dtype=np.int8).reshape(3, 4) - 1
 
