@@ -13,6 +13,8 @@ from typing import Any, ClassVar
 
 from rose2_logs.errors import ParameterError
 
+BY_FACES = ("walls", "dbscan")
+"""Groupings of the floor plan that join faces; the other one joins atoms by fitted borders."""
 HIGHEST = {
     "m": 100.0,
     "m2": 1e6,

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from rose2_logs.config.parameters import TopologyParameters
+from rose2_logs.config.topology import TopologyParameters
 from rose2_logs.model.borders import Border
 from rose2_logs.model.labels import contacts, narrow
 from rose2_logs.model.occupancy import FloatArray

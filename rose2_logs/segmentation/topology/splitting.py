@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from shapely import STRtree, box, linestrings
 
-from rose2_logs.config.parameters import TopologyParameters
+from rose2_logs.config.topology import TopologyParameters
 from rose2_logs.model.labels import LabelRuns, known_window
 from rose2_logs.model.occupancy import BoolArray, FloatArray
 from rose2_logs.segmentation.topology.voronoi import clearance_m, parts_of_room

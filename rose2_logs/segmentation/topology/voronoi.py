@@ -9,7 +9,7 @@ from scipy import ndimage
 from skimage.morphology import skeletonize
 from skimage.segmentation import watershed
 
-from rose2_logs.config.parameters import TopologyParameters
+from rose2_logs.config.topology import TopologyParameters
 from rose2_logs.model.labels import LabelRuns, contacts, distance_from, label_sizes, straight_runs
 from rose2_logs.model.occupancy import BoolArray, FloatArray
 from rose2_logs.model.regions import RegionGraph, best_first

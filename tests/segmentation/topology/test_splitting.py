@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rose2_logs.config.parameters import TopologyParameters
+from rose2_logs.config.topology import TopologyParameters
 from rose2_logs.model.labels import distance_from
 from rose2_logs.segmentation.topology import voronoi
 from rose2_logs.segmentation.topology.splitting import split_rooms
