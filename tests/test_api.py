@@ -170,3 +170,21 @@ def test_a_run_in_a_temporary_folder_is_copied_but_not_sent_away():
     del copies
     gc.collect()
     assert not folder.exists()
+
+
+def test_a_parameter_without_effect_is_told_wherever_maps_are_segmented(cells, caplog, tmp_path):
+    vain = {"floor_plan.known_power": 1.0}
+    with rl.open_log(SAMPLE_LOGS / "office.mcap", max_snapshots=2) as reader:
+        maps = list(reader.snapshots())
+    calls = {
+        "segment": lambda: rl.segment(cells, resolution_m=0.05, parameters=vain),
+        "track": lambda: list(rl.track(maps, parameters=vain)),
+        "analyze": lambda: rl.analyze(SAMPLE_LOGS / "office.mcap", max_snapshots=1, parameters=vain),
+    }
+    for name, call in calls.items():
+        caplog.clear()
+        call()
+        told = [
+            each.message for each in caplog.records if "floor_plan.known_power has no effect" in each.message
+        ]
+        assert len(told) == 1, name

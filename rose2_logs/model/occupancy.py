@@ -7,7 +7,7 @@ import operator
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from numbers import Real
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +33,16 @@ def _are_numbers(*values: object) -> bool:
         type(value) is float or (isinstance(value, Real) and not isinstance(value, bool | np.bool_))
         for value in values
     )
+
+
+def _may_change(array: NDArray[Any]) -> bool:
+    """Whether somebody may write to an array, or to the one that it shows a part of."""
+    held: object = array
+    while isinstance(held, np.ndarray):
+        if held.flags.writeable:
+            return True
+        held = held.base
+    return False
 
 
 @dataclass(frozen=True)
@@ -221,7 +231,7 @@ class OccupancySnapshot:
                 f"not from {given.min()} to {given.max()}"
             )
         # What can be written to may hold the next map when this one is looked at.
-        cells = given.astype(np.int8, copy=given.flags.writeable).view()
+        cells = given.astype(np.int8, copy=_may_change(given)).view()
         cells.flags.writeable = False
         object.__setattr__(self, "cells", cells)
 

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from rose2_logs.config.baselines import METHODS
-from rose2_logs.config.parameters import FloorPlanParameters, Parameters
+from rose2_logs.config.floor_plan import FloorPlanParameters
+from rose2_logs.config.parameters import Parameters
 from rose2_logs.config.topology import TopologyParameters
 from rose2_logs.errors import ParameterError
 from rose2_logs.model.analysis import FloorPlan, SnapshotAnalysis, Structure, Walls

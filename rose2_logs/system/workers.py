@@ -472,7 +472,7 @@ def _work(packed: Packed) -> Packed:
 
 
 def _call_on_one_thread(function: Callable[[Item], Result], item: Item) -> Result:
-    with _LIMIT:
+    with _limit():
         return function(item)
 
 
@@ -481,7 +481,6 @@ def _one_thread() -> Iterator[None]:
     """Limit OpenCV and the linear algebra libraries to one thread while the context lasts."""
     import cv2
 
-    _end_threads_before_forks()
     threads = cv2.getNumThreads()
     cv2.setNumThreads(1)
     try:
@@ -514,26 +513,25 @@ class _OneThreadLimit:
             if self._within == 0:
                 self._limit.close()
 
+    def begin_anew(self) -> None:
+        """Put back what was there in a copy of the process, in which no thread is within any more."""
+        self._limit.close()
+        self.__init__()  # type: ignore[misc]
 
-_LIMIT = _OneThreadLimit()
+    def hold_forks(self) -> None:
+        """Let OpenCV end its threads while this process is copied: the copy would wait for them forever."""
+        if hasattr(os, "register_at_fork"):
+            os.register_at_fork(
+                before=self.__enter__, after_in_parent=self.__exit__, after_in_child=self.begin_anew
+            )
 
 
 @cache
-def _end_threads_before_forks() -> None:
-    """Let OpenCV end its threads before this process is copied: the copy would wait for them forever."""
-    import cv2
-
-    threads: list[int] = []
-
-    def end() -> None:
-        threads.append(cv2.getNumThreads())
-        cv2.setNumThreads(1)
-
-    def begin_again() -> None:
-        cv2.setNumThreads(threads.pop())
-
-    if hasattr(os, "register_at_fork"):
-        os.register_at_fork(before=end, after_in_parent=begin_again, after_in_child=begin_again)
+def _limit() -> _OneThreadLimit:
+    """The limit of this process."""
+    limit = _OneThreadLimit()
+    limit.hold_forks()
+    return limit
 
 
 @lru_cache(maxsize=1)

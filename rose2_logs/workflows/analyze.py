@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 
-from rose2_logs.config.baselines import METHODS
 from rose2_logs.config.run_options import RunOptions
 from rose2_logs.errors import AlreadyWholeError, InvalidMapError, OutputError, ParameterError
 from rose2_logs.io import open_log
@@ -41,6 +40,7 @@ from rose2_logs.system.files import refuse_existing, require_short, require_utf8
 from rose2_logs.system.warnings import WarningLog, collect_warnings, log_warning, muted
 from rose2_logs.system.workers import usable_processes
 from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot
+from rose2_logs.workflows.without_effect import tell_without_effect
 
 __all__ = [
     "OnSnapshot",
@@ -133,9 +133,7 @@ def _analyze_log(
     warnings: WarningLog,
 ) -> RunResult:
     start = time.perf_counter()
-    if options.method == METHODS[0]:
-        for text in options.parameters.without_effect():
-            log_warning(logger, "no_effect", text)
+    tell_without_effect(options.parameters, options.method)
     for named in (path, folder):
         require_utf8(named)
     output = OutputFolder(folder, [file.name for file in _planned_files(folder, path, options).values()])

@@ -18,6 +18,7 @@ from rose2_logs.evaluation.cases import load_cases
 from rose2_logs.evaluation.run_tracks import RunTracks, RunTrackScores, run_tracks_as_json
 from rose2_logs.evaluation.scores import Scores
 from rose2_logs.system.text import counted
+from rose2_logs.workflows.without_effect import tell_without_effect
 
 OnCase = Callable[[CaseResult, int, int], None]
 """Told of each result, with its labels, how many cases are done and how many there are."""
@@ -117,6 +118,7 @@ def evaluate_method(
     check_option(RunOptions, "method", method)
     check_option(RunOptions, "workers", workers)
     used = parameters or Parameters()
+    tell_without_effect(used, method)
     chosen = load_cases(Path(cases), group)
     results: list[CaseResult] = []
     tracks = RunTracks(used)

@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from rose2_logs.config.baselines import METHODS
 from rose2_logs.config.parameters import Parameters
 from rose2_logs.config.run_options import with_detail
 from rose2_logs.drawing.drawing import Drawing
@@ -37,6 +36,7 @@ from rose2_logs.runs.summary import write_json
 from rose2_logs.segmentation.pipeline import RoomTree, analyze_with_tree
 from rose2_logs.system.files import refuse_existing, require_utf8
 from rose2_logs.system.warnings import log_warning
+from rose2_logs.workflows.without_effect import tell_without_effect
 
 logger = logging.getLogger(__name__)
 
@@ -158,8 +158,7 @@ def segment_snapshot(
 
     It is warned of what was left out, of a map that is odd, and of coarser cells that a large map took.
     """
-    for text in parameters.without_effect() if method == METHODS[0] else ():
-        log_warning(logger, "no_effect", text)
+    tell_without_effect(parameters, method)
     far = find_far_cells(snapshot.cells, snapshot.geometry.resolution_m, parameters.occupancy)
     if far is not None:
         log_warning(logger, "far_cells", f"{name}: {far.note}")

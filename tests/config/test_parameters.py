@@ -12,8 +12,8 @@ import pytest
 from drawn_maps import office, snapshot
 
 from rose2_logs.config.comparison import ComparisonParameters
+from rose2_logs.config.floor_plan import FloorPlanParameters
 from rose2_logs.config.parameters import (
-    FloorPlanParameters,
     OccupancyParameters,
     Parameters,
     SpectrumParameters,

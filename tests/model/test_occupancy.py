@@ -52,6 +52,9 @@ def test_bytes_are_copied_only_where_they_may_change():
     taken = snapshot(cells)
     cells[:] = 100
     assert (taken.cells == 0).all()
+    shown = cells.view()
+    shown.flags.writeable = False
+    assert not np.shares_memory(snapshot(shown).cells, cells)
     cells.flags.writeable = False
     assert np.shares_memory(snapshot(cells).cells, cells)
 

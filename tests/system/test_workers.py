@@ -23,11 +23,11 @@ import pytest
 from rose2_logs.errors import InvalidMapError
 from rose2_logs.system import shared_memory as packed
 from rose2_logs.system.workers import (
-    _LIMIT,
     LOOK_AHEAD_PER_WORKER,
     WorkerError,
     WorkerProcess,
     Workers,
+    _limit,
     ordered_map,
     threaded_map,
     usable_cpus,
@@ -179,7 +179,7 @@ def test_threads_that_work_at_once_are_held_to_one_thread_each_and_let_go_togeth
     first_is_within, second_is_done = threading.Event(), threading.Event()
 
     def first() -> int:
-        with _LIMIT:
+        with _limit():
             first_is_within.set()
             assert second_is_done.wait(10)
             return threads(0)
@@ -187,7 +187,7 @@ def test_threads_that_work_at_once_are_held_to_one_thread_each_and_let_go_togeth
     with ThreadPoolExecutor(1) as other:
         found = other.submit(first)
         assert first_is_within.wait(10)
-        with _LIMIT:
+        with _limit():
             assert threads(0) == 1
         second_is_done.set()
         assert found.result() == 1

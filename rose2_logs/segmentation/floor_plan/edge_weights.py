@@ -9,7 +9,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from rose2_logs.config.parameters import FloorPlanParameters
+from rose2_logs.config.floor_plan import FloorPlanParameters
 from rose2_logs.model.occupancy import BoolArray, FloatArray
 from rose2_logs.segmentation.floor_plan.faces import SNAP_M
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rose2_logs.config.parameters import FloorPlanParameters
+from rose2_logs.config.floor_plan import FloorPlanParameters
 from rose2_logs.model.occupancy import BoolArray, FloatArray
 from rose2_logs.model.regions import RegionGraph, best_first
 from rose2_logs.segmentation.floor_plan.edge_weights import EdgeEvidence

@@ -9,7 +9,7 @@ import shapely
 from numpy.typing import NDArray
 from shapely.affinity import rotate
 
-from rose2_logs.config.parameters import FloorPlanParameters
+from rose2_logs.config.floor_plan import FloorPlanParameters
 from rose2_logs.model.labels import LabelRuns, row_ends
 from rose2_logs.model.mitred import mitred
 from rose2_logs.model.occupancy import BoolArray, FloatArray

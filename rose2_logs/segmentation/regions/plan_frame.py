@@ -16,10 +16,10 @@ Labels = NDArray[np.int32]
 Number = TypeVar("Number", bound=np.integer)
 
 PLAN_CELL_M = 0.1
+"""Side of a plan cell, meters. The network and the trees were fitted on cells of this size."""
 LEAST_PLAN_CELL = 0.5
 """A plan cell is at least this much of a map's cell: finer ones would tell nothing of a coarse map, but their
 number would grow with the length that a header claims for a cell."""
-"""Side of a plan cell, meters. The network and the trees were fitted on cells of this size."""
 POINTS_PER_SIDE = 3
 """A plan cell is looked at in this many points squared, so that walls of one map cell are met."""
 COUNT_BITS = 4

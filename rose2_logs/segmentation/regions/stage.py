@@ -239,7 +239,9 @@ class RegionTree:
             too_narrow = (self._narrow(joined, number[found.of_atom]) & room[kept])[number] & ~may_be_narrow
             if not (too_narrow & ~narrow).any():
                 # What is narrow, but beside no room, stays one.
-                return given, room | (found.room & (given == np.arange(len(given))))
+                whole_m2 = np.bincount(given, found.graph.node_sums[:, 0], len(given))
+                own = (given == np.arange(len(given))) & ~found.outside
+                return given, room | (own & (whole_m2 >= self.parameters.room_min_area_m2))
             narrow |= too_narrow
 
     def _leftovers_joined(

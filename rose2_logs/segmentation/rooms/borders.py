@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rose2_logs.config.parameters import FloorPlanParameters
+from rose2_logs.config.floor_plan import FloorPlanParameters
 from rose2_logs.model.labels import narrow
 from rose2_logs.model.occupancy import BoolArray
 

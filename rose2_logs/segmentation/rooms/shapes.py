@@ -10,7 +10,7 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from rose2_logs.config.parameters import FloorPlanParameters
+from rose2_logs.config.floor_plan import FloorPlanParameters
 from rose2_logs.model.labels import (
     Label,
     LabelRuns,

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from rose2_logs.config.parameters import FloorPlanParameters, Parameters
+from rose2_logs.config.floor_plan import FloorPlanParameters
+from rose2_logs.config.parameters import Parameters
 from rose2_logs.model.labels import LabelRuns, number_rooms
 from rose2_logs.model.occupancy import BoolArray
 from rose2_logs.segmentation.floor_plan.stage import FloorPlanResult

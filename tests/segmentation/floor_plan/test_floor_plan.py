@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import shapely
 
-from rose2_logs.config.parameters import FloorPlanParameters
+from rose2_logs.config.floor_plan import FloorPlanParameters
 from rose2_logs.model.labels import distance_from
 from rose2_logs.model.outlines import outline
 from rose2_logs.segmentation.floor_plan.edge_weights import EdgeEvidence, edge_evidence

@@ -12,8 +12,19 @@ from drawn_maps import office, snapshot
 from finished_runs import SAMPLE_LOGS
 
 import rose2_logs as rl
+from rose2_logs.config.regions import RegionParameters
 from rose2_logs.model.labels import narrow_labels
 from rose2_logs.segmentation.pipeline import RoomTree, analyze_with_tree
+from rose2_logs.segmentation.regions import stage
+from rose2_logs.segmentation.regions.graph import (
+    BORDER_MAXIMA,
+    BORDER_SUMS,
+    NODE_MAXIMA,
+    NODE_SUMS,
+    RegionGraph,
+)
+from rose2_logs.segmentation.regions.joining import Joins
+from rose2_logs.segmentation.regions.stage import RegionTree
 
 DETAILS = (-20.0, -6.0, -2.0, -0.5, 0.0, 0.5, 2.0, 6.0, 20.0)
 
@@ -140,3 +151,34 @@ def test_what_is_outside_is_so_at_any_detail():
     assert set(outside_m2.values()) == {outside_m2[0.0]}
     in_room = [(tree.rooms(detail).labels > 0) & atoms for detail in (-20.0, 0.0)]
     assert np.array_equal(*in_room)
+
+
+@pytest.mark.parametrize("order", ["NS", "SN"])
+def test_narrow_floor_beside_no_room_stays_a_room_whatever_its_number(order: str, monkeypatch):
+    """At more detail a room of 0.75 m is parted into a strip of 1.35 m2 and one too small for a room."""
+    monkeypatch.setattr(stage, "small_region_joins", lambda graph, *_: no_joins(graph))
+    monkeypatch.setattr(
+        RegionTree, "_outside_of", lambda self, graph, *_: np.zeros(len(graph.node_sums), bool)
+    )
+    columns = {"N": slice(10, 19), "S": slice(19, 25)}
+    cells = np.zeros((80, 60), np.int32)
+    for number, name in enumerate(order, start=1):
+        cells[10:70, columns[name]] = number
+    sums = np.zeros((2, len(NODE_SUMS)))
+    sums[:, 0] = [np.count_nonzero(cells == number) * 0.05**2 for number in (1, 2)]
+    graph = RegionGraph(
+        sums,
+        np.ones((2, len(NODE_MAXIMA))),
+        np.array([[0, 1]]),
+        np.ones((1, len(BORDER_SUMS))),
+        np.ones((1, len(BORDER_MAXIMA))),
+    )
+    tree = RegionTree(
+        cells, cells > 0, 0.05, graph, np.zeros(2), lambda f: np.ones(len(f)), RegionParameters()
+    )
+    for detail in (0.0, 0.5, 2.0):
+        assert (tree.rooms(detail).labels > 0).sum() == (cells > 0).sum()
+
+
+def no_joins(graph: RegionGraph) -> Joins:
+    return Joins(len(graph.node_sums), np.zeros((0, 2), np.int64), np.zeros(0))

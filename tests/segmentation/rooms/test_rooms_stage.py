@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from drawn_floors import draw_floor
 
-from rose2_logs.config.parameters import FloorPlanParameters, Parameters
+from rose2_logs.config.floor_plan import FloorPlanParameters
+from rose2_logs.config.parameters import Parameters
 from rose2_logs.config.topology import TopologyParameters
 from rose2_logs.segmentation.regions.stage import RegionsResult, generous_floor_plan, generous_walls
 from rose2_logs.segmentation.rooms.borders import adopt_left_out, settle_borders

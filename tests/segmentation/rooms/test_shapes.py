@@ -10,7 +10,7 @@ from finished_runs import SAMPLE_LOGS
 from shapely.affinity import rotate
 
 import rose2_logs as rl
-from rose2_logs.config.parameters import FloorPlanParameters
+from rose2_logs.config.floor_plan import FloorPlanParameters
 from rose2_logs.segmentation.rooms.shapes import room_shapes, seen_cells
 
 PARAMETERS = FloorPlanParameters()
