@@ -173,13 +173,13 @@ def test_a_scheduler_that_is_lost_ends_the_batch_in_one_line(undisturbed, tmp_pa
     assert err.splitlines()[-1].endswith("is gone; the same call again analyzes the rest")
     done = {path.name for path in out.glob("logs/*")}
     assert set(summary(out)) == done
-    assert "slow" not in done
     written = {path: path.stat().st_mtime_ns for path in out.glob("logs/*/*.parquet")}
     heard = Heard()
     with cluster_in(tmp_path / "second") as (file, _):
         result = run_batch([str(logs)], out, BatchOptions(QUIET, scheduler=file), heard)
     assert not result.failed, result.failed
     status = {state.name: state.status for state in result.states}
+    assert done < set(status)  # which one is first on a loaded machine, nobody knows
     assert {name for name in status if status[name] == "up to date"} == done
     assert set(heard.shares) == set(status) - done
     assert {path: path.stat().st_mtime_ns for path in written} == written
