@@ -55,6 +55,21 @@ def connected(
     return int(number.max(initial=-1)) + 1, number.take(lowest)
 
 
+def root_of(above: list[int], number: int) -> int:
+    """Follow steps towards a root, a number above which is itself; the steps on the way become longer."""
+    while above[number] != number:
+        above[number] = above[above[number]]
+        number = above[number]
+    return number
+
+
+def roots_of(above: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Root (N,) of each number, as `root_of` finds one."""
+    while not np.array_equal(further := above[above], above):
+        above = further
+    return above
+
+
 class RegionGraph(Generic[Border]):
     """Regions 0..N - 1 and the borders between neighbors, while regions are joined.
 
@@ -104,10 +119,7 @@ class RegionGraph(Generic[Border]):
 
     def holders(self) -> NDArray[np.intp]:
         """Region (N,) that each belongs to after all joins."""
-        holder = self._holder
-        while not np.array_equal(above := holder[holder], holder):
-            holder = above
-        return holder
+        return roots_of(self._holder)
 
 
 def best_first(

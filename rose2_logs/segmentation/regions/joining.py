@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rose2_logs.model.occupancy import BoolArray, FloatArray
+from rose2_logs.model.regions import root_of, roots_of
 from rose2_logs.segmentation.regions.features import join_features, joinable
 from rose2_logs.segmentation.regions.graph import RegionGraph
 
@@ -67,23 +68,14 @@ class Joins:
         """A step towards the root of the part of it that was made."""
         whole = [True] * self.count
 
-        def root(of: list[int], n: int) -> int:
-            while of[n] != n:
-                of[n] = of[of[n]]
-                n = of[n]
-            return n
-
         for (a, b), strength in zip(self.pairs.tolist(), self.strength.tolist(), strict=True):
-            one, other = root(above, a), root(above, b)
+            one, other = root_of(above, a), root_of(above, b)
             made = whole[one] and whole[other] and strength >= least
             above[other] = one
             whole[one] = made
             if made:
-                parent[root(parent, b)] = root(parent, a)
-        region = np.array(parent, np.int64)
-        while not np.array_equal(further := region[region], region):
-            region = further
-        return np.unique(region, return_inverse=True)[1]
+                parent[root_of(parent, b)] = root_of(parent, a)
+        return np.unique(roots_of(np.array(parent, np.intp)), return_inverse=True)[1]
 
     def levels(self, one: NDArray[np.integer], other: NDArray[np.integer]) -> FloatArray:
         """Log odds (K,) down to which pairs of atoms (K,) are in different regions; -inf for always.
@@ -97,14 +89,8 @@ class Joins:
         node = list(range(self.count))
         """The tree's node that an atom stands for, of those that stand for themselves."""
 
-        def root(n: int) -> int:
-            while of_atom[n] != n:
-                of_atom[n] = of_atom[of_atom[n]]
-                n = of_atom[n]
-            return n
-
         for number, pair in enumerate(self.pairs.tolist(), start=self.count):
-            a, b = (root(atom) for atom in pair)
+            a, b = (root_of(of_atom, atom) for atom in pair)
             below = [node[a], node[b]]
             parent[below] = number
             level[number] = min(level[number], *level[below])

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from rose2_logs.config.regions import RegionParameters
 from rose2_logs.model.labels import labels_near, row_ends
 from rose2_logs.model.occupancy import BoolArray, FloatArray
+from rose2_logs.model.regions import root_of, roots_of
 from rose2_logs.segmentation.regions.features import join_features, joinable, region_features
 from rose2_logs.segmentation.regions.graph import RegionGraph
 from rose2_logs.segmentation.regions.joining import Strength
@@ -141,13 +142,6 @@ def leftovers_joined(
     area = graph.node_sums[:, 0]
     size = (area if narrow is None else np.where(narrow, 0.0, area)).tolist()
     is_room, region = room.tolist(), list(range(len(room)))
-
-    def holder(number: int) -> int:
-        while region[number] != number:
-            region[number] = region[region[number]]
-            number = region[number]
-        return number
-
     which = np.flatnonzero(joinable(graph))
     ends = graph.ends[which]
     asked = ~room[ends].all(1) & ~outside[ends].any(1)
@@ -156,7 +150,7 @@ def leftovers_joined(
         before = together(*ends.T) if together else ()
         order = np.lexsort([-value for value in (strength(join_features(graph, which)), *before[::-1])])
         for pair in ends[order].tolist():
-            target, given = sorted(holder(number) for number in pair)
+            target, given = sorted(root_of(region, number) for number in pair)
             if target == given or (is_room[target] and is_room[given]):
                 continue
             if is_room[given]:
@@ -164,4 +158,4 @@ def leftovers_joined(
             region[given] = target
             size[target] += size[given]
             is_room[target] = is_room[target] or size[target] >= least_m2
-    return np.array([holder(number) for number in range(len(region))], np.int64), np.array(is_room, bool)
+    return roots_of(np.array(region, np.intp)), np.array(is_room, bool)
