@@ -17,7 +17,7 @@ from urllib.parse import parse_qs, urlsplit
 
 import pytest
 from commands import ROSE2_LOGS, WAIT_S, below, is_running, started, wait_for
-from saved_maps import save_run
+from saved_maps import held_at, save_run
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="needs signals of POSIX")
 SIGNALS = [signal.SIGTERM, signal.SIGHUP]
@@ -34,7 +34,7 @@ def temporary() -> Iterator[Path]:
 
 @pytest.fixture(scope="module")
 def many_maps(tmp_path_factory) -> Path:
-    return save_run(tmp_path_factory.mktemp("many") / "maps", tuple(range(100, 240)))
+    return save_run(tmp_path_factory.mktemp("many") / "maps", tuple(range(100, 130)))
 
 
 def stop(process: subprocess.Popen[str], number: int, to_group: bool = False) -> tuple[str, str]:
@@ -63,7 +63,8 @@ def test_a_run_leaves_nothing_behind(
     """But the journal, by which it can be resumed; one line and the exit code of shells."""
     out, before = tmp_path / "out", shared_memory()
     arguments = [command, many_maps, "-o", out, "--workers", "2", "--no-rrd"]
-    with started(*ROSE2_LOGS, *arguments, env=os.environ | {"TMPDIR": str(temporary)}) as process:
+    environment = os.environ | {"TMPDIR": str(temporary)}
+    with held_at(many_maps, 20), started(*ROSE2_LOGS, *arguments, env=environment) as process:
         wait_for(lambda: list(out.rglob("*.part")))
         _, err = stop(process, number, to_group)
     lines = [line for line in err.splitlines() if line.strip()]

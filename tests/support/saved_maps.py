@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -38,3 +41,18 @@ def save_run(folder: Path, seen: tuple[int, ...] = (115, 180, 240)) -> Path:
     for number, columns in enumerate(seen):
         save_map(folder, f"map{number}", two_rooms(columns))
     return folder
+
+
+@contextmanager
+def held_at(folder: Path, number: int) -> Iterator[None]:
+    """Let whoever reads a run wait before one of its maps, so that it is at work however busy the machine is.
+
+    Its image is a named pipe meanwhile, which nobody writes to.
+    """
+    image, aside = folder / f"map{number}.png", folder / f"map{number}.png.aside"
+    image.rename(aside)
+    os.mkfifo(image)
+    try:
+        yield
+    finally:
+        aside.replace(image)

@@ -71,6 +71,23 @@ options = RunOptions(
 analyze_log(Path(log), Path(folder), options, count_frames)
 """
 
+HELD = """
+import sys, time
+from rose2_logs.cli.main import main
+from rose2_logs.runs.journal import Journal
+
+maps, add = int(sys.argv.pop(1)), Journal.add
+
+def add_and_wait(journal, *found):
+    add(journal, *found)
+    if journal.maps >= maps:
+        time.sleep(3600)
+
+Journal.add = add_and_wait
+main()
+"""
+"""The command line, which waits once so many maps are in the journal: a signal finds it at work."""
+
 
 @pytest.fixture(scope="module")
 def log(tmp_path_factory) -> Path:
@@ -377,11 +394,11 @@ def test_a_full_disk_is_one_line(log: Path, tmp_path: Path):
 @pytest.mark.skipif(sys.platform == "win32", reason="needs signals of POSIX")
 def test_killed_and_interrupted_commands_end_with_their_workers(tmp_path: Path, monkeypatch, capsys):
     """kill -9 leaves no process behind; Ctrl-C is one line and exit code 130; --resume ends it."""
-    many = save_run(tmp_path / "maps", tuple(range(120, 240)))
-    command = [*COMMAND, str(many), "-o", str(tmp_path / "o"), "--no-rrd"]
+    many = save_run(tmp_path / "maps", tuple(range(120, 160)))
+    command = ["analyze", str(many), "-o", str(tmp_path / "o"), "--no-rrd"]
     journal = tmp_path / "o" / ".maps.journal"
-    for number, extra in ((signal.SIGKILL, ["--workers", "2"]), (signal.SIGINT, ["--resume"])):
-        with started(*command, *extra) as running:
+    for number, maps, extra in ((signal.SIGKILL, 8, ["--workers", "2"]), (signal.SIGINT, 16, ["--resume"])):
+        with started(sys.executable, "-c", HELD, maps, *command, *extra) as running:
             size = journal.stat().st_size if journal.exists() else 10_000
             wait_for(lambda size=size: journal.exists() and journal.stat().st_size > size)
             children = below(running.pid)
@@ -395,7 +412,7 @@ def test_killed_and_interrupted_commands_end_with_their_workers(tmp_path: Path, 
     ]
     assert "--resume goes on from there" in err
     assert names(tmp_path / "o") == [".maps.journal"]
-    monkeypatch.setattr(sys, "argv", ["rose2-logs", *command[3:], "--resume"])
+    monkeypatch.setattr(sys, "argv", ["rose2-logs", *command, "--resume"])
     for said in ("results in", "is whole already"):
         with pytest.raises(SystemExit) as ended:
             main()
