@@ -282,7 +282,8 @@ def _snapshot_of_array(
     if resolution_m is None:
         raise ParameterError("an array does not say how large its cells are; give resolution_m in meters")
     try:
-        cells = np.asanyarray(array)  # a mask is kept: what it hides is unknown to the snapshot
+        # A mask is kept: what it hides is unknown to the snapshot.
+        cells = array if isinstance(array, np.ma.MaskedArray) else np.asarray(array)
     except ValueError as error:
         raise InvalidMapError("all rows of a map must have the same number of cells") from error
     geometry = GridGeometry(resolution_m, (0.0, 0.0), 0.0, "map", cells.shape)

@@ -40,6 +40,11 @@ def test_usual_percent_are_taken_silently(caplog):
     assert not caplog.records
 
 
+@pytest.mark.filterwarnings("ignore::PendingDeprecationWarning")
+def test_a_matrix_is_an_array():
+    assert np.array_equal(rl.segment(np.matrix(CELLS), resolution_m=RESOLUTION_M).labels, ROOMS)
+
+
 @pytest.mark.parametrize(
     "parameters", [{"occupancy.values": "stored"}, {"occupancy.occupied_min_percent": 65}]
 )

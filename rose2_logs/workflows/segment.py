@@ -74,7 +74,7 @@ class Segmentation(SnapshotAnalysis):
         # The tree is worth its memory while one looks at a map, but not a way between processes.
         return self.__dict__ | {"_tree": None}
 
-    def at_detail(self, detail: float) -> Segmentation:
+    def at_detail(self, detail: float | None) -> Segmentation:
         """Divide the same map into more or fewer rooms, without analyzing it again.
 
         More detail never joins what less detail parts, but for floor too small for a room. The result is
@@ -84,7 +84,7 @@ class Segmentation(SnapshotAnalysis):
         ----------
         detail : float
             Log odds: 0 parts what is likelier two rooms than one; positive gives more and smaller rooms,
-            negative fewer and larger ones.
+            negative fewer and larger ones. None leaves it as it is.
 
         Raises
         ------
@@ -104,7 +104,7 @@ class Segmentation(SnapshotAnalysis):
             return segment_snapshot(
                 self.snapshot, parameters, name=self.name, voronoi=self.voronoi_m is not None
             )
-        found = self._tree.at_detail(self, self.snapshot, detail)
+        found = self._tree.at_detail(self, self.snapshot, parameters.regions.detail)
         return replace(found, parameters=parameters)
 
     def plan(self) -> RoomPlan:

@@ -116,6 +116,11 @@ def test_another_detail_of_a_segmented_map_is_as_if_it_was_segmented_so(detail: 
         assert other.outside_m2 == wanted.outside_m2
 
 
+def test_no_detail_is_the_one_there_is():
+    found = rl.segment(snapshot(office(clutter=25)[0]), detail=4.0)
+    assert np.array_equal(found.at_detail(None).labels, found.labels)
+
+
 @pytest.mark.parametrize(
     ("options", "detail"),
     [
