@@ -15,7 +15,7 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 from rich.theme import Theme
-from typer.core import TyperCommand, TyperGroup
+from typer.core import TyperCommand, TyperGroup, TyperOption
 
 THEME = Theme({"help.option": "bold cyan", "help.switch": "bold green", "help.usage": "yellow"})
 VALUE, REQUIRED, TOLD, BORDER = "bold yellow", "red", "dim", "dim"
@@ -35,7 +35,16 @@ _colored = _Options()
 
 
 class Command(TyperCommand):
-    """A command whose help is drawn here."""
+    """A command whose help is drawn here, and whose options take a value once, but for those for several."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Refuse what is given twice: of two values one would be left out without a word."""
+        _, _, given = self.make_parser(ctx).parse_args(args=list(args))
+        for each in given:
+            takes_one = isinstance(each, TyperOption) and not (each.multiple or each.is_flag)
+            if takes_one and given.count(each) > 1:
+                ctx.fail(f"{each.opts[0]} is given more than once; it takes one value")
+        return super().parse_args(ctx, args)
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Print the help."""

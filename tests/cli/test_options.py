@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 
 import pytest
+from finished_runs import SAMPLE_LOGS
 
 from rose2_logs.batch.options import BatchOptions
 from rose2_logs.cli.flags import flag_of, with_flags
@@ -85,3 +86,13 @@ def test_one_definition_makes_option_and_value(cli, tmp_path: Path):
     """A flag that turns off what is on by default does."""
     _, _, err = cli("analyze", tmp_path / "x.bag", "-o", tmp_path, "--bag", "--no-mcap", "--no-rrd")
     assert "--bag makes a ROS 2 bag" in err
+
+
+@pytest.mark.parametrize("command", ["batch", "analyze"])
+def test_an_option_for_one_value_is_given_once(cli, tmp_path: Path, command: str):
+    """Of two one would be left out without a word; flags say the same twice."""
+    where = ("-o", tmp_path / "one", "--out", tmp_path / "two")
+    code, _, err = cli(command, SAMPLE_LOGS / "office.mcap", *where, "-q", "-q")
+    assert code == 2
+    assert "--out is given more than once; it takes one value" in err
+    assert list(tmp_path.iterdir()) == []
