@@ -14,7 +14,7 @@ from shapely.geometry.base import BaseGeometry
 
 from rose2_logs.errors import ParameterError
 from rose2_logs.io.dxf_plan import read_dxf_plan
-from rose2_logs.model.room_names import RoomNames
+from rose2_logs.model.room_names import RoomNames, room_name
 
 PLAN_ENDINGS = (".geojson", ".json", ".dxf")
 """Files with outlines; all others are tables."""
@@ -36,6 +36,7 @@ def read_room_names(path: Path) -> RoomNames:
     path : path
         A table (CSV) with the columns ``name`` and ``track``, or ``name``, ``x`` and ``y`` in meters of the
         map's frame; or GeoJSON with polygons that have the property ``name``; or DXF, see `read_dxf_plan`.
+        What an exported plan calls by its number has no name; its outline helps to lay the plan over a map.
 
     Raises
     ------
@@ -56,7 +57,7 @@ def read_room_names(path: Path) -> RoomNames:
 
 
 def _known(path: Path, names: RoomNames) -> RoomNames:
-    if not names.by_track and not names.places:
+    if not names.by_track and not any(names.of_place):
         raise ParameterError(f"{path}: holds no name of a room")
     return names
 
@@ -117,12 +118,19 @@ def _meters(text: str, name: str, at: str) -> float:
     return value
 
 
+def _given_name(properties: dict[str, Any]) -> str:
+    """Name of a feature, empty where it is what an exported plan calls a room that nobody has named."""
+    name = " ".join(properties["name"].split())
+    number = properties.get("room")
+    return "" if isinstance(number, int) and name == room_name(number) else name
+
+
 def _plan(path: Path, text: str) -> RoomNames:
     try:
         content: Any = json.loads(text)
         features = content["features"]
         named = [
-            (shapely.geometry.shape(feature["geometry"]), " ".join(feature["properties"]["name"].split()))
+            (shapely.geometry.shape(feature["geometry"]), _given_name(feature["properties"]))
             for feature in features
             if (feature.get("properties") or {}).get("name")
             and (feature.get("geometry") or {}).get("type") in ("Polygon", "MultiPolygon")

@@ -53,6 +53,8 @@ STEP_NS = 10**9
 OCCUPIED_THRESH = 0.65
 FREE_THRESH = 0.196
 MODES = ("trinary", "scale", "raw")
+ROOMS_KEY = "rooms"
+"""Key of the description of an exported plan: the file that lists which room a value stands for."""
 NEGATE = {"0": False, "1": True, "false": False, "true": True, "no": False, "yes": True}
 NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 NOT_A_NUMBER = re.compile(r"[-+]?\.?nan", re.IGNORECASE)
@@ -347,6 +349,10 @@ def _cells(
     mode = _mode(path, described)
     if mode == "raw":
         value = np.round(shade * 255)
+        if ROOMS_KEY in described:
+            text = "its values from 1 to 99 are the rooms of an exported plan; they are read as free"
+            map_warnings.append(MapWarning("values", text))
+            value[(value > 0) & (value < 100)] = 0
         return np.where(value <= 100, value, UNKNOWN).astype(np.int8)
     occupancy = _occupancy(path, described, shade)
     free_below, occupied_above = _thresholds(path, described)

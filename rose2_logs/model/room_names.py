@@ -77,7 +77,7 @@ class RoomNames:
     places : tuple of shapely geometry
         Points and outlines that are named, world meters.
     of_place : tuple of str
-        Their names.
+        Their names, empty for outlines that only help to lay a plan over a map.
 
     Examples
     --------
@@ -116,7 +116,7 @@ class RoomNames:
             pairs = shapely.STRtree(rooms).query(places, predicate="intersects")
             place, room = pairs[:, self._are_one(places[pairs[0]], rooms[pairs[1]])]
             for at, number in sorted(zip(place.tolist(), room.tolist(), strict=True)):
-                if self.of_place[at] not in found[number]:
+                if self.of_place[at] and self.of_place[at] not in found[number]:
                     found[number].append(self.of_place[at])
         return tuple(
             self.by_track.get(track, JOINED.join(names)) for track, names in zip(tracks, found, strict=True)
@@ -133,4 +133,4 @@ class RoomNames:
         """List what was given and names none of some rooms, whose names `of` gave."""
         used = {*names, *(part for name in names for part in name.split(JOINED))}
         given = [*(name for track, name in self.by_track.items() if track not in tracks), *self.of_place]
-        return sorted({name for name in given if name not in used})
+        return sorted({name for name in given if name and name not in used})

@@ -43,6 +43,11 @@ class _TemporaryResults:
         )
 
 
+def is_last(final: dict[str, Any], last: int) -> bool:
+    """Whether a layout was final in the last map only, of several: so it may change again."""
+    return bool(final["snapshot"] == last > 0)
+
+
 class Run(StoredRun, Sequence["RunSnapshot"]):
     """A run over one log, as an analysis has stored it: a sequence of `RunSnapshot`.
 
@@ -221,7 +226,9 @@ class Run(StoredRun, Sequence["RunSnapshot"]):
             "log": self.summary["log"],
             "maps": found["snapshots"],
             "rooms at the end": f"{found['rooms_last']} of {found['tracks']} tracks",
-            "layout final from": "not reached" if final is None else f"{percent(final['coverage'])} coverage",
+            "layout final from": "not reached"
+            if final is None or is_last(final, self.choose())
+            else f"{percent(final['coverage'])} coverage",
             "warnings": self.summary["warnings"].get("count", 0),
         }
         rows = "".join(f"<tr><th>{escape(k)}</th><td>{escape(str(v))}</td></tr>" for k, v in facts.items())

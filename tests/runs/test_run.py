@@ -338,6 +338,13 @@ def test_a_run_and_its_maps_are_drawn(run: rl.Run, tmp_path: Path):
     assert "office.mcap" in html
 
 
+@pytest.mark.parametrize(("snapshot", "said"), [(0, "51% coverage"), (-1, "not reached")])
+def test_a_layout_that_was_final_in_the_last_map_alone_is_not_told_as_final(run, snapshot, said, monkeypatch):
+    final = {"snapshot": run[snapshot].number, "coverage": 0.51}
+    monkeypatch.setitem(run.summary["layout"], "final_since", final)
+    assert f"<th>layout final from</th><td>{said}</td>" in run._repr_html_()
+
+
 def test_what_a_log_is_called_is_no_html(tmp_path: Path):
     log = save_run(tmp_path / "<b>maps&")
     html = rl.analyze(log)._repr_html_()

@@ -11,6 +11,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from rose2_logs.drawing.palette import track_color
+from rose2_logs.io.dxf_plan import LABELS
 from rose2_logs.model.occupancy import FloatArray
 from rose2_logs.model.room_plan import PlanRoom, RoomPlan, predicted_parts, wall_outlines
 from rose2_logs.system.files import replacing
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 
 VERSION = "R2010"
 """Read by every CAD program in use; the first release with true colors on all entities."""
-ROOMS, PREDICTED, DOORWAYS, WALLS, LABELS = "ROOMS", "PREDICTED", "DOORWAYS", "WALLS", "LABELS"
+ROOMS, PREDICTED, DOORWAYS, WALLS = "ROOMS", "PREDICTED", "DOORWAYS", "WALLS"
 LAYERS = {ROOMS: 7, PREDICTED: 8, DOORWAYS: 1, WALLS: 7, LABELS: 7}
 """Layers and their AutoCAD color indices: 7 is black or white, 8 gray, 1 red."""
 TEXT_HEIGHT_M = 0.25

@@ -11,6 +11,7 @@ import yaml
 
 from rose2_logs.drawing.image_files import write_label_image
 from rose2_logs.errors import OutputError
+from rose2_logs.io.saved_maps import ROOMS_KEY
 from rose2_logs.model.occupancy import classify
 from rose2_logs.model.room_plan import PlanMap, RoomPlan
 from rose2_logs.system.files import replacing
@@ -32,7 +33,8 @@ def write_labeled_map(plan: RoomPlan, folder: Path, stem: str) -> tuple[Path, ..
     The description has ``mode: raw``, so that cells load with the values of the image: 0 free, 100 occupied,
     255 unknown, 1 to 99 a room. The list says which room a value stands for, with its name, areas and
     neighbors. If there are more than 99 rooms, they share values; a second image of the same cells therefore
-    contains the room numbers themselves, 0 for no room.
+    contains the room numbers themselves, 0 for no room. Our reader of saved maps takes
+    rooms as free.
 
     Returns
     -------
@@ -70,6 +72,7 @@ def write_labeled_map(plan: RoomPlan, folder: Path, stem: str) -> tuple[Path, ..
         "negate": 0,
         "occupied_thresh": OCCUPIED_THRESH,
         "free_thresh": FREE_THRESH,
+        ROOMS_KEY: listing.name,
     }
     _write_yaml(about, described)
     _write_yaml(listing, _listing(plan, values, about.name, labels.name))

@@ -13,9 +13,8 @@ from rose2_logs.drawing.palette import TEMPORARY, state_colors, track_color
 from rose2_logs.drawing.shapes import Color
 from rose2_logs.model.occupancy import BoolArray, FloatArray, IntArray
 from rose2_logs.model.room_quality import UNSURE_SIGN, unsure_sign
-from rose2_logs.outputs.report.facts import is_last
 from rose2_logs.outputs.report.words import css, duration
-from rose2_logs.runs.run import Run
+from rose2_logs.runs.run import Run, is_last
 from rose2_logs.system.text import percent
 
 BLUE, ORANGE, GREEN, VIOLET = (47, 126, 216), (224, 123, 26), (42, 157, 92), (138, 95, 208)

@@ -12,7 +12,7 @@ from rose2_logs.model.borders import UNSURE_BORDER_BELOW
 from rose2_logs.model.room_plan import RoomPlan
 from rose2_logs.model.room_quality import UNSURE_BELOW
 from rose2_logs.outputs.report.words import MISSING, date_of, duration, size
-from rose2_logs.runs.run import Run
+from rose2_logs.runs.run import Run, is_last
 from rose2_logs.system.text import listed, percent
 
 LATE_COVERAGE = 0.95
@@ -102,11 +102,6 @@ def _followed(found: dict[str, Any]) -> str:
     """Say how many rooms had a number, and how many of them were soon gone."""
     brief = found["brief_tracks"]
     return f"{found['tracks']} followed over the run" + (f", {brief} only briefly" if brief else "")
-
-
-def is_last(final: dict[str, Any], last: int) -> bool:
-    """Whether a layout was final in the last map only, of several: so it may change again."""
-    return bool(final["snapshot"] == last > 0)
 
 
 def _final(final: dict[str, Any] | None, last: int) -> tuple[str, str]:

@@ -18,7 +18,6 @@ from rose2_logs.errors import LogError, ParameterError
 from rose2_logs.outputs.report import PANELS
 from rose2_logs.outputs.report.buildings import same_buildings
 from rose2_logs.outputs.report.comparison import changed_rooms, comparison_page
-from rose2_logs.outputs.report.facts import is_last
 from rose2_logs.outputs.report.page import REPORT_NAME, render, write_page, write_report
 from rose2_logs.outputs.report.words import (
     MISSING,
@@ -32,7 +31,7 @@ from rose2_logs.outputs.report.words import (
     share,
 )
 from rose2_logs.runs.last_layout import read_final_layout
-from rose2_logs.runs.run import Run
+from rose2_logs.runs.run import Run, is_last
 from rose2_logs.runs.stored_run import find_results
 from rose2_logs.system.files import refuse_existing
 

@@ -150,7 +150,7 @@ class RerunRecording(Sink):
         self._log_curves(step)
         for event in step.events:
             if event.kind != "continued":
-                text = f"{percent(step.coverage, ' %')}: {event_text(event)}"
+                text = f"{percent(step.coverage, ' %')}: {event_text(event, self._name_of)}"
                 self._layers.add("/events", Entry(text, _event_level(event)))
         if is_first:
             self._log_legend()

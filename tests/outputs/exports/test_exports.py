@@ -240,20 +240,26 @@ def test_the_same_plan_gives_the_same_dxf_in_every_process(tmp_path: Path):
     assert len(written) == 1
 
 
-def test_labeled_map_is_read_as_a_map(plan, tmp_path: Path):
-    """Our reader of map_server's files gets the cells, their place, and the rooms as values."""
+def values_in(image: Path) -> np.ndarray:
+    return np.flipud(np.asarray(Image.open(image)))
+
+
+def test_labeled_map_is_read_as_a_map(plan, tmp_path: Path, caplog):
+    """It has the rooms as values; our reader of map_server's files gets the map again, and its place."""
     image, about, listing, labels = write_plan(plan, ["map_server"], tmp_path, "two")
     with open_log(about) as log:
-        snapshot = log.first()
+        (snapshot,) = log.snapshots()
     geometry = plan.map.geometry
     assert snapshot.geometry.shape == geometry.shape
     assert snapshot.geometry.origin_xy_m == pytest.approx(geometry.origin_xy_m)
     assert snapshot.geometry.yaw_rad == pytest.approx(geometry.yaw_rad)
     rooms = {each["room"]: each for each in yaml.safe_load(listing.read_text())["rooms"]}
     for number in (LEFT, RIGHT):
-        assert ((plan.map.labels == number) == (snapshot.cells == rooms[number]["value"])).all()
+        assert ((plan.map.labels == number) == (values_in(image) == rooms[number]["value"])).all()
     outside = plan.map.labels == 0
     assert np.array_equal(snapshot.cells[outside], plan.map.cells[outside])
+    assert (snapshot.cells[~outside] == 0).all()
+    assert "are the rooms of an exported plan; they are read as free" in caplog.text
     assert rooms[LEFT]["neighbors"] == [RIGHT]
     assert image.read_bytes().startswith(b"P5")
     assert np.array_equal(np.flipud(np.asarray(Image.open(labels))), plan.map.labels)
@@ -278,7 +284,7 @@ def test_more_rooms_than_values_are_still_told_apart(tmp_path: Path, caplog):
     assert set(values.values()) == set(range(1, 100))
     with open_log(about) as log:
         cells = log.first().cells
-    assert all((cells[labels == number] == values[number]).all() for number in numbers)
+    assert all((values_in(image)[labels == number] == values[number]).all() for number in numbers)
     assert (cells[labels == 0] == 0).all()
     assert image.read_bytes().startswith(b"P5")
 
@@ -295,6 +301,22 @@ def test_free_and_occupied_are_what_they_were_in_the_analysis(tmp_path: Path):
         files = write_plan(dataclasses.replace(plan, map=below), ["map_server"], folder, "map")
         with open_log(files[1]) as log:
             assert (log.first().cells[beside] == value).all()
+
+
+@pytest.mark.parametrize("kind", ["geojson", "dxf"])
+def test_only_the_rooms_that_a_person_named_have_names_in_a_plan(kind: str, tmp_path: Path):
+    """The others are called by their numbers there, which may be those of other rooms in another run."""
+    plan = two_rooms_plan()
+    (file,) = write_plan(plan, [kind], tmp_path, "unnamed")
+    with pytest.raises(ParameterError, match="holds no name"):
+        read_room_names(file)
+    rooms = [dataclasses.replace(room, given_name="Kitchen" * (room.number == RIGHT)) for room in plan.rooms]
+    (file,) = write_plan(dataclasses.replace(plan, rooms=tuple(rooms)), [kind], tmp_path, "named")
+    names = read_room_names(file)
+    assert set(names.of_place) == {"", "Kitchen"}
+    wanted = tuple("Kitchen" * (room.number == RIGHT) for room in rooms)
+    assert names.of((5, 6), tuple(room.shape for room in rooms)) == wanted
+    assert names.unused(wanted, (5, 6)) == []
 
 
 def test_graph_is_read_by_networkx(plan, tmp_path: Path):

@@ -24,6 +24,7 @@ from rose2_logs.config.run_options import RECORDING_LAYERS
 from rose2_logs.drawing.sheet import legend
 from rose2_logs.errors import OutputError
 from rose2_logs.model.borders import UNSURE_BORDER_BELOW
+from rose2_logs.model.room_names import TrackNames
 from rose2_logs.outputs.rerun.blueprint import PLAY_S, make_blueprint
 from rose2_logs.outputs.rerun.legend import (
     CURVES_WIDTH_EM,
@@ -236,6 +237,23 @@ def test_a_shift_of_the_map_is_told_in_metres_and_degrees():
     motion = RigidMotion((3.0, 4.0), (0.204, -0.05), np.deg2rad(1.2))
     text = event_text(RoomEvent("shifted", 5, MAP_TRACK, motion=motion))
     assert text == "the map shifted by +0.20, -0.05 m and turned by +1.2°"
+
+
+@pytest.mark.parametrize(
+    ("kind", "others", "text"),
+    [
+        ("lost", (), "Kitchen lost"),
+        ("split", (3, 4), "Kitchen split: now also Room 3, Room 4"),
+        ("merged", (3,), "Kitchen merged with Room 3"),
+        ("merged", (), "Kitchen merged"),
+    ],
+)
+def test_events_call_rooms_by_their_names(kind: str, others: tuple[int, ...], text: str):
+    from rose2_logs.drawing.event_text import event_text
+
+    names = TrackNames()
+    names.add((2,), ("Kitchen",))
+    assert event_text(RoomEvent(kind, 5, 2, others), names) == text
 
 
 def test_names_of_rooms_are_short_enough_for_their_place_in_the_view():
