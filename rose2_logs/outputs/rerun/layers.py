@@ -43,10 +43,9 @@ def whole_percent(coverage: float) -> int:
 
 @dataclass
 class _Entity:
-    """What an entity shows, in which stretch of the run that was logged, and the rows that wait."""
+    """What an entity shows, and the rows that wait."""
 
     shown: LayerKind
-    stretch: int
     instants: list[Instant] = field(default_factory=list)
     rows: list[LayerKind] = field(default_factory=list)
     nbytes: int = 0
@@ -56,9 +55,9 @@ class Layers:
     """Writes layers to a recording, each only where it differs from what its entity shows already.
 
     At any place of a timeline a viewer shows what was logged last before it on that timeline, so that what
-    has not changed can be left out as long as the timelines go forward. A snapshot that covers less than
-    one before it stands on the coverage timeline at the greatest coverage so far, behind the other. Stamps
-    that go back begin a new stretch of the run, in which everything is logged again.
+    has not changed can be left out as long as the timelines go forward. So they do: a snapshot that covers
+    less than one before it, or has an earlier stamp, stands at the greatest coverage or the latest stamp so
+    far, behind the other.
 
     Parameters
     ----------
@@ -81,38 +80,32 @@ class Layers:
         self._waiting_bytes = waiting_bytes
         self._nbytes = 0
         self._entities: dict[str, _Entity] = {}
-        self._stretch = 0
-        self._stamps_went_back = False
-        self._now = Instant(0, 0, 0, 0)
-        self._latest_stamp_ns: int | None = None
+        self._now: Instant | None = None
 
     def begin(self, log_time_ns: int, stamp_ns: int, snapshot: int, coverage_percent: int) -> None:
         """Start a snapshot: everything is logged at these times from now on."""
-        latest_ns = stamp_ns if self._latest_stamp_ns is None else self._latest_stamp_ns
-        goes_back = stamp_ns < latest_ns
-        if goes_back or self._stamps_went_back:
-            self._stretch += 1
-        self._stamps_went_back, self._latest_stamp_ns = goes_back, max(stamp_ns, latest_ns)
-        self._now = Instant(
-            log_time_ns, stamp_ns, snapshot, max(coverage_percent, self._now.coverage_percent)
-        )
+        before = self._now
+        if before is not None:
+            stamp_ns = max(stamp_ns, before.ros2_timestamp)
+            coverage_percent = max(coverage_percent, before.coverage_percent)
+        self._now = Instant(log_time_ns, stamp_ns, snapshot, coverage_percent)
 
     @property
     def now(self) -> Instant:
         """Position of the present snapshot on each timeline."""
-        return self._now
+        return Instant(0, 0, 0, 0) if self._now is None else self._now
 
     def show(self, path: str, layer: LayerKind) -> None:
         """Let an entity show a layer from the present snapshot on; the layers of one are all of one kind."""
         entity = self._entities.get(path)
-        if entity is None or entity.stretch != self._stretch or not _equal(layer, entity.shown):
+        if entity is None or not _equal(layer, entity.shown):
             self.add(path, layer)
 
     def add(self, path: str, layer: LayerKind) -> None:
         """Log a layer also where it is the same as before: the point of a curve, an entry of a list."""
-        entity = self._entities.setdefault(path, _Entity(layer, self._stretch))
-        entity.shown, entity.stretch = layer, self._stretch
-        entity.instants.append(self._now)
+        entity = self._entities.setdefault(path, _Entity(layer))
+        entity.shown = layer
+        entity.instants.append(self.now)
         entity.rows.append(layer)
         nbytes = ROW_BYTES + sum(value.nbytes for value in _values(layer) if isinstance(value, np.ndarray))
         entity.nbytes += nbytes
@@ -127,7 +120,7 @@ class Layers:
         for known in [each for each in self._entities if each == path or each.startswith(f"{path}/")]:
             # Of what stands at one place of a timeline, a viewer takes what was written last.
             self._write(known, self._entities.pop(known))
-        now = self._now
+        now = self.now
         self._recording.set_time("message_log_time", timestamp=np.datetime64(now.message_log_time, "ns"))
         self._recording.set_time("ros2_timestamp", timestamp=np.datetime64(now.ros2_timestamp, "ns"))
         self._recording.set_time("snapshot", sequence=now.snapshot)
