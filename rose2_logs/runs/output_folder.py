@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import logging
 import os
+import re
 import shutil
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -18,12 +19,14 @@ from rose2_logs.errors import AlreadyWholeError, OutputError
 from rose2_logs.runs.journal import Journal, KeptMaps, kept_maps
 from rose2_logs.runs.provenance import log_files
 from rose2_logs.system.files import locked, refuse_existing, writing
-from rose2_logs.system.text import counted
+from rose2_logs.system.text import counted, listed
 from rose2_logs.system.warnings import UNCOUNTED
 from rose2_logs.system.workers import WorkerError
 
 logger = logging.getLogger(__name__)
 
+TOLD_MOST = 5
+"""Files that are told in one line."""
 MAY_PASS = (OutputError, WorkerError, OSError, MemoryError)
 """After these errors, as after Ctrl-C, another try may go on; the others would come again."""
 
@@ -33,7 +36,8 @@ class OutputFolder:
 
     A folder that is not there appears with all results in it, by one renaming. Into one that is there the
     files are moved one after the other, the summary last: as long as it is missing they are not whole. What
-    an earlier run has written there besides, as its recording where this one makes none, goes.
+    an earlier run has written there besides, as its recording where this one makes none, goes. Pages, figures
+    and plans that were made of its results stay, and are told.
 
     Parameters
     ----------
@@ -117,6 +121,13 @@ class OutputFolder:
                 self._clean_up(journal.maps if _may_pass(error) else 0)
                 raise
             self._clean_up()
+            if made := self._made_of_results():
+                logger.warning(
+                    "%s: made of the results that were here before: %s; make them again or remove them",
+                    self._folder,
+                    listed(made, TOLD_MOST),
+                    extra=UNCOUNTED,
+                )
 
     def _begin(self) -> None:
         with writing(self._folder):
@@ -194,6 +205,18 @@ class OutputFolder:
             for file in files
             if file.is_file() and not any(file.samefile(each) for each in self._sources if each.exists())
         ]
+
+    def _made_of_results(self) -> list[str]:
+        """Pages, figures and plans in the folder, which ``report``, ``figure`` and ``export`` name so."""
+        name = re.escape(self._place.name)
+        made = re.compile(rf"report.*\.html|{name}\..+")
+        files = [file for file in self._place.iterdir() if file.is_file() and made.fullmatch(file.name)]
+        return sorted(
+            file.name
+            for file in files
+            if file.name not in self._names
+            and not any(file.samefile(each) for each in self._sources if each.exists())
+        )
 
     def _clean_up(self, kept_maps: int = 0) -> None:
         shutil.rmtree(self._work, ignore_errors=True)

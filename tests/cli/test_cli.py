@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -90,6 +91,14 @@ def test_analyze_writes_a_folder_named_after_the_log(cli, maps: Path, tmp_path: 
     assert "2 (2 over the run)" in out
     summary = json.loads((tmp_path / "out" / "maps" / "summary.json").read_text())
     assert summary["parameters"]["tracking"]["match_min_iou"] == 0.3
+
+
+def test_a_layout_may_be_final_before_the_last_of_maps_without_times(cli, tmp_path: Path):
+    """All maps of a folder of saved ones have the same time."""
+    save_run(tmp_path / "maps", (115, 200, 210, 219))
+    code, out, _ = cli("analyze", tmp_path / "maps", "-o", tmp_path / "out", "--no-rrd", "--no-mcap")
+    assert code == 0
+    assert re.search(r"layout final +from 9\d\.\d% coverage on", out)
 
 
 def test_detail_gives_more_or_fewer_rooms(cli, tmp_path: Path):

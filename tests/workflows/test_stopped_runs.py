@@ -152,6 +152,18 @@ def test_results_that_only_the_earlier_run_has_made_go_with_it(log: Path, tmp_pa
     assert annotated.name in before - kept
 
 
+def test_what_was_made_of_the_results_before_is_told(log: Path, tmp_path: Path, caplog):
+    """A page beside new results would be taken for theirs; what has other names is somebody's own."""
+    out = tmp_path / "out"
+    analyze_log(log, out, RunOptions(**OPTIONS))
+    for name in ("report.html", "out.figure.png", "out.floor_plan.geojson", "notes.txt"):
+        (out / name).write_text("")
+    assert "made of the results" not in caplog.text
+    analyze_log(log, out, RunOptions(**OPTIONS, overwrite=True))
+    (told,) = [each for each in caplog.messages if "made of the results that were here before" in each]
+    assert "out.figure.png, out.floor_plan.geojson, report.html; make them again or remove them" in told
+
+
 def count_calls(monkeypatch, analyzed: list[int]) -> None:
     from rose2_logs.runs import stream as tracked_stream
 

@@ -28,7 +28,7 @@ from rose2_logs.errors import AlreadyWholeError, ParameterError, Rose2LogsError
 from rose2_logs.system.text import counted
 
 if TYPE_CHECKING:
-    from rose2_logs.runs.history import RunSummary, RunTotals
+    from rose2_logs.runs.history import RunSummary
     from rose2_logs.tracking.track_history import SnapshotRef
     from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot
     from rose2_logs.workflows.analyze import OnSnapshot, RunResult
@@ -196,7 +196,7 @@ def print_run(result: RunResult) -> None:
         ("known part final", result.summary.known_final),
     ):
         if since is not None:
-            table.add_row(name, _since(since, totals))
+            table.add_row(name, _since(since, result.summary))
     if result.warnings.count:
         kinds = ", ".join(f"{found.count} {kind}" for kind, found in result.warnings.kinds.items())
         table.add_row("warnings", f"{kinds}; see warnings in summary.json")
@@ -214,9 +214,9 @@ def _part(part: RunSummary) -> str:
     return f"{counted(totals.snapshots, 'map')}, {coverage}, {counted(totals.rooms_last, 'room')} at its end"
 
 
-def _since(since: SnapshotRef, totals: RunTotals) -> str:
+def _since(since: SnapshotRef, summary: RunSummary) -> str:
     """Say from when on something held."""
-    span_ns = (totals.last_log_time_ns or 0) - (totals.first_log_time_ns or 0)
-    if totals.snapshots > 1 and since.time_s == span_ns / 1e9:
+    last = summary.histories.last
+    if summary.totals.snapshots > 1 and last is not None and since.snapshot == last.snapshot:
         return "only in the last map: take the rooms as preliminary"
     return f"from {since.coverage:.1%} coverage on, {duration(since.time_s)}"
