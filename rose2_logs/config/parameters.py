@@ -348,7 +348,9 @@ def _by_block(changes: Mapping[str, Any], blocks: Iterable[str]) -> dict[str, di
         name, dot, parameter = str(key).partition(".")
         values = {parameter: given} if dot else given
         if name not in blocks:
-            meant = _meant(f"{name}.{next(iter(values), '')}" if isinstance(values, Mapping) else name)
+            first = next(iter(values), "") if isinstance(values, Mapping) else ""
+            full_name = f"{name}.{first}" if first else name
+            meant = f"did you mean {first}?" if first in blocks else _meant(full_name)
             hint = meant or f"there are: {', '.join(blocks)}"
             raise ParameterError(f"no parameter block {name!r}; {hint}")
         if not isinstance(values, Mapping):
@@ -420,7 +422,9 @@ def load_parameters(config: Path | None = None, settings: Iterable[str] = ()) ->
             hint = "; its value is a number as 4.5, a name, or true or false" if sign and "." in name else ""
             raise ParameterError(f"setting {shown!r}: write it as block.name=value{hint}") from error
         if not all(isinstance(values, Mapping) for values in parsed.values()):
-            meant = _meant(next(iter(parsed)))
+            name = next(iter(parsed))
+            is_block = name in (block.name for block in dataclasses.fields(parameters))
+            meant = "which of its parameters?" if is_block else _meant(name)
             hint = f"; {meant}" if meant else ""
             raise ParameterError(f"setting {setting!r}: write it as block.name=value{hint}")
         parameters = parameters.replaced(parsed)

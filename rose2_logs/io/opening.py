@@ -339,6 +339,8 @@ def _kind(file: Path) -> str:
     if is_packed(begin) and (kind := _MAGIC.get(first_bytes(file, len(begin)))) is not None:
         return kind
     suffix = file.suffix.lower()
+    if file.name == BAG_DESCRIPTION:
+        raise LogError(f"{file}: describes a ROS 2 bag; give its folder, {file.parent}", file=file)
     if suffix in MAP_ENDINGS:
         return ".yaml"
     if suffix in IMAGE_ENDINGS:

@@ -65,13 +65,16 @@ class OutputFolder:
         )
 
     def refuse_log(self, log: Path) -> None:
-        """Refuse to write over a log, or into its folder.
+        """Refuse to write over a log, or into its folder, and a place that is no folder.
 
         Raises
         ------
         OutputError
-            If a result is one of the log's files, also by another name, or would be among them.
+            If a result is one of the log's files, also by another name, or would be among them; or if a file
+            is where the folder is to be.
         """
+        if self._place.exists() and not self._place.is_dir():
+            raise OutputError(f"{self._folder}: is a file, not a folder; choose another folder, or remove it")
         self._sources = log_files(log)
         for file in self.files:
             for source in self._sources:

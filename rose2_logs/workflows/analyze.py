@@ -360,7 +360,7 @@ def _facts(info: RunInfo, options: RunOptions) -> dict[str, Any]:
         "topic": info.topic,
         "selection": dataclasses.asdict(options.selection),
         "versions": info.versions,
-        "voronoi": "voronoi" in options.shown_layers,
+        "a recording with the layer voronoi": "voronoi" in options.shown_layers,
     }
 
 

@@ -195,6 +195,8 @@ def test_time_options_are_seconds_into_the_log(cli, maps: Path, tmp_path: Path):
         ),
         (["view", "nowhere.rrd"], "nowhere.rrd"),
         (["view", "."], "holds no recording"),
+        (["view", SAMPLE_LOGS / "office.mcap"], "office.mcap: is no recording of Rerun"),
+        (["analyze", "x.bag", "-o", "out", "--set", "walls=6"], "which of its parameters?"),
         (["serve", "nowhere"], "nowhere: holds no recording"),
         (["evaluate", "nowhere.json"], "nowhere.json"),
         (["segment", "nowhere.png", "-o", "out"], "nowhere.png"),

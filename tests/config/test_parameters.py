@@ -143,6 +143,7 @@ def test_nothing_gives_the_defaults():
             {"extension_m": 6},
             "no parameter block 'extension_m'; did you mean walls.extension_m?",
         ),
+        ({"parameters": {"walls": {}}}, "no parameter block 'parameters'; did you mean walls?"),
     ],
 )
 def test_what_names_no_parameter_is_refused_with_the_next_name(value: Any, message: str):

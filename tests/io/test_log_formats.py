@@ -607,6 +607,7 @@ def test_a_map_topic_on_which_nothing_was_recorded_is_said_to_be_empty(tmp_path)
         ("run.tar.gz", b"\x1f\x8b and so on", "is an archive; unpack it"),
         ("text.log", b"just some text", "not a supported kind of log"),
         ("map.yaml", b"- a list", "does not describe a map"),
+        ("metadata.yaml", b"rosbag2_bagfile_information:", "describes a ROS 2 bag; give its folder"),
         ("map.pgm", b"P5 1 1 255 \0", "map.yaml next to it"),
     ],
 )

@@ -376,10 +376,15 @@ def test_differences_are_told_by_name():
     assert difference({}, {"a": 1}) == "a was None, is 1"
 
 
-def test_a_folder_that_is_a_file_is_told(log: Path, tmp_path: Path):
+def test_a_folder_that_is_a_file_is_told(log: Path, tmp_path: Path, monkeypatch):
+    """Before the first map is analyzed."""
     (tmp_path / "file").write_text("")
-    with pytest.raises(OutputError, match="file"):
-        analyze_log(log, tmp_path / "file" / "out", RunOptions(**OPTIONS))
+    analyzed = []
+    count_calls(monkeypatch, analyzed)
+    for folder in (tmp_path / "file" / "out", tmp_path / "file"):
+        with pytest.raises(OutputError, match="file"):
+            analyze_log(log, folder, RunOptions(**OPTIONS, overwrite=True))
+    assert analyzed == []
     assert OutputFolder(tmp_path / "x", ["a"]).files == (tmp_path / "x" / "a",)
 
 

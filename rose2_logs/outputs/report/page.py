@@ -52,7 +52,8 @@ def write_report(
     folder : path
         What `analyze_log` has written.
     out : path, optional
-        The page; by default ``report.html`` in the folder, or ``report_part_1.html`` of a part that is named.
+        The page, or a folder for it; by default ``report.html`` in the folder of results, or
+        ``report_part_1.html`` of a part that is named.
     panels : int
         Small pictures of the layout along the run.
     part : int, optional
@@ -77,7 +78,7 @@ def write_report(
         If there is a page already that may not be replaced, or it cannot be written.
     """
     name = REPORT_NAME if part is None else f"report_part_{part}.html"
-    out = folder / name if out is None else out
+    out = folder / name if out is None else out / name if out.is_dir() else out
     refuse_existing([out], overwrite=overwrite)
     results = Run(folder, part=part)
     if part is None and results.parts:

@@ -35,6 +35,8 @@ SCREENS = ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET")
 """Environment variables that are set where there is a screen."""
 RERUN = (sys.executable, "-m", "rerun", "--bind", "127.0.0.1")
 """Rerun's servers answer the whole network by default."""
+MAGIC = b"RRF"
+"""First bytes of a recording of any version."""
 
 
 def open_viewer(port: int) -> tuple[str, subprocess.Popen[bytes] | None]:
@@ -89,12 +91,15 @@ def find_recording(named: Path | str) -> str:
     Raises
     ------
     LogError
-        If there is none, or there are several.
+        If there is none, or there are several, or the file is no recording.
     """
     if "://" in str(named):
         return str(named)
     path = Path(named)
     if path.is_file():
+        with path.open("rb") as file:
+            if file.read(len(MAGIC)) != MAGIC:
+                raise LogError(f"{path}: is no recording of Rerun; an analysis writes one (.rrd)")
         return str(path)
     if not path.is_dir():
         raise LogError(f"{path}: there is no such file; an analysis writes a recording (.rrd)")

@@ -238,6 +238,11 @@ def test_an_earlier_page_stays_unless_it_may_be_replaced(office_results: Path, t
     assert page.read_text() != "mine"
 
 
+def test_a_page_may_be_written_to_a_folder(office_results: Path, tmp_path: Path):
+    assert write_report(office_results, tmp_path) == tmp_path / "report.html"
+    assert (tmp_path / "report.html").exists()
+
+
 def test_long_tables_are_cut_and_say_so(office_results: Path, tmp_path: Path, monkeypatch):
     """What is kept: rooms of the last map, the events that tell most."""
     monkeypatch.setattr(tables, "ROWS_MOST", 4)
