@@ -114,3 +114,21 @@ def test_the_maps_of_two_robots_and_the_merged_one(cli, tmp_path: Path):
     assert topics_in(tmp_path / "two_robots") == names
     for name in ("tb3_0_map", "tb3_1_map"):
         assert rl.load(tmp_path / "two_robots" / name).summary["results"]["rooms_last"] == 7
+
+
+@pytest.mark.parametrize("several", ["topics", "all topics", "logs"])
+def test_names_are_those_of_one_run(cli, log: Path, tmp_path: Path, several: str):
+    """A track of one run is another room in the next."""
+    names = tmp_path / "names.csv"
+    names.write_text("name,track\nKitchen,1\n")
+    other = tmp_path / "other.mcap"
+    other.write_bytes(log.read_bytes())
+    runs = {
+        "topics": (log, "--topic", "/map", "--topic", "/a/map"),
+        "all topics": (log, "--all-topics"),
+        "logs": (log, other, "--topic", "/map"),
+    }
+    code, _, err = cli("analyze", *runs[several], "-o", tmp_path / "out", "--names", names, *QUIET)
+    assert code == 2
+    assert f"--names {names}: is for the rooms of one run" in err
+    assert not list(tmp_path.rglob("summary.json"))

@@ -90,11 +90,13 @@ def analyze(
     # Whatever is wrong with them is told before the first log is read.
     asked = list(dict.fromkeys(topics or []))
     of_topics = [dataclasses.replace(options, topic=topic) for topic in asked] or [options]
+    _refuse_names(options, is_one=len(logs) == 1 and len(asked) < 2)
     failed = 0
     for log, name in zip(logs, names, strict=True):
         try:
             # A topic that the log lacks is told before others are analyzed.
             chosen = of_topics if len(asked) < 2 and not all_topics else _of_topics(log, options, asked)
+            _refuse_names(options, is_one=len(chosen) == 1)
         except Rose2LogsError as error:
             failed += 1
             _tell(error, is_only=len(logs) == 1)
@@ -107,6 +109,14 @@ def analyze(
                 _tell(error, is_only=len(logs) == len(chosen) == 1)
     if failed:
         raise typer.Exit(EXIT_KNOWN)
+
+
+def _refuse_names(options: RunOptions, *, is_one: bool) -> None:
+    """Refuse names for the rooms of several runs: a track of one is another room in the next."""
+    if options.names is not None and not is_one:
+        raise ParameterError(
+            f"names={options.names}: is for the rooms of one run; analyze each log and topic by itself"
+        )
 
 
 def _of_topics(log: Path, options: RunOptions, asked: Sequence[str]) -> list[RunOptions]:
