@@ -44,6 +44,7 @@ SUMMARY_COLUMNS: dict[str, tuple[pa.DataType, str]] = {
     "tracks": (pa.int32(), "distinct rooms over the run"),
     "splits": (pa.int32(), "rooms that split"),
     "merges": (pa.int32(), "rooms that merged"),
+    "warnings": (pa.int32(), "warnings about the log and its maps; its summary.json has them"),
     "run_s": (pa.float64(), "wall-clock time of the analysis, seconds"),
 }
 """Name, type and meaning of the columns of ``summary.parquet`` and ``summary.csv``."""
@@ -120,6 +121,7 @@ def summary_row(out: Path, name: str) -> Row:
             "tracks": results["tracks"],
             "splits": results["events"].get("split", 0),
             "merges": results["events"].get("merged", 0),
+            "warnings": kept["warnings"].get("count", 0),
             "run_s": kept["seconds"]["run"],
         }
     except (OSError, ValueError, KeyError, TypeError) as error:

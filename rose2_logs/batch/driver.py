@@ -370,7 +370,8 @@ class _Batch:
         # With what lost workers may have left of it.
         shutil.rmtree(self._work / task.name, ignore_errors=True)
         if outcome.status == "failed":
-            row = dataset.failed_row(name, task.log.address, outcome.reason)
+            kept = "; the tables hold its earlier results" if self._records.get(name) is not None else ""
+            row = dataset.failed_row(name, task.log.address, f"{outcome.reason}{kept}")
         else:
             row = dataset.summary_row(self._out, name)
         status = "up to date" if outcome.status == "unchanged" else outcome.status

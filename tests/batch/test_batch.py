@@ -27,6 +27,7 @@ from batches import (
     worker_of,
 )
 from commands import is_running, wait_for
+from finished_runs import SAMPLE_LOGS
 from reader_logs import START_NS, Map, McapLog
 from saved_maps import save_run
 
@@ -142,6 +143,25 @@ def test_the_summary_is_the_same_as_csv_and_parquet(batch):
     for name, row in rows.items():
         assert text[name] == {key: "" if value is None else str(value) for key, value in row.items()}
     assert all(b"description" in field.metadata for field in table.schema)
+
+
+def test_a_log_that_fails_now_is_told_to_have_earlier_results(tmp_path: Path):
+    """They stay in the data set, and what is wrong with the log is counted in the summary."""
+    log, out = tmp_path / "logs" / "office.mcap", tmp_path / "out"
+    log.parent.mkdir()
+    whole = (SAMPLE_LOGS / "office.mcap").read_bytes()
+    log.write_bytes(whole[:100_000])
+    code, printed, _ = run_batch(log.parent, "-o", out, "--workers", 1, "--max-snapshots", 2)
+    (row,) = summary(out).values()
+    assert (code, row["status"]) == (0, "done")
+    assert int(row["warnings"]) > 0
+    assert "warnings" in printed
+    log.write_bytes(b"broken")
+    code, _, _ = run_batch(log.parent, "-o", out, "--workers", 1, "--max-snapshots", 2)
+    (row,) = summary(out).values()
+    assert (code, row["status"]) == (2, "failed")
+    assert row["reason"].endswith("; the tables hold its earlier results")
+    assert set(pd.read_parquet(out / "tables" / "rooms")["log"]) == {"office"}
 
 
 class Killer(Heard):

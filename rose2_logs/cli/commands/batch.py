@@ -143,14 +143,13 @@ def print_batch(result: BatchResult) -> None:
     table = Table(box=None, pad_edge=False)
     table.add_column("log", overflow="fold")
     table.add_column("status", no_wrap=True)
-    for heading in ("maps", "rooms", "tracks", "s"):
+    for heading in ("maps", "rooms", "tracks", "warnings", "s"):
         table.add_column(heading, justify="right", no_wrap=True)
     table.add_column("why", overflow="fold")
     for state in listed:
         row, color = state.row, COLORS[state.status]
-        figures = [
-            "" if row[name] is None else str(row[name]) for name in ("snapshots", "rooms_last", "tracks")
-        ]
+        names = ("snapshots", "rooms_last", "tracks", "warnings")
+        figures = ["" if row[name] is None else str(row[name]) for name in names]
         seconds = "" if row["run_s"] is None else f"{row['run_s']:.1f}"
         status = f"[{color}]{state.status}[/]"
         table.add_row(shown(state.name), status, *figures, seconds, escape(with_flags(row["reason"] or "")))
