@@ -12,7 +12,15 @@ from urllib.request import url2pathname
 
 from rose2_logs.batch.location import WEB_SCHEMES, Location, require_place
 from rose2_logs.errors import LogError
-from rose2_logs.io.discovery import MAP_ENDINGS, STORAGE_ENDINGS, is_bag, is_storage, logs_among, plain_name
+from rose2_logs.io.discovery import (
+    MAP_ENDINGS,
+    STORAGE_ENDINGS,
+    is_bag,
+    is_storage,
+    logs_among,
+    plain_name,
+    tell_split_recordings,
+)
 
 
 def find_logs(arguments: Sequence[str], out: Path) -> list[Location]:
@@ -55,6 +63,7 @@ def find_logs(arguments: Sequence[str], out: Path) -> list[Location]:
         for log in logs:
             each = Location(log)
             found.setdefault(each.address, each)
+    tell_split_recordings(each.address for each in found.values())
     return list(found.values())
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+import re
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from pathlib import Path, PurePosixPath
@@ -9,6 +11,10 @@ from typing import Any
 
 from rose2_logs.errors import InvalidMapError, LogError
 from rose2_logs.system.files import reason_of
+from rose2_logs.system.text import counted, listed
+from rose2_logs.system.warnings import log_warning
+
+logger = logging.getLogger(__name__)
 
 MAP_ENDINGS = (".yaml", ".yml")
 IMAGE_ENDINGS = (".pgm", ".png", ".bmp")
@@ -23,6 +29,10 @@ ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 ANNOTATED_ENDING = ".rose2.mcap"
 """Ending of annotated logs, which are results and not logs to analyze."""
 BAG_DESCRIPTION = "metadata.yaml"
+TOLD_MOST = 3
+"""Pieces of a recording that are named in one line."""
+_NUMBER = re.compile(r"_(\d{1,9})$")
+_DIGITS = re.compile(r"\d+")
 
 
 def plain_name(name: str) -> str:
@@ -95,6 +105,48 @@ def is_bag(names: Sequence[str], folder_name: str) -> bool:
         return bool(stored)
     parts = {f"{folder_name}_{number}" for number in range(len(stored))}
     return {PurePosixPath(plain_name(name)).stem for name in stored} == parts
+
+
+def split_recordings(logs: Iterable[str]) -> list[list[str]]:
+    """Find logs that may be pieces of one recording.
+
+    They are numbered from 0 on at the end of their names, which are alike but for digits.
+
+    Parameters
+    ----------
+    logs : iterable of str
+        Paths or URLs of files.
+
+    Returns
+    -------
+    list of list of str
+        The pieces of each, in order.
+    """
+    pieces: dict[tuple[str, str], dict[int, str]] = defaultdict(dict)
+    for log in logs:
+        folder, _, name = log.replace("\\", "/").rpartition("/")
+        if is_storage(name) and (found := _NUMBER.search(stem_of(name))):
+            # Recorders put the time at which a piece was begun before its number.
+            alike = f"{folder}/{_DIGITS.sub('0', stem_of(name)[: found.start()])}"
+            pieces[alike, PurePosixPath(plain_name(name)).suffix][int(found[1])] = log
+    return [
+        [numbers[place] for place in range(len(numbers))]
+        for numbers in pieces.values()
+        if len(numbers) > 1 and set(numbers) == set(range(len(numbers)))
+    ]
+
+
+def tell_split_recordings(logs: Iterable[str]) -> None:
+    """Warn of logs that are going to be analyzed by themselves, and may be pieces of one recording."""
+    found = split_recordings(logs)
+    if found:
+        pieces = [PurePosixPath(log).name for log in found[0]]
+        more = f", and {counted(len(found) - 1, 'other recording')} like it" if len(found) > 1 else ""
+        text = (
+            f"{listed(pieces, TOLD_MOST)}: may be pieces of one recording{more}, and are analyzed as a log "
+            "each; to analyze them as one, give a folder that holds only these"
+        )
+        log_warning(logger, "split_recording", text)
 
 
 def is_storage(name: str) -> bool:

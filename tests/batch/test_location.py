@@ -87,3 +87,24 @@ def test_a_single_log_that_is_not_there_is_for_the_worker_to_tell(data: Path):
 def test_addresses_hold_no_secrets(target: str, address: str):
     """They are written beside the results."""
     assert Location(target).address == address
+
+
+@pytest.mark.parametrize(
+    ("names", "told"),
+    [
+        (["run_0.bag", "run_1.bag", "run_2.bag"], "run_0.bag, run_1.bag, run_2.bag"),
+        (["a_2023-01-01-10-00-00_0.bag", "a_2023-01-01-10-05-00_1.bag"], "a_2023-01-01-10-00-00_0.bag, "),
+        (["run_0.mcap.zstd", "run_1.mcap.zstd"], "run_0.mcap.zstd, run_1.mcap.zstd"),
+        (["run_1.bag", "run_2.bag"], ""),
+        (["run_0.bag", "run_2.bag"], ""),
+        (["run_0.bag", "run_1.mcap"], ""),
+        (["hall_0.bag", "lab_1.bag"], ""),
+        (["run_0.yaml", "run_1.yaml"], ""),
+    ],
+)
+def test_pieces_of_one_recording_that_are_given_as_logs_are_told(tmp_path: Path, names, told: str, caplog):
+    for name in names:
+        (tmp_path / name).touch()
+    find_logs([str(tmp_path / name) for name in names], tmp_path / "out")
+    assert ("may be pieces of one recording" in caplog.text) == bool(told)
+    assert told in caplog.text

@@ -79,6 +79,7 @@ def analyze(
     if options.workers > 1:
         with suppress(OSError):  # it is told when the workers are started
             start_importing(WORK)
+    from rose2_logs.io.discovery import tell_split_recordings
     from rose2_logs.workflows.analyze import log_stem
 
     names = [log_stem(log) for log in logs]
@@ -91,6 +92,8 @@ def analyze(
     asked = list(dict.fromkeys(topics or []))
     of_topics = [dataclasses.replace(options, topic=topic) for topic in asked] or [options]
     _refuse_names(options, is_one=len(logs) == 1 and len(asked) < 2)
+    if len(logs) > 1:
+        tell_split_recordings(map(str, logs))
     failed = 0
     for log, name in zip(logs, names, strict=True):
         try:
