@@ -84,28 +84,36 @@ def outside_of(
     narrow : (N,) bool, optional
         Regions that are nowhere wide enough for a room.
     """
-    area = graph.node_sums[:, 0]
+    area, walled_m, unknown_m = graph.node_sums[:, :3].T
     around = surroundings(edge_share, area, parameters)
+    whole_m2 = area[~around].sum()
     no_room = [is_room(region_features(graph)) < parameters.room_min_log_odds]
     if narrow is not None:
         no_room.append(narrow)
     outside = np.zeros(len(area), bool)
     for answer in no_room:
         with_answer = outside | (answer & ~around)
-        # An answer by which hardly anything is left is not believed.
-        if area[with_answer].sum() <= parameters.outside_max_share * area[~around].sum():
+        # An answer by which hardly anything is left is not believed, nor one that takes much of a map, unless
+        # what it leaves is behind walls, as a building that is seen into the open through its windows.
+        left = ~with_answer & ~around
+        least_walled_m = parameters.walled_min_share * (walled_m[left].sum() + unknown_m[left].sum())
+        is_building = (
+            area[left].sum() > parameters.walled_min_left * whole_m2 and walled_m[left].sum() > least_walled_m
+        )
+        if is_building or area[with_answer].sum() <= parameters.outside_max_share * whole_m2:
             outside = with_answer
     return outside | around
 
 
-def rooms_among(graph: RegionGraph, outside: BoolArray, parameters: RegionParameters) -> BoolArray:
-    """Which regions (N,) are large enough for a room, and not outside."""
-    room: BoolArray = ~outside & (graph.node_sums[:, 0] >= parameters.room_min_area_m2)
+def rooms_among(area_m2: FloatArray, outside: BoolArray, parameters: RegionParameters) -> BoolArray:
+    """Which regions (N,) are large enough for a room, by the area of their cells, and not outside."""
+    room: BoolArray = ~outside & (area_m2 >= parameters.room_min_area_m2)
     return room
 
 
 def leftovers_joined(
     graph: RegionGraph,
+    area_m2: FloatArray,
     room: BoolArray,
     outside: BoolArray,
     strength: Strength,
@@ -121,6 +129,8 @@ def leftovers_joined(
     Parameters
     ----------
     graph : RegionGraph
+    area_m2 : (N,) float
+        Area of the cells of each region.
     room, outside : (N,) bool
         Regions that are rooms, and those that no room gets.
     strength : callable
@@ -139,8 +149,7 @@ def leftovers_joined(
         Regions that are rooms now.
     """
     least_m2 = parameters.room_min_area_m2
-    area = graph.node_sums[:, 0]
-    size = (area if narrow is None else np.where(narrow, 0.0, area)).tolist()
+    size = (area_m2 if narrow is None else np.where(narrow, 0.0, area_m2)).tolist()
     is_room, region = room.tolist(), list(range(len(room)))
     which = np.flatnonzero(joinable(graph))
     ends = graph.ends[which]

@@ -103,12 +103,15 @@ class _Split:
         Region 0.. of each atom.
     graph : RegionGraph
         Of the regions.
+    area_m2 : (N,) float
+        Of their cells.
     room, outside : (N,) bool
         Regions that are large enough for rooms, and those outside.
     """
 
     of_atom: NDArray[np.int64]
     graph: RegionGraph
+    area_m2: FloatArray
     room: BoolArray
     outside: BoolArray
 
@@ -142,6 +145,12 @@ class RegionTree:
     edge_share: FloatArray
     strength: Strength
     parameters: RegionParameters
+
+    @cached_property
+    def _atoms_m2(self) -> FloatArray:
+        """Area (N,) of the cells of each atom."""
+        cells: FloatArray = label_sizes(self.cells, len(self.graph.node_sums))[1:].astype(float)
+        return cells * self.resolution_m**2
 
     @cached_property
     def _to_even_odds(self) -> Joins:
@@ -193,7 +202,9 @@ class RegionTree:
         graph, _ = self.graph.joined(of_atom)
         outside = np.zeros(len(graph.node_sums), bool)
         outside[of_atom] = self._outside
-        return _Split(of_atom, graph, rooms_among(graph, outside, self.parameters), outside)
+        # Plan cells that are free in part count as whole, but a room is as large as its cells.
+        area_m2 = np.bincount(of_atom, self._atoms_m2).astype(float)
+        return _Split(of_atom, graph, area_m2, rooms_among(area_m2, outside, self.parameters), outside)
 
     def _narrow(self, regions: RegionGraph, region: NDArray[np.int64]) -> BoolArray:
         """Regions (N,) that are large enough for a room, but nowhere wide enough."""
@@ -239,7 +250,7 @@ class RegionTree:
             too_narrow = (self._narrow(joined, number[found.of_atom]) & room[kept])[number] & ~may_be_narrow
             if not (too_narrow & ~narrow).any():
                 # What is narrow, but beside no room, stays one.
-                whole_m2 = np.bincount(given, found.graph.node_sums[:, 0], len(given))
+                whole_m2 = np.bincount(given, found.area_m2, len(given))
                 own = (given == np.arange(len(given))) & ~found.outside
                 return given, room | (own & (whole_m2 >= self.parameters.room_min_area_m2))
             narrow |= too_narrow
@@ -248,7 +259,14 @@ class RegionTree:
         self, found: _Split, together: Together | None = None, narrow: BoolArray | None = None
     ) -> tuple[NDArray[np.int64], BoolArray]:
         return leftovers_joined(
-            found.graph, found.room, found.outside, self.strength, self.parameters, together, narrow
+            found.graph,
+            found.area_m2,
+            found.room,
+            found.outside,
+            self.strength,
+            self.parameters,
+            together,
+            narrow,
         )
 
     def rooms(self, detail: float) -> RegionsResult:
@@ -262,8 +280,7 @@ class RegionTree:
         regions, _ = found.graph.joined(number)
         region = number[found.of_atom]
         room = np.where(is_room, np.cumsum(is_room), 0)[kept]
-        cells_of_atom = label_sizes(self.cells, len(region))[1:]
-        outside_m2 = float(cells_of_atom[found.outside[kept][region]].sum()) * self.resolution_m**2
+        outside_m2 = float(self._atoms_m2[found.outside[kept][region]].sum())
         labels = room_labels(
             self.cells, room[region], self.free, self.resolution_m, self.parameters.loose_reach_m
         )
@@ -312,12 +329,18 @@ def find_atoms(
     walls = without_specks(occupied, parameters.speck_max_m / resolution_m)
     solid, wall, open_cells, strong = frame.counts(walls, occupied, free, score >= STRONG_SCORE)
     cells = cut_atoms(free, faces, solid > 0, open_cells > 0, frame, resolution_m, parameters)
+    on_plan, count = frame.sampled(cells), int(cells.max(initial=0))
+    has_borders = label_sizes(on_plan, count) > 0
+    if not has_borders[1:].all():
+        # A sliver between two lines, that no center of a plan cell lies on, could be joined to nothing.
+        has_borders[0] = True
+        cells = np.where(has_borders.take(cells), cells, np.int32(0))
     return Atoms(
-        int(cells.max(initial=0)),
+        count,
         cells,
         frame,
         PlanRaster(wall, open_cells),
-        frame.sampled(cells),
+        on_plan,
         frame.sampled(faces),
         strong > 0,
     )

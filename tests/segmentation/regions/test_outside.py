@@ -48,7 +48,7 @@ def rooms(area_m2, log_odds, edge_share=None, narrow=None):
     graph = lone_regions(*area_m2)
     no_width = None if narrow is None else np.array(narrow)
     outside = outside_of(graph, edge, lambda _: np.array(log_odds), PARAMETERS, no_width)
-    room = rooms_among(graph, outside, PARAMETERS)
+    room = rooms_among(graph.node_sums[:, 0], outside, PARAMETERS)
     return np.where(room, np.cumsum(room), 0).tolist(), float(np.array(area_m2)[outside].sum())
 
 
@@ -166,11 +166,13 @@ def test_the_floor_of_a_doorway_goes_to_the_room_it_is_likeliest_of():
         def strength(features, likeliest=likeliest):
             return np.where(np.arange(len(features)) == likeliest, 1.0, -1.0)
 
-        region, is_room = leftovers_joined(graph, room, outside, strength, PARAMETERS)
+        region, is_room = leftovers_joined(graph, graph.node_sums[:, 0], room, outside, strength, PARAMETERS)
         assert region.tolist() == [0, 1, likeliest]
         assert is_room.tolist() == room.tolist()
     outside[2] = True
-    assert leftovers_joined(graph, room, outside, strength, PARAMETERS)[0].tolist() == [0, 1, 2]
+    assert leftovers_joined(graph, graph.node_sums[:, 0], room, outside, strength, PARAMETERS)[
+        0
+    ].tolist() == [0, 1, 2]
 
 
 def test_what_belongs_together_comes_before_the_strength_of_a_border():
@@ -183,7 +185,13 @@ def test_what_belongs_together_comes_before_the_strength_of_a_border():
 
         for sign in (1.0, -1.0):
             region, _ = leftovers_joined(
-                graph, room, outside, lambda f, sign=sign: sign * np.arange(len(f)), PARAMETERS, together
+                graph,
+                graph.node_sums[:, 0],
+                room,
+                outside,
+                lambda f, sign=sign: sign * np.arange(len(f)),
+                PARAMETERS,
+                together,
             )
             assert region.tolist() == [0, 1, wanted]
 
@@ -191,10 +199,11 @@ def test_what_belongs_together_comes_before_the_strength_of_a_border():
 @pytest.mark.parametrize("narrow", [False, True])
 def test_small_regions_that_are_as_large_as_a_room_together_are_one_unless_they_are_narrow(narrow):
     graph = drawn_graph(["11112222"] * 4)
-    one_room = replace(PARAMETERS, room_min_area_m2=float(graph.node_sums[:, 0].sum()))
+    area_m2 = graph.node_sums[:, 0]
+    one_room = replace(PARAMETERS, room_min_area_m2=float(area_m2.sum()))
     room = outside = np.zeros(2, bool)
     region, is_room = leftovers_joined(
-        graph, room, outside, lambda f: np.zeros(len(f)), one_room, narrow=np.array([narrow, False])
+        graph, area_m2, room, outside, lambda f: np.zeros(len(f)), one_room, narrow=np.array([narrow, False])
     )
     assert region.tolist() == [0, 0]
     assert is_room.tolist() == [not narrow, False]
