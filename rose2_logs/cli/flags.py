@@ -39,15 +39,34 @@ def _flags() -> dict[str, str]:
     return flags
 
 
-_PARAMETER = re.compile(r"\bthe parameter (\w+\.\w+)")
+_QUOTED = r"""(?<!\w)(?:'(?:\\.|[^'\\])*'|"(?:\\.|[^"\\])*")"""
+"""A text in quotes, as Python writes it; an apostrophe within a word opens none."""
+_NUMBER = r"[-+]?(?:\d+(?:\.\d*)?(?:e[-+]?\d+)?|nan|inf)(?=[:;,)]?(?:\s|$))"
+_VALUE = rf"['\"]|NAME\b|\s|$|{_NUMBER}"
+"""How the value of an option begins in a message: quoted, a number, the word NAME, or none."""
+_PARAMETER = r"\bthe parameter (?P<parameter>\w+\.\w+)"
+
+
+@cache
+def _replaced() -> re.Pattern[str]:
+    """What `with_flags` looks for; texts in quotes are found first, so that nothing in them is."""
+    options = "|".join(
+        rf"{re.escape(name)}(?={_VALUE})" if name.endswith("=") else rf"{re.escape(name)}(?![\w./-])"
+        for name in _flags()
+    )
+    return re.compile(rf"{_QUOTED}|(?<![^\s(])(?P<option>{options})|{_PARAMETER}")
 
 
 def with_flags(message: str) -> str:
     """Return a message of the library with options and parameters as the command line has them.
 
     The library knows no flags: its messages name options as Python writes them, ``overwrite=True``. What
-    stands in quotes was given by the user and stays.
+    stands in quotes was given by the user and stays, and so do names of files that look alike.
     """
-    flags = _flags()
-    options = re.compile(r"(?<![\w/'])(?:" + "|".join(map(re.escape, flags)) + ")")
-    return _PARAMETER.sub(r"--set \1", options.sub(lambda found: flags[found[0]], message))
+
+    def flag(found: re.Match[str]) -> str:
+        if found["parameter"] is not None:
+            return f"--set {found['parameter']}"
+        return found[0] if found["option"] is None else _flags()[found["option"]]
+
+    return _replaced().sub(flag, message)

@@ -452,7 +452,8 @@ class RunOptions:
             )
         if self.map_frame is not None and self.map_from is None:
             raise ParameterError(
-                f"map_frame={self.map_frame!r} is for maps built from scans; give map_from too"
+                f"map_frame={self.map_frame!r} is for maps built from scans; give their topic, too "
+                "(map_from='/scan')"
             )
         if self.start_s is not None and self.end_s is not None and self.start_s > self.end_s:
             raise ParameterError(f"start_s={self.start_s:g}: it lies after end_s={self.end_s:g}")

@@ -75,11 +75,33 @@ def test_no_message_of_the_library_names_a_flag():
         ("start_s=nan: it must be", "--start nan: it must be"),
         ("raise the parameter reading.map_max_cells", "raise --set reading.map_max_cells"),
         ("setting 'detail=2': write it as", "setting 'detail=2': write it as"),
-        ("/data/topic=7/run.mcap: cannot be read", "/data/topic=7/run.mcap: cannot be read"),
+        ("base_frame=NAME names it, of map", "--base-frame NAME names it, of map"),
+        ("the map is built in odom (map_frame= names another frame)", "(--map-frame  names another frame)"),
+        ("detail=1e-05: only method='rose2' has it", "--detail 1e-05: only --method 'rose2' has it"),
+        ("its map_server's origin; choose one (topic='/map')", "origin; choose one (--topic '/map')"),
+        *(
+            (told, told)
+            for told in (
+                "/data/topic=7/run.mcap: cannot be read",
+                "x-topic=y,detail=2.mcap: no such file or directory",
+                "my topic=y detail=2.mcap: no such file or directory",
+                "overwrite=True.mcap: no such file or directory",
+                "setting 'regions.detail=1,5': write it as block.name=value",
+                "no group 'of detail=2'; there are: a",
+                "names 'it\\'s detail=2' twice",
+                "no parameter block \"it's the parameter walls.x and topic='/a'\"",
+            )
+        ),
     ],
 )
 def test_messages_name_options_as_flags_on_the_command_line(message: str, shown: str):
     assert with_flags(message).endswith(shown) or with_flags(message).startswith(shown)
+
+
+def test_what_an_option_lacks_is_named_as_a_flag(cli, tmp_path: Path):
+    code, _, err = cli("analyze", SAMPLE_LOGS / "office.mcap", "-o", tmp_path / "out", "--map-frame", "odom")
+    assert code == 2
+    assert "is for maps built from scans; give their topic, too (--map-from '/scan')" in err
 
 
 def test_one_definition_makes_option_and_value(cli, tmp_path: Path):
