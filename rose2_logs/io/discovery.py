@@ -17,7 +17,9 @@ from rose2_logs.system.warnings import log_warning
 logger = logging.getLogger(__name__)
 
 MAP_ENDINGS = (".yaml", ".yml")
-IMAGE_ENDINGS = (".pgm", ".png", ".bmp")
+IMAGE_ENDINGS = (".pgm", ".png", ".bmp", ".tif", ".tiff")
+LOSSY_ENDINGS = (".jpg", ".jpeg", ".webp")
+"""Endings of images that may not keep grays exactly: map savers write 205 for unknown, and 206 is free."""
 STORAGE_ENDINGS = (".mcap", ".db3", ".bag", ".bag.active")
 """``.bag.active`` is a bag that its recorder did not close."""
 CARMEN_ENDINGS = (".log.gz", ".clf.gz", ".log", ".clf")

@@ -21,7 +21,7 @@ from rose2_logs.drawing.plot import plot_plan
 from rose2_logs.errors import LogError, ParameterError
 from rose2_logs.io import open_log
 from rose2_logs.io.cell_values import oddity
-from rose2_logs.io.discovery import IMAGE_ENDINGS
+from rose2_logs.io.discovery import IMAGE_ENDINGS, LOSSY_ENDINGS, MAP_ENDINGS
 from rose2_logs.io.saved_maps import MapFilesSource
 from rose2_logs.model.analysis import SnapshotAnalysis, left_out_note
 from rose2_logs.model.borders import Border
@@ -244,24 +244,33 @@ def read_static_map(
     if not map_file.is_file():
         what = "is a folder, not a file; name the map in it" if map_file.is_dir() else "there is no such file"
         raise LogError(f"{map_file}: {what}")
-    is_bare = map_file.suffix.lower() in IMAGE_ENDINGS and not map_file.with_suffix(".yaml").exists()
+    ending = map_file.suffix.lower()
+    if ending in LOSSY_ENDINGS:
+        raise LogError(
+            f"{map_file}: this kind of image does not keep the grays of a map exactly; save the map as .png, "
+            "or give the .yaml that describes it"
+        )
+    is_described = any(map_file.with_suffix(each).exists() for each in MAP_ENDINGS)
+    is_bare = ending in IMAGE_ENDINGS and not is_described
     if is_bare and resolution_m is None:
         raise ParameterError(
             f"{map_file}: there is no .yaml next to it; give the side of a cell in meters (resolution_m=0.05)"
         )
-    if not is_bare and resolution_m is not None:
+    if resolution_m is not None and (ending in MAP_ENDINGS or (ending in IMAGE_ENDINGS and is_described)):
         raise ParameterError(
             f"{map_file}: its .yaml gives the resolution; leave out resolution_m={resolution_m:g}"
         )
     # The labels are to be as large as the image, whatever is analyzed of it.
     limits, occupancy = parameters.reading, replace(parameters.occupancy, far_cells="keep")
     with (
-        _described(map_file, resolution_m) as log,
+        _described(map_file, resolution_m if is_bare else None) as log,
         open_log(log, limits=limits, occupancy=occupancy) as reader,
     ):
         if not isinstance(reader.source, MapFilesSource):
+            own = "" if resolution_m is None else ", and tells its resolution itself"
             raise LogError(
-                f"{map_file}: is a log, not a saved map; analyze it as a log to find the rooms of its maps"
+                f"{map_file}: is a log, not a saved map{own}; analyze it as a log to find the rooms of its "
+                "maps"
             )
         # Unlike `first`, this tells what is odd about the map.
         return next(reader.snapshots())

@@ -256,6 +256,36 @@ def test_segment_needs_the_resolution_of_a_bare_image(cli, tmp_path: Path):
     assert (tmp_path / "out" / "bare.labels.png").exists()
 
 
+@pytest.mark.parametrize("ending", [".png", ".pgm", ".bmp", ".tif", ".TIFF"])
+def test_segment_reads_images_that_keep_grays(cli, tmp_path: Path, ending: str):
+    Image.fromarray(two_rooms()).save(tmp_path / f"bare{ending}")
+    given = ("segment", tmp_path / f"bare{ending}", "-o", tmp_path / "out")
+    assert cli(*given, "--resolution", RESOLUTION_M)[0] == 0
+    with Image.open(tmp_path / "out" / "bare.labels.png") as labels:
+        assert np.asarray(labels).max() == 2
+    (tmp_path / "bare.yml").write_text(f"image: bare{ending}\nresolution: 0.05\norigin: [0, 0, 0]\n")
+    assert cli(*given, "--overwrite")[0] == 0
+    code, _, err = cli(*given, "--overwrite", "--resolution", RESOLUTION_M)
+    assert (code, "its .yaml gives the resolution; leave out --resolution 0.05" in err) == (2, True)
+
+
+def test_segment_says_of_other_files_what_they_are(cli, tmp_path: Path):
+    """With a resolution and without: neither answer leads to the other one."""
+    shutil.copy(SAMPLE_LOGS / "office.mcap", tmp_path / "office.mcap")
+    Image.fromarray(two_rooms()).save(tmp_path / "map.jpg")
+    (tmp_path / "map.txt").write_text("no map")
+    for name, told in {
+        "office.mcap": "is a log, not a saved map",
+        "map.jpg": "does not keep the grays of a map exactly; save the map as .png",
+        "map.txt": "is not a supported kind of log",
+    }.items():
+        for more in ((), ("--resolution", 0.05)):
+            code, _, err = cli("segment", tmp_path / name, "-o", tmp_path / "out", *more)
+            assert (code, told in err) == (2, True), err
+        if name == "office.mcap":
+            assert "and tells its resolution itself" in err
+
+
 def test_segment_does_not_replace_unasked(cli, tmp_path: Path):
     """A second run needs --overwrite."""
     path = save_map(tmp_path, "flat", two_rooms())

@@ -22,7 +22,10 @@ METHOD, DETAIL = option_of("method"), option_of("detail")
 
 def segment(
     map_file: Annotated[
-        Path, typer.Argument(metavar="MAP", help="Saved map: the .yaml of map_server, or a .png or .pgm.")
+        Path,
+        typer.Argument(
+            metavar="MAP", help="Saved map: the .yaml of map_server, or a .png, .pgm, .bmp or .tif."
+        ),
     ],
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the results.")],
     parameters: Parameters,
