@@ -35,7 +35,7 @@ from rose2_logs.workflows.analyze import OnSnapshot, analyze_log, log_stem
 from rose2_logs.workflows.compare import compare_runs, compare_stored
 from rose2_logs.workflows.evaluate import Evaluation, evaluate_method
 from rose2_logs.workflows.segment import Segmentation, read_static_map, segment_snapshot
-from rose2_logs.workflows.without_effect import tell_without_effect
+from rose2_logs.workflows.without_effect import following, tell_without_effect
 
 __all__ = ["analyze", "compare", "evaluate", "load", "map_topics", "open_log", "read_map", "segment", "track"]
 
@@ -191,7 +191,8 @@ def _tracked_and_closed(reader: LogReader, options: RunOptions) -> Iterator[Trac
 
 def _tracked(maps: LogReader | Iterable[OccupancySnapshot], options: RunOptions) -> Iterator[TrackedSnapshot]:
     parameters = options.parameters
-    tell_without_effect(parameters, options.method)
+    built = not isinstance(maps, LogReader) or maps.is_built
+    tell_without_effect(parameters, *following(built=built), method=options.method)
     with start_workers(options) as workers:
         if isinstance(maps, LogReader):
             yield from TrackedStream.of_log(maps, workers, parameters)

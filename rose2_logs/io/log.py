@@ -111,6 +111,11 @@ class LogReader:
         """Release the log's files."""
         self.source.close()
 
+    @property
+    def is_built(self) -> bool:
+        """Whether the maps are built from scans, and not recorded."""
+        return self.source.made_from(self.topic) != self.topic
+
     @cached_property
     def cell_reading(self) -> CellReading:
         """What the numbers in the cells mean: decided once for the whole log, whatever is selected of it."""

@@ -20,7 +20,7 @@ from rose2_logs.errors import AlreadyWholeError, InvalidMapError, OutputError, P
 from rose2_logs.io import open_log
 from rose2_logs.io.discovery import stem_of
 from rose2_logs.io.log import LogReader
-from rose2_logs.io.room_names import read_room_names
+from rose2_logs.io.room_names import is_plan, read_room_names
 from rose2_logs.model.analysis import left_out_note
 from rose2_logs.model.occupancy import OccupancySnapshot
 from rose2_logs.model.room_names import RoomNames, TrackNames
@@ -40,7 +40,7 @@ from rose2_logs.system.files import refuse_existing, require_short, require_utf8
 from rose2_logs.system.warnings import WarningLog, collect_warnings, log_warning, muted
 from rose2_logs.system.workers import usable_processes
 from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot
-from rose2_logs.workflows.without_effect import tell_without_effect
+from rose2_logs.workflows.without_effect import COMPARING, following, tell_without_effect
 
 __all__ = [
     "OnSnapshot",
@@ -133,7 +133,6 @@ def _analyze_log(
     warnings: WarningLog,
 ) -> RunResult:
     start = time.perf_counter()
-    tell_without_effect(options.parameters, options.method)
     for named in (path, folder):
         require_utf8(named)
     output = OutputFolder(folder, [file.name for file in _planned_files(folder, path, options).values()])
@@ -162,6 +161,7 @@ def _analyze_log(
             len(reader.source.log_times(reader.topic)),
             reader.topic,
         )
+        _tell_without_effect(reader, options)
         info = _run_info(path, reader, options)
         prepared = output.prepared(_facts(info, options), overwrite=options.overwrite, resume=options.resume)
         with _refused_if_named_otherwise(folder, names), prepared as (work, journal):
@@ -237,6 +237,14 @@ def _facts_of(sinks: Sequence[Sink]) -> dict[str, Any]:
         except (TypeError, ValueError, AttributeError) as error:
             raise OutputError(f"the facts of a sink for {SUMMARY} are no JSON object: {error}") from error
     return facts
+
+
+def _tell_without_effect(reader: LogReader, options: RunOptions) -> None:
+    """Warn of parameters that were set in vain, which depends on where the maps and the names come from."""
+    read = ["kinds", *following(built=reader.is_built)]
+    if options.names is not None and is_plan(Path(options.names)):
+        read += COMPARING
+    tell_without_effect(options.parameters, *read, method=options.method)
 
 
 def _stream_of(

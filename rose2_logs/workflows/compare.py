@@ -13,6 +13,7 @@ from rose2_logs.runs.last_layout import read_final_layout
 from rose2_logs.runs.run import Run
 from rose2_logs.runs.summary import SUMMARY
 from rose2_logs.system.files import refuse_existing, writing
+from rose2_logs.workflows.without_effect import COMPARING, tell_without_effect
 
 FILES = (
     "room_changes.parquet",
@@ -113,6 +114,8 @@ def compare_stored(
     ResultsError
         If results cannot be read, or a last map has too few walls to be aligned.
     """
+    if parameters is not None:
+        tell_without_effect(parameters, *COMPARING)
     a = read_final_layout(run_a, name_a, parameters)
     b = read_final_layout(run_b, name_b, parameters)
     comparison = compare_layouts(a, b)

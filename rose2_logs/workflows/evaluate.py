@@ -118,7 +118,7 @@ def evaluate_method(
     check_option(RunOptions, "method", method)
     check_option(RunOptions, "workers", workers)
     used = parameters or Parameters()
-    tell_without_effect(used, method)
+    tell_without_effect(used, *(["tracking"] if along else []), method=method)
     chosen = load_cases(Path(cases), group)
     results: list[CaseResult] = []
     tracks = RunTracks(used)

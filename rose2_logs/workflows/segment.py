@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from rose2_logs.config.parameters import Parameters
-from rose2_logs.config.run_options import with_detail
+from rose2_logs.config.run_options import RunOptions, check_option, with_detail
 from rose2_logs.drawing.drawing import Drawing
 from rose2_logs.drawing.image_files import write_label_image
 from rose2_logs.drawing.plan import draw_segmentation
@@ -158,7 +158,8 @@ def segment_snapshot(
 
     It is warned of what was left out, of a map that is odd, and of coarser cells that a large map took.
     """
-    tell_without_effect(parameters, method)
+    check_option(RunOptions, "method", method)
+    tell_without_effect(parameters, "reading", method=method)
     far = find_far_cells(snapshot.cells, snapshot.geometry.resolution_m, parameters.occupancy)
     if far is not None:
         log_warning(logger, "far_cells", f"{name}: {far.note}")
