@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
@@ -22,7 +24,7 @@ from rose2_logs.drawing.sheet import Key, arranged, captioned, legend, stacked, 
 from rose2_logs.evaluation.along import RunPoint
 from rose2_logs.evaluation.benchmark import CaseResult
 from rose2_logs.evaluation.case_errors import Comparison, Mark, compare
-from rose2_logs.evaluation.cases import Truth
+from rose2_logs.evaluation.cases import Case, Truth
 from rose2_logs.evaluation.scores import Scores
 from rose2_logs.model.labels import known_window, straight_runs
 from rose2_logs.model.occupancy import BoolArray, FloatArray, GridGeometry
@@ -226,6 +228,31 @@ def draw_along(title: str, points: Sequence[RunPoint]) -> Drawing:
     )
 
 
+def files_of_pictures(folder: Path, cases: Sequence[Case]) -> list[Path]:
+    """List what `CasePictures` writes for some cases.
+
+    Raises
+    ------
+    CasesError
+        If the name of a case leads out of the folder.
+    """
+    counts = Counter(case.group for case in cases)
+    return [case.image_in(folder) for case in cases] + [
+        _sheet_file(folder, group, page)
+        for group, count in counts.items()
+        for page in range(1, math.ceil(count / (COLUMNS * ROWS)) + 1)
+    ]
+
+
+def along_file(folder: Path, group: str) -> Path:
+    """Where the curves of a group that is a run belong."""
+    return folder / f"{group}.along.png"
+
+
+def _sheet_file(folder: Path, group: str, page: int) -> Path:
+    return folder / f"{group}.sheet_{page}.png"
+
+
 class CasePictures:
     """Writes ``<group>/<name>.png`` for each case, and ``<group>.sheet_<page>.png`` at the end.
 
@@ -258,7 +285,7 @@ class CasePictures:
         panels = draw_panels(cells, comparison)
         title = f"{case.group}/{case.name}"
         picture = case_sheet(panels, comparison, result.scores, title, _which_truth(result))
-        picture.save(self._folder / case.group / f"{case.name}.png", width_px=None)
+        picture.save(case.image_in(self._folder), width_px=None)
         self._tiles.setdefault(case.group, []).append(_tile(panels[1:], result))
 
     def __exit__(
@@ -269,7 +296,7 @@ class CasePictures:
         for group, tiles in self._tiles.items():
             for page, first in enumerate(range(0, len(tiles), COLUMNS * ROWS), start=1):
                 sheet = tiled(tiles[first : first + COLUMNS * ROWS], min(COLUMNS, len(tiles)), GAP_PX)
-                sheet.save(self._folder / f"{group}.sheet_{page}.png", width_px=None)
+                sheet.save(_sheet_file(self._folder, group, page), width_px=None)
 
 
 def _which_truth(result: CaseResult) -> Truth | None:

@@ -11,8 +11,9 @@ Images have row 0 at the top, occupancy grids at the origin below; a case conver
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Any, Literal
 
 import numpy as np
@@ -26,6 +27,9 @@ from rose2_logs.system.files import reason_of
 
 Truth = Literal["rooms", "rooms_other"]
 """One of the true rooms of a case, by its name in the list of cases."""
+
+_UNNAMABLE = re.compile("[\0\ud800-\udfff]")
+"""What JSON may hold, but no name of a file."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +57,23 @@ class Case:
     resolution_m: float
     origin_xy_m: tuple[float, float] | None = None
     rooms_other_path: Path | None = None
+
+    def image_in(self, folder: Path) -> Path:
+        """Where an image of the case belongs in a folder: ``<group>/<name>.png``.
+
+        Raises
+        ------
+        CasesError
+            If group and name lead out of the folder, or cannot name a file.
+        """
+        own = PurePath(self.group, f"{self.name}.png")
+        if own.anchor or ".." in own.parts or _UNNAMABLE.search(str(own)):
+            called = f"{self.group}/{self.name}"
+            raise CasesError(
+                f"case {called!r}: its image would have no place in {folder}; call group and case as files "
+                "may be called, without .. and without a / at the beginning"
+            )
+        return folder / own
 
     def snapshot(self) -> OccupancySnapshot:
         """Read the map as an occupancy grid; its origin is (0, 0) where it is not known.
@@ -124,7 +145,7 @@ def load_cases(path: Path, group: str | None = None) -> tuple[Case, ...]:
     Raises
     ------
     CasesError
-        If the file cannot be read, misses something, or no case is left.
+        If the file cannot be read, misses something, two cases are called the same, or no case is left.
     """
     try:
         listed = json.loads(path.read_text(encoding="utf-8"))
@@ -133,6 +154,11 @@ def load_cases(path: Path, group: str | None = None) -> tuple[Case, ...]:
     if not isinstance(listed, dict) or not isinstance(listed.get("cases"), list):
         raise CasesError(f'{path}: must hold an object with a list "cases"')
     cases = tuple(_case(path, number, entry) for number, entry in enumerate(listed["cases"]))
+    numbers: dict[tuple[str, str], int] = {}
+    for number, case in enumerate(cases):
+        if (first := numbers.setdefault((case.group, case.name), number)) != number:
+            called = f"group {case.group!r}, name {case.name!r}"
+            raise CasesError(f"{path}: cases {first} and {number} are both called {called}; rename one")
     groups = dict.fromkeys(case.group for case in cases)
     chosen = tuple(case for case in cases if group in (None, case.group))
     if not chosen:

@@ -10,14 +10,16 @@ from typing import Any
 
 from rose2_logs.config.parameters import Parameters
 from rose2_logs.config.run_options import RunOptions, check_option
-from rose2_logs.drawing.evaluation_pictures import CasePictures, draw_along
+from rose2_logs.drawing.evaluation_pictures import CasePictures, along_file, draw_along
 from rose2_logs.drawing.image_files import write_label_image
 from rose2_logs.evaluation.along import RunPoint, along_as_json, along_runs
 from rose2_logs.evaluation.benchmark import CaseResult, evaluate_cases, figures, group_means
 from rose2_logs.evaluation.cases import load_cases
 from rose2_logs.evaluation.run_tracks import RunTracks, RunTrackScores, run_tracks_as_json
 from rose2_logs.evaluation.scores import Scores
+from rose2_logs.runs.summary import write_json
 from rose2_logs.system.text import counted
+from rose2_logs.workflows.evaluation_files import check_files
 from rose2_logs.workflows.without_effect import tell_without_effect
 
 OnCase = Callable[[CaseResult, int, int], None]
@@ -81,6 +83,8 @@ def evaluate_method(
     workers: int = 1,
     predictions: Path | None = None,
     pictures: Path | None = None,
+    json_file: Path | None = None,
+    overwrite: bool = False,
     on_case: OnCase | None = None,
 ) -> Evaluation:
     """Segment maps whose true rooms are known, and measure how well the rooms agree.
@@ -103,30 +107,44 @@ def evaluate_method(
         Folder for label images, ``<group>/<name>.png``.
     pictures : path, optional
         Folder for pictures of the cases, ``<group>/<name>.png``, contact sheets, and of runs the curves.
+    json_file : path, optional
+        File for the figures, as JSON.
+    overwrite : bool
+        Whether files that exist already may be replaced; inputs may not.
     on_case : callable, optional
         Told of each result.
 
     Raises
     ------
     CasesError
-        If the list or an image cannot be read, or the images of a case differ in size.
+        If the list or an image cannot be read, the images of a case differ in size, or the name of a case
+        leads out of a folder.
     ParameterError
         If there is no such method, or the number of workers cannot be used.
     OutputError
-        If a file cannot be written.
+        If a file cannot be written, would be written twice, is an input, or exists and may not be replaced.
     """
     check_option(RunOptions, "method", method)
     check_option(RunOptions, "workers", workers)
     used = parameters or Parameters()
     tell_without_effect(used, *(["tracking"] if along else []), method=method)
     chosen = load_cases(Path(cases), group)
+    check_files(
+        Path(cases),
+        chosen,
+        predictions=predictions,
+        pictures=pictures,
+        json_file=json_file,
+        along=along,
+        overwrite=overwrite,
+    )
     results: list[CaseResult] = []
     tracks = RunTracks(used)
     with ExitStack() as stack:
         drawer = None if pictures is None else stack.enter_context(CasePictures(pictures))
         for result in evaluate_cases(chosen, method, used, workers):
             if predictions is not None:
-                write_label_image(predictions / result.case.group / f"{result.case.name}.png", result.labels)
+                write_label_image(result.case.image_in(predictions), result.labels)
             if drawer is not None:
                 drawer.add(result)
             if along:
@@ -137,5 +155,8 @@ def evaluate_method(
     runs = along_runs(results) if along else {}
     if pictures is not None:
         for name, points in runs.items():
-            draw_along(f"{name}, {method}", points).save(pictures / f"{name}.along.png", width_px=None)
-    return Evaluation(method, used, tuple(results), group_means(results), runs, tracks.scores())
+            draw_along(f"{name}, {method}", points).save(along_file(pictures, name), width_px=None)
+    found = Evaluation(method, used, tuple(results), group_means(results), runs, tracks.scores())
+    if json_file is not None:
+        write_json(json_file, found.as_json())
+    return found

@@ -332,6 +332,61 @@ def test_evaluate_draws_each_case_and_a_sheet(cli, cases: Path, tmp_path: Path):
     assert names == ["drawn.sheet_1.png", "drawn/flat.png", "drawn/half.png"]
 
 
+def test_evaluate_does_not_replace_unasked(cli, cases: Path, tmp_path: Path):
+    """Neither label images nor figures nor pictures, sheets and curves; another run needs --overwrite."""
+    for written in (
+        ("--predictions", tmp_path / "p"),
+        ("--json", tmp_path / "f.json"),
+        ("--pictures", tmp_path / "q", "--along"),
+    ):
+        given = ("evaluate", cases, "--method", "distance", *written)
+        assert cli(*given)[0] == 0
+        kept = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.*")}
+        code, _, err = cli(*given)
+        assert (code, "already exists" in err, "(--overwrite)" in err) == (2, True, True)
+        assert {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.*")} == kept
+        assert cli(*given, "--overwrite")[0] == 0
+    for drawn in (tmp_path / "q" / "drawn").iterdir():
+        drawn.unlink()
+    for left in ("drawn.sheet_1.png", "drawn.along.png"):
+        code, _, err = cli(*given)
+        assert (code, f"{left}: already exists" in err) == (2, True)
+        (tmp_path / "q" / left).unlink()
+    assert cli(*given)[0] == 0
+
+
+def test_evaluate_never_writes_over_what_it_reads(cli, cases: Path, tmp_path: Path):
+    """Not even where files may be replaced, nor through a link, nor what only cases of other groups read."""
+    (tmp_path / "drawn").mkdir()
+    listed = json.loads(cases.read_text())["cases"]
+    (tmp_path / "half.rooms.png").rename(tmp_path / "drawn" / "half.png")
+    listed[0] |= {"rooms": "drawn/half.png", "group": "other"}
+    listed[1] |= {"name": "half"}
+    cases.write_text(json.dumps({"cases": listed}))
+    (tmp_path / "link").symlink_to(tmp_path)
+    held = {path: path.read_bytes() for path in tmp_path.rglob("*.*")}
+    for where in (
+        ("--predictions", tmp_path),
+        ("--pictures", tmp_path / "link"),
+        ("--json", cases),
+        ("--json", tmp_path / "link" / "half.png"),
+    ):
+        code, _, err = cli("evaluate", cases, *where, "--group", "drawn", "--overwrite")
+        assert (code, "the evaluation reads this file; write its results to another place" in err) == (
+            2,
+            True,
+        ), err
+    assert {path: path.read_bytes() for path in tmp_path.rglob("*.*")} == held
+
+
+def test_evaluate_writes_no_file_twice(cli, cases: Path, tmp_path: Path):
+    out = tmp_path / "out"
+    for second in (("--pictures", out), ("--json", out / "drawn" / "flat.png")):
+        code, _, err = cli("evaluate", cases, "--predictions", out, *second)
+        assert (code, "two results would be this file" in err) == (2, True)
+    assert not out.exists()
+
+
 def test_evaluate_along_a_run(cli, cases: Path, tmp_path: Path):
     """Coverage of each map in the table and the JSON, and the curve beside the pictures."""
     code, out, _ = cli(
@@ -375,7 +430,7 @@ def test_evaluate_names_the_truth_that_counts(cli, cases: Path, tmp_path: Path):
         "rooms",
         "rooms_other",
     ]
-    code, out, _ = cli("evaluate", cases, "--along", "--json", tmp_path / "f.json")
+    code, out, _ = cli("evaluate", cases, "--along", "--json", tmp_path / "f.json", "--overwrite")
     assert (code, out.count(" truth")) == (0, 2)
     figures = json.loads((tmp_path / "f.json").read_text())
     assert [point["truth"] for point in figures["along"]["drawn"]] == ["rooms", "rooms_other"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from pathlib import Path
 
@@ -80,6 +81,24 @@ def test_an_image_that_is_missing_is_named(cases_file: Path):
     (cases_file.parent / "map.png").unlink()
     with pytest.raises(CasesError, match=r"map\.png"):
         load_cases(cases_file)[0].snapshot()
+
+
+def test_two_cases_of_one_name_are_refused(cases_file: Path):
+    """Their images would be one file, and their rows could not be told apart."""
+    listed = json.loads(cases_file.read_text())["cases"]
+    cases_file.write_text(json.dumps({"cases": [*listed, listed[0]]}))
+    with pytest.raises(CasesError, match="cases 0 and 2 are both called group 'g', name 'n'; rename one"):
+        load_cases(cases_file)
+
+
+@pytest.mark.parametrize(
+    ("group", "name"), [("g", "../../x"), ("g", "/x"), ("..", "x"), ("/g", "x"), ("g", "\0"), ("g", "\ud800")]
+)
+def test_an_image_of_a_case_stays_in_its_folder(cases_file: Path, tmp_path: Path, group: str, name: str):
+    case = load_cases(cases_file)[0]
+    assert case.image_in(tmp_path) == tmp_path / "g" / "n.png"
+    with pytest.raises(CasesError, match="its image would have no place in"):
+        dataclasses.replace(case, group=group, name=name).image_in(tmp_path)
 
 
 def with_other(cases_file: Path, other: object) -> Case:

@@ -73,9 +73,9 @@ def evaluate(
     workers: int = WORKERS,
     method: str = METHOD,
     detail: float | None = DETAIL,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace files that exist already.")] = False,
 ) -> None:
     """Segment maps whose true rooms are known, and print how well the rooms agree."""
-    from rose2_logs.runs.summary import write_json
     from rose2_logs.system.workers import keep_freed_memory
     from rose2_logs.workflows.evaluate import evaluate_method
 
@@ -90,10 +90,10 @@ def evaluate(
             workers=workers,
             predictions=predictions,
             pictures=pictures,
+            json_file=json_file,
+            overwrite=overwrite,
             on_case=on_case,
         )
-    if json_file is not None:
-        write_json(json_file, found.as_json())
     if along:
         print_along(found)
         print_tracks(found)
