@@ -7,25 +7,31 @@ import difflib
 import inspect
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from itertools import chain, islice
 from numbers import Real
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from rose2_logs.comparison.layouts import LayoutComparison
-from rose2_logs.config.parameters import OccupancyParameters, Parameters
+from rose2_logs.config.parameters import Parameters
 from rose2_logs.config.run_options import RunOptions, check_option, options_of, with_detail
 from rose2_logs.config.selection import Selection
 from rose2_logs.errors import InvalidMapError, ParameterError
 from rose2_logs.io import map_topics as map_topics_of_log
 from rose2_logs.io import open_log as open_log_reader
-from rose2_logs.io.cell_values import MAPS_LOOKED_AT, reading_of, stored_bytes
-from rose2_logs.io.given_maps import all_in_percent, decided_reading, in_percent
+from rose2_logs.io.given_maps import (
+    decided_reading,
+    in_percent,
+    read_alike,
+    snapshot_of_array,
+    with_maps,
+    with_snapshot,
+)
 from rose2_logs.io.log import LogReader
-from rose2_logs.model.occupancy import UNKNOWN, GridGeometry, OccupancySnapshot, free_area_m2
+from rose2_logs.model.occupancy import OccupancySnapshot
 from rose2_logs.runs.run import Run
 from rose2_logs.runs.sink import Sink
 from rose2_logs.runs.stream import TrackedStream, start_workers
@@ -148,7 +154,8 @@ def track(
         The log, or what `open_log` returns, or your own maps. Coverage refers to the last map; it is NaN for
         an iterator, whose last map is not known in advance.
     parameters : Parameters or mapping, optional
-        As for `analyze`.
+        As for `analyze`. What `open_log` returns, and its maps, are read by those that it was given: of
+        ``reading``, ``mapping`` and ``occupancy`` there may be no others here.
     method : str
         The segmentation method.
     detail : float, optional
@@ -179,9 +186,12 @@ def track(
     """
     # What cannot be used is refused by the call, not when the first map is asked for.
     options = _options(parameters, {"method": method, "detail": detail, "workers": workers, "topic": topic})
-    if isinstance(log, LogReader) or (isinstance(log, Iterable) and not isinstance(log, str | bytes)):
-        return _tracked(log, options)
-    return _tracked_and_closed(open_log(log, topic=topic, parameters=options.parameters), options)
+    if not isinstance(log, LogReader) and (not isinstance(log, Iterable) or isinstance(log, str | bytes)):
+        return _tracked_and_closed(open_log(log, topic=topic, parameters=options.parameters), options)
+    if topic is not None:
+        raise ParameterError(f"topic={topic!r}: is for a log that is given by its path; give it to open_log")
+    options = dataclasses.replace(options, parameters=with_maps(options.parameters, log))
+    return _tracked(log, options) if isinstance(log, LogReader) else _own_tracked(log, options)
 
 
 def _tracked_and_closed(reader: LogReader, options: RunOptions) -> Iterator[TrackedSnapshot]:
@@ -189,27 +199,21 @@ def _tracked_and_closed(reader: LogReader, options: RunOptions) -> Iterator[Trac
         yield from _tracked(reader, options)
 
 
-def _tracked(maps: LogReader | Iterable[OccupancySnapshot], options: RunOptions) -> Iterator[TrackedSnapshot]:
-    parameters = options.parameters
-    built = not isinstance(maps, LogReader) or maps.is_built
-    tell_without_effect(parameters, *following(built=built), method=options.method)
+def _tracked(reader: LogReader, options: RunOptions) -> Iterator[TrackedSnapshot]:
+    tell_without_effect(options.parameters, *following(built=reader.is_built), method=options.method)
     with start_workers(options) as workers:
-        if isinstance(maps, LogReader):
-            yield from TrackedStream.of_log(maps, workers, parameters)
-            return
-        final_m2, reading = None, None
-        if isinstance(maps, Sequence) and len(maps):
-            some = np.unique(np.linspace(0, len(maps) - 1, MAPS_LOOKED_AT).round().astype(int)).tolist()
-            reading = decided_reading([_checked_map(maps[k]) for k in some], parameters.occupancy)
-            final_m2 = free_area_m2(in_percent(maps[-1], reading), parameters.occupancy)
-        read = all_in_percent(map(_checked_map, maps), reading, parameters.occupancy)
-        yield from TrackedStream(read, final_m2, workers, parameters)
+        yield from TrackedStream.of_log(reader, workers, options.parameters)
 
 
-def _checked_map(given: OccupancySnapshot) -> OccupancySnapshot:
-    if not isinstance(given, OccupancySnapshot):
-        raise ParameterError(f"only maps of the type OccupancySnapshot can be tracked, not {_type(given)}")
-    return given
+def _own_tracked(maps: Iterable[OccupancySnapshot], options: RunOptions) -> Iterator[TrackedSnapshot]:
+    if not isinstance(maps, Sequence):
+        maps = iter(maps)
+        first = list(islice(maps, 1))
+        maps = chain(first, maps)
+        options = dataclasses.replace(options, parameters=with_maps(options.parameters, first))
+    tell_without_effect(options.parameters, "tracking", method=options.method)
+    with start_workers(options) as workers:
+        yield from TrackedStream(*read_alike(maps, options.parameters), workers, options.parameters)
 
 
 def segment(
@@ -236,7 +240,8 @@ def segment(
     detail : float, optional
         As for `analyze`; `Segmentation.at_detail` changes it later.
     parameters : Parameters or mapping, optional
-        As for `analyze`.
+        As for `analyze`. A snapshot that `open_log` or `read_map` made is read already: there may be no
+        others of ``occupancy`` than it was read by.
     voronoi : bool
         Whether to return the Voronoi graph as well.
 
@@ -264,36 +269,21 @@ def segment(
     RoomMap(2 rooms, 1 doorway, 200 x 120 cells of 0.05 m)
     """
     used = with_detail(Parameters.from_any(parameters), detail, method)
-    if isinstance(map_, OccupancySnapshot):
-        snapshot = in_percent(map_, decided_reading([map_], used.occupancy))
-    elif isinstance(map_, str | Path | bytes):
+    if isinstance(map_, str | Path | bytes):
         snapshot = _read_map(map_, resolution_m, used)  # type: ignore[arg-type]
+    elif isinstance(map_, OccupancySnapshot):
+        if resolution_m is not None:
+            raise ParameterError(
+                f"an OccupancySnapshot says how large its cells are; leave out resolution_m={resolution_m!r}"
+            )
+        used = with_snapshot(used, map_)
+        snapshot = in_percent(map_, decided_reading([map_], used.occupancy), used.occupancy)
     else:
-        snapshot = _snapshot_of_array(map_, resolution_m, used.occupancy)
+        snapshot = snapshot_of_array(map_, resolution_m, used.occupancy)
     if not snapshot.cells.size:
         raise InvalidMapError("the map has no cells")
-    return segment_snapshot(snapshot, used, method, name=snapshot.topic, voronoi=voronoi)
-
-
-def _snapshot_of_array(
-    array: ArrayLike, resolution_m: float | None, occupancy: OccupancyParameters
-) -> OccupancySnapshot:
-    if array is None or isinstance(array, Mapping):
-        raise ParameterError(f"a map is an array, a path or an OccupancySnapshot, not {_type(array)}")
-    if resolution_m is None:
-        raise ParameterError("an array does not say how large its cells are; give resolution_m in meters")
-    try:
-        # A mask is kept: what it hides is unknown to the snapshot.
-        cells = array if isinstance(array, np.ma.MaskedArray) else np.asarray(array)
-    except ValueError as error:
-        raise InvalidMapError("all rows of a map must have the same number of cells") from error
-    geometry = GridGeometry(resolution_m, (0.0, 0.0), 0.0, "map", cells.shape)
-    if cells.dtype.kind in "iu":
-        if isinstance(cells, np.ma.MaskedArray):
-            cells = np.ma.filled(cells.astype(np.int64), UNKNOWN)
-        cells = stored_bytes(cells)
-        cells = reading_of([cells], occupancy, "array").percent_of(cells)
-    return OccupancySnapshot(0, 0, 0, "array", cells, geometry, is_percent=True)
+    read = ("reading",) if isinstance(map_, str | Path | bytes) else ()
+    return segment_snapshot(snapshot, used, method, name=snapshot.topic, voronoi=voronoi, read=read)
 
 
 def open_log(

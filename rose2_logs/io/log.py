@@ -14,7 +14,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from rose2_logs.config.parameters import OccupancyParameters
+from rose2_logs.config.parameters import Parameters
 from rose2_logs.config.selection import Selection, Times
 from rose2_logs.errors import InvalidMapError, LogError, NoMapTopicError
 from rose2_logs.io.cell_values import MAPS_LOOKED_AT, CellReading, reading_of
@@ -37,7 +37,7 @@ logger = logging.getLogger(__name__)
 PREFERRED_TOPIC = "map"
 # Patches are published on the map's topic with this suffix: the convention of costmap_2d and nav2.
 PATCH_SUFFIX = "_updates"
-USUAL = OccupancyParameters()
+USUAL = Parameters()
 # Number of message types named in the error about a log without maps, so that it stays one readable line.
 MOST_LISTED = 6
 
@@ -55,6 +55,8 @@ class LogReader:
         The open log.
     counts : ReadCounts
         Message counts of the latest call of `snapshots`.
+    parameters : Parameters
+        Those that it reads by: of ``reading``, ``mapping`` and ``occupancy``.
 
     Examples
     --------
@@ -69,7 +71,7 @@ class LogReader:
         source: MessageSource,
         topic: str | None,
         selection: Selection,
-        occupancy: OccupancyParameters = USUAL,
+        parameters: Parameters = USUAL,
         part: int | None = None,
     ) -> None:
         self.info = source.info
@@ -86,7 +88,8 @@ class LogReader:
         self.counts = ReadCounts()
         self.source = source
         self._selection = selection.since(source.info.start_ns)
-        self._occupancy = occupancy
+        self.parameters = parameters
+        self._occupancy = parameters.occupancy
         self._asked_part = part
         self._first_failure: str | None = None
         self._path_origin: str | None = None

@@ -159,6 +159,7 @@ class MapStream:
             now.geometry,
             self._repeats,
             is_percent=True,
+            read_by=self._occupancy,
         )
         self._yielded = now
         self._index += 1

@@ -11,7 +11,7 @@ from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
 
 from rose2_logs.config.mapping import MappingParameters
-from rose2_logs.config.parameters import OccupancyParameters
+from rose2_logs.config.parameters import OccupancyParameters, Parameters
 from rose2_logs.config.reading import ReadingParameters
 from rose2_logs.config.selection import Selection
 from rose2_logs.errors import LogError
@@ -114,11 +114,12 @@ def open_log(
         If the log cannot be opened.
     """
     source = open_source(path, limits, occupancy)
+    parameters = Parameters(reading=limits, mapping=mapping, occupancy=occupancy)
     with OnFailure(source.close):
         if map_from is not None or source.info.format == CARMEN_FORMAT:
             built = _with_maps(source, map_from, map_frame, selection, limits, mapping)
-            return LogReader(built, topic or built.topic, selection, occupancy, part)
-        return LogReader(source, topic, selection, occupancy, part)
+            return LogReader(built, topic or built.topic, selection, parameters, part)
+        return LogReader(source, topic, selection, parameters, part)
 
 
 def _with_maps(

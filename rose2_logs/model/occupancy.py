@@ -183,6 +183,8 @@ class OccupancySnapshot:
     is_percent : bool
         Whether the cells are known to be percent, as those of a reader are. Of others it is decided from
         their values what they mean.
+    read_by : OccupancyParameters, optional
+        What a reader has read the cells by; none of a map that no reader made.
 
     Raises
     ------
@@ -206,6 +208,7 @@ class OccupancySnapshot:
     geometry: GridGeometry
     repeats_before: int = 0
     is_percent: bool = False
+    read_by: OccupancyParameters | None = None
 
     def __repr__(self) -> str:
         return f"OccupancySnapshot(index={self.index}, topic={self.topic!r}, {self.geometry.size_text})"

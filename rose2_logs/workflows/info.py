@@ -104,7 +104,7 @@ def describe_log(log: str, parameters: Parameters | None = None) -> LogFacts:
 
 def _topic_facts(source: MessageSource, topic: str, parameters: Parameters) -> TopicFacts:
     try:
-        reader = LogReader(source, topic, Selection(), parameters.occupancy)
+        reader = LogReader(source, topic, Selection(), parameters)
         first, last = (_map_facts(each, parameters.occupancy) for each in (reader.first(), reader.last()))
         return TopicFacts(topic, first, last)
     except LogError as error:

@@ -153,13 +153,15 @@ def segment_snapshot(
     *,
     name: str = "map",
     voronoi: bool = False,
+    read: Sequence[str] = ("reading",),
 ) -> Segmentation:
     """Segment a single map.
 
-    It is warned of what was left out, of a map that is odd, and of coarser cells that a large map took.
+    It is warned of what was left out, of a map that is odd, of coarser cells that a large map took, and of
+    parameters that were set in vain, but for those of the blocks by which the map was `read`.
     """
     check_option(RunOptions, "method", method)
-    tell_without_effect(parameters, "reading", method=method)
+    tell_without_effect(parameters, *read, method=method)
     far = find_far_cells(snapshot.cells, snapshot.geometry.resolution_m, parameters.occupancy)
     if far is not None:
         log_warning(logger, "far_cells", f"{name}: {far.note}")
@@ -274,7 +276,7 @@ def read_static_map(
                 "maps"
             )
         # Unlike `first`, this tells what is odd about the map.
-        return next(reader.snapshots())
+        return replace(next(reader.snapshots()), read_by=parameters.occupancy)
 
 
 @contextmanager
