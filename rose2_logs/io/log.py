@@ -91,6 +91,7 @@ class LogReader:
         self.parameters = parameters
         self._occupancy = parameters.occupancy
         self._asked_part = part
+        self._is_closed = False
         self._first_failure: str | None = None
         self._path_origin: str | None = None
         self._topics = [self.topic] + [
@@ -112,6 +113,7 @@ class LogReader:
 
     def close(self) -> None:
         """Release the log's files."""
+        self._is_closed = True
         self.source.close()
 
     @property
@@ -119,9 +121,16 @@ class LogReader:
         """Whether the maps are built from scans, and not recorded."""
         return self.source.made_from(self.topic) != self.topic
 
+    def _require_open(self) -> None:
+        """Refuse to read a closed log, whose messages would all seem to be damaged."""
+        if self._is_closed:
+            text = f"{self.info.path}: the log is closed; read its maps before it is, inside of `with`"
+            raise LogError(text, file=self.info.path)
+
     @cached_property
     def cell_reading(self) -> CellReading:
         """What the numbers in the cells mean: decided once for the whole log, whatever is selected of it."""
+        self._require_open()
         name = f"{self.info.path}: {self.topic}"
         return reading_of(self._some_cells(), self._occupancy, name, file=self.info.path, topic=self.topic)
 
@@ -177,7 +186,7 @@ class LogReader:
         Raises
         ------
         LogError
-            If the topic has no map in the time range, or none can be read.
+            If the topic has no map in the time range, none can be read, or the log is closed.
         """
         times = self._times_in_range()
         chosen = self._selection.thin(distinct(times))
@@ -256,6 +265,7 @@ class LogReader:
         base_frame : str, optional
             Frame of the robot's base, where it is none of the usual ones.
         """
+        self._require_open()
         start_ns = self._selection.start_ns
         if (first := next(iter(self._parts))) > 1:
             start_ns = max(start_ns or 0, int(self._parts[first].times[0]))
@@ -306,6 +316,7 @@ class LogReader:
                     has_told_far = True
                 del message, decoded  # a large canvas is not kept while what it shows is analyzed
                 yield snapshot
+                self._require_open()
 
     def _place(self, message: LoggedMap) -> str:
         total = len(self.source.log_times(message.topic))
@@ -341,6 +352,7 @@ class LogReader:
     @cached_property
     def _found_parts(self) -> tuple[Parts, dict[int, Part]]:
         """The parts of the topic, and those that are read, by number."""
+        self._require_open()
         times = self.source.log_times(self.topic)
         if len(times) > 1 and isinstance(self.source, MapFilesSource):
             return self._chosen(find_saved_parts(self.source.names, times, self._grid, self._occupancy))
@@ -392,6 +404,7 @@ class LogReader:
         return np.sort(np.concatenate([self.source.log_times(topic) for topic in self._topics]))
 
     def _times_in_range(self) -> Times:
+        self._require_open()
         times = self._all_times()
         if len(times) and self.part_count > 1:
             times = np.concatenate([part.times for part in self._parts.values()])

@@ -8,6 +8,7 @@ import shutil
 import sqlite3
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -29,8 +30,10 @@ from reader_logs import (
     write_mcap,
     write_rosbag2,
 )
+from saved_maps import save_run
 from scipy.ndimage import binary_dilation
 
+import rose2_logs as rl
 from rose2_logs.config.reading import ReadingParameters
 from rose2_logs.config.selection import Selection
 from rose2_logs.errors import InvalidMapError, LogError, NoMapTopicError
@@ -102,6 +105,44 @@ FORMATS = {
     "rosbag2-mcap-storage": lambda path, log: write_rosbag2(path / "run", log, "MCAP", "STORAGE"),
     "db3": lambda path, log: write_rosbag2(path / "run", log) / "run.db3",
 }
+
+
+CLOSED = {
+    **{name: FORMATS[name] for name in ("bag", "mcap-zstd", "mcap-no-index", "rosbag2-sqlite3-none", "db3")},
+    "packed": FORMATS["rosbag2-mcap-file"],
+    "saved maps": lambda path, log: save_run(path / "maps"),
+}
+
+
+@pytest.mark.parametrize("name", CLOSED)
+def test_a_closed_log_is_no_damaged_one(name, tmp_path, caplog):
+    """It is told in one line, also where it was closed on the way, and nothing is taken for damage."""
+    path = CLOSED[name](tmp_path, run_of_maps())
+    with open_log(path) as log:
+        begun = log.snapshots()
+        next(begun)
+    with open_log(path) as never_read:
+        pass
+    calls = [begun, never_read.snapshots(), log.snapshots()]
+    readings = [partial(next, each) for each in calls] + [
+        never_read.first,
+        never_read.last,
+        never_read.lasts,
+        lambda: never_read.robot_path("map"),
+        lambda: never_read.part_count,
+    ]
+    for reading in readings:
+        with pytest.raises(LogError) as error:
+            reading()
+        assert str(error.value) == f"{path}: the log is closed; read its maps before it is, inside of `with`"
+    assert not caplog.records
+
+
+def test_rooms_are_not_tracked_in_a_closed_log(tmp_path):
+    with open_log(write_mcap(tmp_path / "run.mcap", run_of_maps())) as log:
+        steps = rl.track(log)
+    with pytest.raises(LogError, match="the log is closed"):
+        next(steps)
 
 
 @pytest.mark.parametrize("name", FORMATS)

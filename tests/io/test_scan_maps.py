@@ -338,3 +338,12 @@ def test_a_carmen_log_is_opened_directly(tmp_path):
         maps = list(reader.snapshots())
     assert [each.log_time_ns for each in maps] == [105 * 10**9, int(114.5e9)]
     assert_is_the_room(maps[-1])
+
+
+def test_maps_are_not_built_from_a_closed_log(tmp_path):
+    path = write_scans(tmp_path / "run.mcap", drive())
+    with rl.open_log(path, map_from="/scan", every_s=1.0) as reader:
+        begun = reader.snapshots()
+        next(begun)
+    with pytest.raises(LogError, match="the log is closed"):
+        next(begun)
