@@ -7,6 +7,7 @@ import difflib
 import inspect
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from itertools import chain, islice
 from numbers import Real
 from pathlib import Path
@@ -414,8 +415,7 @@ def read_map(map_file: str | Path, resolution_m: float | None = None) -> Occupan
 
 
 def _read_map(map_file: str | Path, resolution_m: float | None, parameters: Parameters) -> OccupancySnapshot:
-    _check_resolution(resolution_m)
-    return read_static_map(_path(map_file, "map_file"), resolution_m, parameters)
+    return read_static_map(_path(map_file, "map_file"), _resolution(resolution_m), parameters)
 
 
 def load(folder: str | Path, *, part: int | None = None) -> Run:
@@ -581,9 +581,14 @@ def _path(given: Any, name: str) -> Path:
     return path
 
 
-def _check_resolution(given: object) -> None:
-    if isinstance(given, bool) or not isinstance(given, Real | None):
-        raise ParameterError(f"resolution_m={given!r}: it must be a number, in meters")
+def _resolution(given: Any) -> float | None:
+    """Return a resolution as a float; what is no number is refused."""
+    if given is None:
+        return None
+    with suppress(OverflowError):
+        if isinstance(given, Real) and given is not True and given is not False:
+            return float(given)
+    raise ParameterError(f"resolution_m={given!r}: it must be a number, in meters")
 
 
 def _type(given: object) -> str:

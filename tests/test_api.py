@@ -6,6 +6,7 @@ import copy
 import gc
 import json
 import pickle
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -81,6 +82,21 @@ def test_what_is_no_occupancy_is_refused_in_a_line(wrong: object):
 def test_a_resolution_that_is_none_is_refused(cells: np.ndarray, resolution_m: float):
     with pytest.raises(Rose2LogsError, match="resolution"):
         rl.segment(cells, resolution_m=resolution_m)
+
+
+def test_a_resolution_is_any_number(cells: np.ndarray, tmp_path: Path):
+    """As a map and as an image; one that no float can hold is refused."""
+    image = save_map(tmp_path, "map", two_rooms())
+    image.unlink()
+    picture = image.with_suffix(".png")
+    for resolution_m in (Fraction(1, 20), np.float64(0.05)):
+        assert rl.segment(cells, resolution_m=resolution_m).rooms.geometry.resolution_m == 0.05
+        assert rl.read_map(picture, resolution_m).geometry.resolution_m == 0.05
+    for call in (rl.segment, rl.read_map):
+        with pytest.raises(Rose2LogsError, match="resolution"):
+            call(picture, resolution_m=10**400)
+    with pytest.raises(Rose2LogsError, match="resolution"):
+        rl.segment(cells, resolution_m=10**400)
 
 
 def test_an_array_needs_its_resolution(cells: np.ndarray):

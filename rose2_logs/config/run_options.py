@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 from numbers import Integral, Real
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -18,6 +18,7 @@ from rose2_logs.config.fields import changed_text
 from rose2_logs.config.parameters import Parameters
 from rose2_logs.config.reading import TYPES_WITHOUT_SCHEMA, ReadingParameters
 from rose2_logs.config.regions import DETAIL_MOST
+from rose2_logs.config.times import LONGEST_LOG_S
 from rose2_logs.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -38,8 +39,6 @@ RECORDING_LAYERS = (
 """Layers of a recording that can be left out; map, rooms and doorways are always there."""
 MOST_WORKERS = 1024
 """Far more than there are processors in one machine; slips of the keyboard are not."""
-LONGEST_LOG_S = 2.0**63 / 1e9
-"""Log times are 64 bit integers that count nanoseconds."""
 Type = TypeVar("Type", bound=type)
 BOTH = ("analyze", "batch")
 MAPS, OUTPUTS, METHOD = "Which maps", "What to write", "Method and parameters"
@@ -437,7 +436,11 @@ class RunOptions:
         check_options(self)
         # A text, as the command line has it, is a right value for programs too.
         layers: Any = self.layers
-        layers = layers_named(layers if isinstance(layers, str) else ",".join(layers) or "none")
+        if not isinstance(layers, str):
+            if not isinstance(layers, Collection) or not all(isinstance(each, str) for each in layers):
+                raise ParameterError(f"layers={layers!r}: they must be a text or a sequence of names")
+            layers = ",".join(layers) or "none"
+        layers = layers_named(layers)
         object.__setattr__(self, "layers", layers)
         parameters = with_detail(self.parameters, self.detail, self.method)
         object.__setattr__(self, "parameters", parameters)

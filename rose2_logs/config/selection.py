@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-import math
+import sys
 from dataclasses import dataclass
 from numbers import Integral, Real
 
@@ -11,9 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rose2_logs.config.fields import changed_text
+from rose2_logs.config.times import LATEST_NS, LONGEST_LOG_S
 from rose2_logs.errors import ParameterError
 
 Times = NDArray[np.int64]
+LARGEST = sys.float_info.max
+"""Whole numbers can be larger, but are no float then."""
 
 
 def _is_number(value: object, kind: type) -> bool:
@@ -64,14 +67,24 @@ class Selection:
         return changed_text(self)
 
     def __post_init__(self) -> None:
+        for name in ("every_s", "min_change_m2"):
+            value = getattr(self, name)
+            if value is not None and not (_is_number(value, Real) and 0 <= value <= LARGEST):
+                raise ParameterError(f"{name}={value!r}: it must be a number, 0 or more")
+        for name in ("start_s", "end_s"):
+            value = getattr(self, name)
+            if value is not None and not (_is_number(value, Real) and 0 <= value <= LONGEST_LOG_S):
+                raise ParameterError(f"{name}={value!r}: it must be a number, 0 to {LONGEST_LOG_S:g}")
+        for name in ("start_ns", "end_ns"):
+            value = getattr(self, name)
+            if value is not None and not (_is_number(value, Integral) and 0 <= value <= LATEST_NS):
+                raise ParameterError(
+                    f"{name}={value!r}: it must be a whole number of nanoseconds, 0 to {LATEST_NS}"
+                )
         if self.start_ns is not None and self.end_ns is not None and self.start_ns > self.end_ns:
             raise ParameterError(
                 f"the time range starts at {self.start_ns} ns, after its end at {self.end_ns} ns"
             )
-        for name in ("every_s", "min_change_m2", "start_s", "end_s"):
-            value = getattr(self, name)
-            if value is not None and not (_is_number(value, Real) and math.isfinite(value) and value >= 0):
-                raise ParameterError(f"{name}={value!r}: it must be a number, 0 or more")
         if self.start_s is not None and self.end_s is not None and self.start_s > self.end_s:
             raise ParameterError(f"start_s={self.start_s:g}: it lies after end_s={self.end_s:g}")
         most = self.max_snapshots
@@ -81,8 +94,8 @@ class Selection:
     def since(self, first_ns: int | None) -> Selection:
         """Return the same with a time range in log times, for a log whose first message is of `first_ns`."""
         begin_ns = first_ns or 0
-        start_ns = self.start_ns if self.start_s is None else begin_ns + round(self.start_s * 1e9)
-        end_ns = self.end_ns if self.end_s is None else begin_ns + round(self.end_s * 1e9)
+        start_ns = self.start_ns if self.start_s is None else _after(begin_ns, self.start_s)
+        end_ns = self.end_ns if self.end_s is None else _after(begin_ns, self.end_s)
         return dataclasses.replace(self, start_ns=start_ns, end_ns=end_ns, start_s=None, end_s=None)
 
     def in_range(self, times: Times) -> Times:
@@ -110,3 +123,8 @@ class Selection:
             while (later := int(np.searchsorted(times, int(times[chosen[-1]]) + step))) < len(times):
                 chosen.append(later)
         return chosen
+
+
+def _after(begin_ns: int, time_s: float) -> int:
+    """Log time so many seconds after another, or the latest one that there can be."""
+    return min(begin_ns + round(time_s * 1e9), LATEST_NS)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from numbers import Integral
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rose2_logs.drawing import PRINT_WIDTH_PX
+from rose2_logs.drawing import PRINT_WIDTH_PX, WIDEST_PX
 from rose2_logs.drawing.image_files import write_image
 from rose2_logs.drawing.pixels import as_pixels
 from rose2_logs.drawing.shapes import Page
@@ -36,7 +38,7 @@ class Drawing(Page):
 
     def pixels(self, width_px: int | None = None) -> NDArray[np.uint8]:
         """Return it as pixels (H, W, 3), RGB; by default one for each unit of the page."""
-        return as_pixels(self, round(self.width) if width_px is None else width_px)
+        return as_pixels(self, round(self.width) if width_px is None else _checked_width(width_px))
 
     def save(self, path: str | Path, width_px: int | None = PRINT_WIDTH_PX) -> Path:
         """Write it to a file, which replaces an earlier one.
@@ -56,7 +58,7 @@ class Drawing(Page):
         Raises
         ------
         ParameterError
-            If the file has another ending, or the width is below 1 pixel.
+            If the file has another ending, or the width is no number of pixels from 1 to 20,000.
         OutputError
             If it cannot be written.
         """
@@ -64,8 +66,8 @@ class Drawing(Page):
         kind = path.suffix.lower()
         if kind not in ENDINGS:
             raise ParameterError(f"{path}: a drawing is saved as {' or '.join(ENDINGS)}; let its name end so")
-        if width_px is not None and width_px < 1:
-            raise ParameterError(f"a drawing of {width_px} pixels in width cannot be saved; take 1 or more")
+        if width_px is not None:
+            _checked_width(width_px)
         if kind == ".png":
             write_image(path, self.pixels(width_px))
         else:
@@ -81,3 +83,12 @@ class Drawing(Page):
         return (
             f"Drawing({self.title!r}, {self.width:.0f} x {self.height:.0f}, {len(self.shapes)} shape{many})"
         )
+
+
+def _checked_width(width_px: Any) -> int:
+    is_whole = isinstance(width_px, Integral) and width_px is not True
+    if not is_whole or not 1 <= width_px <= WIDEST_PX:
+        raise ParameterError(
+            f"width_px={width_px!r}: it must be a whole number of pixels, 1 to {WIDEST_PX}, or None"
+        )
+    return int(width_px)

@@ -16,9 +16,10 @@ import numpy as np
 
 from rose2_logs.config.reading import ReadingParameters
 from rose2_logs.config.selection import Times
+from rose2_logs.config.times import LATEST_NS
 from rose2_logs.errors import LogError
 from rose2_logs.io.grids import Decoder, Grid, Patch
-from rose2_logs.io.log_file import LATEST_NS, LogFile, Place
+from rose2_logs.io.log_file import LogFile, Place
 from rose2_logs.io.messages import decoder
 from rose2_logs.io.source import LoggedBytes, LoggedMap, LogInfo, MessageSource, TopicInfo, places_of
 from rose2_logs.system.files import OnFailure

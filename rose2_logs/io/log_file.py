@@ -20,9 +20,6 @@ from rose2_logs.system.warnings import log_warning
 
 logger = logging.getLogger(__name__)
 
-LATEST_NS = 2**63 - 1
-"""A later log time (after the year 2262) is treated as damage."""
-
 
 class Place(NamedTuple):
     """Where a message is stored; places sort in reading order.

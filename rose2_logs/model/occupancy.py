@@ -89,12 +89,16 @@ class GridGeometry:
         if height < 0 or width < 0:
             raise InvalidMapError(f"a grid's shape must be rows and columns, not {self.shape!r}")
         object.__setattr__(self, "shape", (height, width))
+        origin: Any = self.origin_xy_m
+        if isinstance(origin, np.ndarray):
+            object.__setattr__(self, "origin_xy_m", origin.tolist())
         is_pair = isinstance(self.origin_xy_m, Sequence) and len(self.origin_xy_m) == 2
         if not is_pair or not _are_numbers(self.resolution_m, self.yaw_rad, *self.origin_xy_m):
             raise InvalidMapError(
                 f"a grid's resolution, origin and yaw must be numbers, not {self.resolution_m!r}, "
                 f"{self.origin_xy_m!r}, {self.yaw_rad!r}"
             )
+        self._hold_floats()
         if not SMALLEST_CELL_M <= self.resolution_m <= LARGEST_CELL_M:
             raise InvalidMapError(
                 f"the map's resolution is {self.resolution_m:g} m; it must be positive, from "
@@ -108,6 +112,21 @@ class GridGeometry:
             raise InvalidMapError(
                 f"the map's origin {self.origin_xy_m} is farther than {FARTHEST_ORIGIN_M:g} m away"
             )
+
+    def _hold_floats(self) -> None:
+        """Turn numbers of other types into floats, so that equal geometries are equal whatever they held."""
+        values = (self.resolution_m, self.yaw_rad, *self.origin_xy_m)
+        if type(self.origin_xy_m) is tuple and all(type(value) is float for value in values):
+            return
+        try:
+            resolution_m, yaw_rad, *origin = map(float, values)
+        except OverflowError as error:
+            raise InvalidMapError(
+                "a grid's resolution, origin and yaw must be numbers as floats can be; one is larger"
+            ) from error
+        object.__setattr__(self, "resolution_m", resolution_m)
+        object.__setattr__(self, "origin_xy_m", tuple(origin))
+        object.__setattr__(self, "yaw_rad", yaw_rad)
 
     def part(self, window: tuple[slice, slice], block: int = 1) -> GridGeometry:
         """Return where a part of the grid lies: its rows and columns, in blocks of so many cells a side."""

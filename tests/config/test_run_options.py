@@ -32,6 +32,9 @@ from rose2_logs.segmentation.baselines.stage import BASELINES
         ({"workers": True}, "workers=True"),
         ({"method": "magic"}, "method='magic': it must be one of rose2, morphological"),
         ({"layers": ("walls",)}, "layers='walls': there is no such layer"),
+        ({"layers": 5}, "layers=5: they must be a text or a sequence of names"),
+        ({"layers": [5]}, "layers=[5]"),
+        ({"layers": None}, "layers=None"),
         ({"bag": True, "annotated_log": False}, "annotated_log=False leaves out"),
     ],
 )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import xml.etree.ElementTree as ET
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -41,12 +42,17 @@ def test_the_name_says_what_it_is_saved_as(drawing: Drawing, tmp_path: Path):
         assert small.size == (200, 100)
 
 
-@pytest.mark.parametrize(("name", "width_px"), [("a.pdf", 100), ("a", 100), ("a.png", 0)])
-def test_what_cannot_be_saved_is_told_in_a_line(drawing: Drawing, tmp_path: Path, name: str, width_px: int):
+@pytest.mark.parametrize(
+    ("name", "width_px"),
+    [("a.pdf", 100), ("a", 100), *(("a.png", width) for width in (0, 10**6, 10**400, True, "9", 2.5))],
+)
+def test_what_cannot_be_saved_is_told_in_a_line(drawing: Drawing, tmp_path: Path, name: str, width_px: Any):
     with pytest.raises(ParameterError) as caught:
         drawing.save(tmp_path / name, width_px=width_px)
     assert "\n" not in str(caught.value)
     assert not list(tmp_path.iterdir())
+    with pytest.raises(ParameterError):
+        drawing.pixels(10**6)
 
 
 def test_a_folder_that_is_none_is_told(drawing: Drawing, tmp_path: Path):

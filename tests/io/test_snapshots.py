@@ -1,6 +1,7 @@
 """Which maps of a log are taken, and what becomes of patches and repeats."""
 
 import dataclasses
+import datetime
 
 import numpy as np
 import pytest
@@ -107,11 +108,29 @@ def test_a_longer_time_between_maps_than_a_log_can_last_takes_the_first_one(ever
         {"min_change_m2": -0.1},
         {"max_snapshots": 0},
         {"start_ns": 2, "end_ns": 1},
+        {"start_ns": "0"},
+        {"start_ns": True},
+        {"start_ns": 1.5},
+        {"start_ns": datetime.datetime(2024, 1, 1)},
+        {"start_ns": -1},
+        {"end_ns": float("nan")},
+        {"end_ns": 2**63},
+        {"end_ns": []},
+        {"start_s": 1e300},
+        {"end_s": 10**400},
+        {"every_s": 10**400},
+        {"min_change_m2": True},
     ],
 )
 def test_a_selection_that_makes_no_sense_is_refused(wrong):
-    with pytest.raises(ParameterError):
+    with pytest.raises(ParameterError, match=next(iter(wrong)) if len(wrong) == 1 else "time range"):
         Selection(**wrong)
+
+
+def test_a_time_range_may_reach_beyond_the_last_time_that_there_can_be(tmp_path):
+    path = write_mcap(tmp_path / "run.mcap", log_at([0, 1]))
+    snapshots, _ = read(path, Selection(start_ns=np.int64(START_NS), end_s=2**63 / 1e9))
+    assert len(snapshots) == 2
 
 
 def test_a_time_range_without_maps_is_an_error_that_tells_when_there_are_some(tmp_path):

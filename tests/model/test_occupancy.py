@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -102,11 +103,28 @@ def test_a_shape_is_rows_and_columns_as_integers():
         {"origin_xy_m": (float("inf"), 0.0)},
         {"origin_xy_m": (1e9, 0.0)},
         {"yaw_rad": float("nan")},
+        {"resolution_m": 10**400},
+        {"origin_xy_m": (0.0, 10**400)},
+        {"yaw_rad": 10**400},
+        {"origin_xy_m": np.zeros(())},
+        {"origin_xy_m": np.zeros((2, 2))},
     ],
 )
 def test_a_place_that_no_map_has_is_refused(changes: dict[str, Any]):
     with pytest.raises(InvalidMapError):
         geometry(**changes)
+
+
+@pytest.mark.parametrize(
+    "origin_xy_m",
+    [[1.0, -2.0], (1, -2), np.array([1.0, -2.0]), np.array([1, -2]), (np.float32(1), Fraction(-2))],
+)
+def test_equal_places_are_equal_whatever_numbers_they_are_given_in(origin_xy_m: Any):
+    usual = geometry(resolution_m=0.5, yaw_rad=0.0)
+    found = geometry(resolution_m=Fraction(1, 2), yaw_rad=np.int64(0), origin_xy_m=origin_xy_m)
+    assert found == usual
+    assert hash(found) == hash(usual)
+    assert repr(found) == repr(usual)
 
 
 def test_the_text_of_a_snapshot_is_one_short_line():

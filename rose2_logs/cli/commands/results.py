@@ -11,6 +11,7 @@ from rose2_logs.cli.exit_codes import EXIT_KNOWN
 from rose2_logs.cli.messages import show_error
 from rose2_logs.cli.options import part_option
 from rose2_logs.cli.printing import print_file
+from rose2_logs.drawing import WIDEST_PX
 from rose2_logs.outputs.report import PANELS
 from rose2_logs.workflows import FIGURE_WIDTH_PX
 
@@ -134,7 +135,7 @@ def figure(
         typer.Option(
             metavar="PX",
             min=100,
-            max=20000,
+            max=WIDEST_PX,
             help="Width of a PNG in pixels; 1800 pixels are 15 cm at 300 dpi.",
             rich_help_panel=WHAT,
         ),

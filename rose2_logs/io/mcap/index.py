@@ -21,11 +21,11 @@ from mcap.records import Attachment, ChunkIndex, Header, Metadata, Schema
 from mcap.records import Channel as McapChannel
 
 from rose2_logs.config.reading import NO_TYPE, ReadingParameters
+from rose2_logs.config.times import LATEST_NS
 from rose2_logs.errors import LogError
 from rose2_logs.io.checked_file import CheckedFile
 from rose2_logs.io.decompression import REMEDY
 from rose2_logs.io.log_file import (
-    LATEST_NS,
     Channel,
     LogFile,
     Place,

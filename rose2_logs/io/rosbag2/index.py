@@ -17,9 +17,9 @@ from urllib.parse import quote
 import numpy as np
 
 from rose2_logs.config.reading import ReadingParameters
+from rose2_logs.config.times import LATEST_NS
 from rose2_logs.errors import LogError
 from rose2_logs.io.log_file import (
-    LATEST_NS,
     Channel,
     LogFile,
     Place,
