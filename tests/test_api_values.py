@@ -65,6 +65,18 @@ def test_a_named_kind_is_taken_without_a_word(caplog):
     assert not caplog.records
 
 
+def test_unsigned_bytes_of_a_message_are_its_cells(caplog):
+    """255 is -1 then, without a word: there is nothing between it and percent."""
+    for cells in (CELLS.view(np.uint8), CELLS.view(np.uint8).astype(np.int64)):
+        assert np.array_equal(rl.segment(cells, resolution_m=RESOLUTION_M).labels, ROOMS)
+    assert not caplog.records
+
+
+def test_an_image_of_two_grays_is_no_map_in_percent():
+    with pytest.raises(rl.InvalidMapError, match="of an image of grays, save it"):
+        rl.segment(np.where(CELLS == 0, 255, 0), resolution_m=RESOLUTION_M)
+
+
 def test_the_grays_of_an_image_are_no_costs():
     grays = np.select([CELLS == 0, CELLS == 100], [254, 0], 205)
     with pytest.raises(rl.InvalidMapError, match="of an image of grays, save it"):

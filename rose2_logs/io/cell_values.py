@@ -357,6 +357,8 @@ def reading_of(
 def stored_bytes(values: NDArray[np.integer]) -> Cells:
     """Return integers of an array as the bytes that a map would store them as; -1 is that of unknown.
 
+    The cells of a ROS message as unsigned bytes have 255 for it. In an image of two grays that is free floor.
+
     Raises
     ------
     InvalidMapError
@@ -370,6 +372,8 @@ def stored_bytes(values: NDArray[np.integer]) -> Cells:
     cells = values.astype(np.uint8).view(np.int8)
     if high > HIGHEST_PERCENT:
         counts = count_values(cells)
+        if counts[1 : HIGHEST_PERCENT + 1].any() and not counts[HIGHEST_PERCENT + 1 : UNKNOWN_BYTE].any():
+            return cells
         # Where more is 254 than 0, it is an image in which that is the gray of free floor.
         if decide(counts).table is not OCCUPANCY_OF_COST or counts[LETHAL_COST] > counts[0]:
             raise InvalidMapError(
