@@ -253,7 +253,7 @@ def named_run(folder: Path, names: Path | None, part: int | None = None) -> Run:
 
 
 class RunSnapshot:
-    """One map of a stored run.
+    """One map of a stored run; equal to the same map of the same run, however that was opened.
 
     Attributes
     ----------
@@ -272,6 +272,16 @@ class RunSnapshot:
     def __init__(self, run: Run, number: int) -> None:
         self.run = run
         self.number = number
+
+    @cached_property
+    def _identity(self) -> tuple[Path, int]:
+        return self.run.folder.resolve(), self.number
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, RunSnapshot) and self._identity == other._identity
+
+    def __hash__(self) -> int:
+        return hash(self._identity)
 
     @cached_property
     def _row(self) -> Row:

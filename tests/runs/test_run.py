@@ -151,6 +151,22 @@ def test_a_run_is_a_sequence_of_its_maps(run: rl.Run):
             run[index]
 
 
+def test_a_map_of_a_run_is_found_in_it(run: rl.Run):
+    """As in any sequence, also when the run was opened twice."""
+    again = rl.load(run.folder)
+    assert run[0] in run
+    assert run.index(run[2]) == again.index(run[2]) == 2
+    assert run.count(run[-1]) == 1
+    assert len({*run, *again}) == len(run)
+    assert run[0] != run[1]
+    assert run[0] != 0
+
+
+def test_maps_of_other_runs_are_other_maps(run: rl.Run):
+    other = rl.analyze(SAMPLE_LOGS / "office.mcap", max_snapshots=1)
+    assert other[0] not in run
+
+
 @pytest.mark.parametrize("index", [True, None, "x", 1.0, [0, 1], (0, 1), np.array([True] * 5)], ids=repr)
 def test_what_is_no_index_of_a_map_is_refused_in_a_line(run: rl.Run, index: object):
     with pytest.raises(TypeError) as refused:
