@@ -36,7 +36,7 @@ from rose2_logs.model.occupancy import OccupancySnapshot
 from rose2_logs.runs.run import Run
 from rose2_logs.runs.sink import Sink
 from rose2_logs.runs.stream import TrackedStream, start_workers
-from rose2_logs.system.files import require_local
+from rose2_logs.system.files import expanded, require_local
 from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot
 from rose2_logs.workflows.analyze import OnSnapshot, analyze_log, log_stem
 from rose2_logs.workflows.compare import compare_runs, compare_stored
@@ -571,12 +571,12 @@ def _refuse_unknown(options: Mapping[str, Any], known: Sequence[str]) -> None:
 
 
 def _path(given: Any, name: str) -> Path:
-    """Return what was given as a path; anything else, and an empty text, is refused."""
+    """Return what was given as a path, from the home folder behind ``~/``; all else is refused."""
     if not isinstance(given, str | os.PathLike):
         raise ParameterError(f"{name} must be a str or a Path, not {_type(given)}")
     if not os.fspath(given):
         raise ParameterError(f"{name} is an empty text; '.' is the current folder")
-    path = Path(given)
+    path = expanded(Path(given))
     require_local(path)
     return path
 

@@ -6,6 +6,7 @@ import copy
 import gc
 import json
 import pickle
+import shutil
 from fractions import Fraction
 from pathlib import Path
 
@@ -204,3 +205,23 @@ def test_a_parameter_without_effect_is_told_wherever_maps_are_segmented(cells, c
             each.message for each in caplog.records if "floor_plan.known_power has no effect" in each.message
         ]
         assert len(told) == 1, name
+
+
+def test_paths_begin_in_the_home_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """What is read and what is written; nothing is made in a folder named as the sign for it."""
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setenv("USERPROFILE", str(tmp_path))
+    (tmp_path / "work").mkdir()
+    shutil.copy(SAMPLE_LOGS / "office.mcap", tmp_path / "office.mcap")
+    (tmp_path / "names.csv").write_text("name,track\nHall,1\n")
+    monkeypatch.chdir(tmp_path / "work")
+    about = {"names": "~/names.csv", "max_snapshots": 1, "recording": False, "annotated_log": False}
+    run = rl.analyze("~/office.mcap", "~/runs/office", **about)
+    assert Path(run.folder) == tmp_path / "runs" / "office"
+    assert run.figure().save("~/plan.svg") == tmp_path / "plan.svg"
+    for again in (rl.load("~/runs/office"), rl.Run("~/runs/office")):
+        again.rename("~/names.csv")
+        assert len(again) == 1
+    with rl.open_log(["~/office.mcap"]) as reader:
+        assert reader.first().index == 0
+    assert not list((tmp_path / "work").iterdir())

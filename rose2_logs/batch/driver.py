@@ -35,7 +35,7 @@ from rose2_logs.errors import LogError, OutputError, ParameterError
 from rose2_logs.io.discovery import BAG_DESCRIPTION
 from rose2_logs.runs.summary import SUMMARY, write_json
 from rose2_logs.runs.tables import BACK_PROJECTED, TABLES
-from rose2_logs.system.files import OnFailure, require_local, require_utf8
+from rose2_logs.system.files import OnFailure, expanded, require_local, require_utf8
 from rose2_logs.system.workers import usable_cpus
 
 if TYPE_CHECKING:
@@ -152,7 +152,7 @@ def run_batch(
         with tempfile.TemporaryDirectory(prefix="rose2_logs_") as scratch:
             return _run_batch(arguments, Path(scratch), place, options, listener)
     require_local(Path(out))
-    out = Path(os.path.abspath(out))  # noqa: PTH100 (as in find_logs)
+    out = Path(os.path.abspath(expanded(Path(out))))  # noqa: PTH100 (as in find_logs)
     require_utf8(out)
     return _run_batch(arguments, out, "", options, listener)
 

@@ -21,6 +21,7 @@ from rose2_logs.io.discovery import (
     plain_name,
     tell_split_recordings,
 )
+from rose2_logs.system.files import expanded
 
 
 def find_logs(arguments: Sequence[str], out: Path) -> list[Location]:
@@ -75,7 +76,7 @@ def _local_path(argument: str) -> str:
 
 
 def _local(argument: str, out: Path, is_bag_at: Callable[[str], bool]) -> list[str]:
-    path = os.path.abspath(argument)  # noqa: PTH100 (resolves "..", keeps symbolic links)
+    path = os.path.abspath(expanded(Path(argument)))  # noqa: PTH100 (resolves "..", keeps symbolic links)
     if Path(path).exists() or not glob.has_magic(argument):
         matches = [path]
     else:

@@ -19,7 +19,7 @@ from rose2_logs.cli.message_options import MESSAGE_OPTIONS
 from rose2_logs.cli.messages import show_messages
 from rose2_logs.config.parameters import Parameters, load_parameters
 from rose2_logs.config.run_options import METHOD, Option, RunOptions, options_of
-from rose2_logs.system.files import require_local
+from rose2_logs.system.files import expanded, require_local
 
 VALUES = {bool: "", int: "N", str: "NAME", Path: "PATH"}
 """Placeholder in a command's help for the value of an option of this type, where it declares none."""
@@ -93,10 +93,7 @@ def _with_options(command: Callable[..., Any]) -> Callable[..., Any]:
     def with_options(**given: Any) -> Any:
         quiet, verbose, as_json, _ = (given.pop(each) for each in MESSAGE_OPTIONS)
         show_messages(quiet=quiet, verbose=verbose, as_json=as_json)
-        for value in given.values():
-            for path in value if isinstance(value, list) else [value]:
-                if isinstance(path, Path):
-                    require_local(path)
+        given = {name: _local(value) for name, value in given.items()}
         return command(**{each: _built(kind, name, given) for each, kind in made.items()}, **given)
 
     parameters: list[inspect.Parameter] = []
@@ -109,6 +106,17 @@ def _with_options(command: Callable[..., Any]) -> Callable[..., Any]:
     with_options.__annotations__ = {each.name: each.annotation for each in parameters}
     with_options.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
     return with_options
+
+
+def _local(value: Any) -> Any:
+    """Return what was given, paths from the home folder where they begin with ``~/``; URLs are refused."""
+    if isinstance(value, list):
+        return [_local(each) for each in value]
+    if not isinstance(value, Path):
+        return value
+    path = expanded(value)
+    require_local(path)
+    return path
 
 
 def _parameter(name: str, kind: Any, default: Any) -> inspect.Parameter:

@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 from numbers import Integral, Real
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from rose2_logs.config.baselines import METHODS
@@ -20,6 +21,7 @@ from rose2_logs.config.reading import TYPES_WITHOUT_SCHEMA, ReadingParameters
 from rose2_logs.config.regions import DETAIL_MOST
 from rose2_logs.config.times import LONGEST_LOG_S
 from rose2_logs.errors import ParameterError
+from rose2_logs.system.files import expanded
 
 if TYPE_CHECKING:
     from rose2_logs.config.selection import Selection
@@ -444,6 +446,8 @@ class RunOptions:
         object.__setattr__(self, "layers", layers)
         parameters = with_detail(self.parameters, self.detail, self.method)
         object.__setattr__(self, "parameters", parameters)
+        if self.names is not None:
+            object.__setattr__(self, "names", str(expanded(Path(self.names))))
         if self.bag and not self.annotated_log:
             raise ParameterError(
                 "bag=True makes a ROS 2 bag of the annotated MCAP, which annotated_log=False leaves out"

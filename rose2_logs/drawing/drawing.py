@@ -15,7 +15,7 @@ from rose2_logs.drawing.pixels import as_pixels
 from rose2_logs.drawing.shapes import Page
 from rose2_logs.drawing.svg import as_svg
 from rose2_logs.errors import ParameterError
-from rose2_logs.system.files import replacing
+from rose2_logs.system.files import expanded, replacing, require_local
 
 ENDINGS = (".png", ".svg")
 
@@ -58,11 +58,12 @@ class Drawing(Page):
         Raises
         ------
         ParameterError
-            If the file has another ending, or the width is no number of pixels from 1 to 20,000.
+            If the file is a URL or has another ending, or the width is no number of pixels from 1 to 20,000.
         OutputError
             If it cannot be written.
         """
-        path = Path(path)
+        path = expanded(Path(path))
+        require_local(path)
         kind = path.suffix.lower()
         if kind not in ENDINGS:
             raise ParameterError(f"{path}: a drawing is saved as {' or '.join(ENDINGS)}; let its name end so")

@@ -20,6 +20,7 @@ from rose2_logs.runs.parquet_table import Row
 from rose2_logs.runs.stored_run import StoredRun
 from rose2_logs.runs.table import Table
 from rose2_logs.runs.tables import BACK_PROJECTED
+from rose2_logs.system.files import expanded
 from rose2_logs.system.text import counted, percent
 
 if TYPE_CHECKING:
@@ -95,7 +96,7 @@ class Run(StoredRun, Sequence["RunSnapshot"]):
         *,
         part: int | None = None,
     ) -> None:
-        super().__init__(Path(folder), part)
+        super().__init__(expanded(Path(folder)), part)
         self._temporary = None if temporary is None else _TemporaryResults(temporary)
 
     @property

@@ -30,7 +30,7 @@ from rose2_logs.runs.parquet_table import Row
 from rose2_logs.runs.summary import RESULTS_FORMAT, SUMMARY
 from rose2_logs.runs.summary_schema import what_it_lacks
 from rose2_logs.runs.tables import BACK_PROJECTED, ONLY_PART, TABLES, unpack_image
-from rose2_logs.system.files import reason_of, require_utf8
+from rose2_logs.system.files import expanded, reason_of, require_utf8
 from rose2_logs.system.text import counted, percent
 from rose2_logs.tracking.registration import RigidMotion
 
@@ -151,12 +151,12 @@ class StoredRun:
         """Return what a room is called."""
         return room_name(track, self.names.get(track, ""))
 
-    def rename(self, path: Path) -> None:
+    def rename(self, path: str | Path) -> None:
         """Call rooms by other names than the run has stored; those that it names not keep theirs.
 
         Parameters
         ----------
-        path : path
+        path : str or path
             As for the option ``names`` of `RunOptions`; points and outlines are those of the last map, and
             name rooms of its part alone.
 
@@ -170,7 +170,7 @@ class StoredRun:
         last = self.choose()
         below, _ = self.map(last)
         snapshot = OccupancySnapshot(last, 0, 0, "", below.cells, below.geometry)
-        given = names_in(snapshot, path, self.parameters, below.occupancy)
+        given = names_in(snapshot, expanded(Path(path)), self.parameters, below.occupancy)
         rows = self.table("tracks").to_pylist()
         tracks = [row["track"] for row in rows]
         shapes = self.shapes("tracks", [row["polygon_wkb"] for row in rows])
@@ -183,7 +183,7 @@ class StoredRun:
         all_tracks = (
             tracks if self.part is None else StoredRun(self.folder).table("tracks")["track"].to_pylist()
         )
-        tell_unused(path, given.unused(found, all_tracks))
+        tell_unused(Path(path), given.unused(found, all_tracks))
         self.names.update({track: name for track, name in zip(tracks, found, strict=True) if name})
 
     @property

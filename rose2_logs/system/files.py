@@ -114,6 +114,14 @@ def require_utf8(path: Path) -> None:
         ) from error
 
 
+def expanded(path: Path) -> Path:
+    """Return a path from the home folder where it begins with ``~/``, which shells leave in ``--out=~/runs``.
+
+    A name that only begins with the sign is one of a file.
+    """
+    return path.expanduser() if path.parts[:1] == ("~",) else path
+
+
 def require_local(path: Path) -> None:
     """Check that a path is no URL, whose scheme would be the name of a folder.
 

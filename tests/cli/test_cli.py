@@ -496,3 +496,21 @@ def test_a_folder_above_is_told_with_the_one_that_may_have_been_meant(cli, tmp_p
     assert "analyze a folder of many logs as a batch" in err
     _, _, err = cli("segment", tmp_path / "results", "-o", tmp_path / "out")
     assert "is a folder, not a file; name the map in it" in err
+
+
+def test_paths_behind_an_equals_sign_begin_in_the_home_folder(cli, tmp_path: Path, monkeypatch):
+    """Shells leave the sign there as it is."""
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setenv("USERPROFILE", str(tmp_path))
+    (tmp_path / "work").mkdir()
+    monkeypatch.chdir(tmp_path / "work")
+    (tmp_path / "few.toml").write_text("[walls]\nextension_m = 6.0\n")
+    log = str(SAMPLE_LOGS / "office.mcap")
+    few = ("--max-snapshots=1", "--no-rrd", "--no-mcap")
+    assert cli("analyze", log, "--out=~/one", "--config=~/few.toml", *few)[0] == 0
+    assert cli("figure", "~/one/office", "--out=~/plan.svg")[0] == 0
+    assert cli("batch", log, "--out=~/many", *few)[0] == 0
+    assert (tmp_path / "one" / "office" / "summary.json").is_file()
+    assert (tmp_path / "plan.svg").is_file()
+    assert (tmp_path / "many" / "summary.csv").is_file()
+    assert not list((tmp_path / "work").iterdir())

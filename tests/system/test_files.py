@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from rose2_logs.errors import OutputError, ParameterError
-from rose2_logs.system.files import OnFailure, reason_of, replacing, require_local
+from rose2_logs.system.files import OnFailure, expanded, reason_of, replacing, require_local
 
 
 @pytest.mark.parametrize("below", ["file/out.txt", "file/folder/out.txt"])
@@ -56,3 +56,11 @@ def test_a_url_is_no_local_path(url: str):
 @pytest.mark.parametrize("path", ["C:/runs", "runs/s3:", "run 1: first", "12:30", "/data/s3:/x", "a:b/c"])
 def test_a_name_with_a_colon_is_a_local_path(path: str):
     require_local(Path(path))
+
+
+def test_only_a_folder_of_this_name_stands_for_the_home_folder(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("HOME", "/home/ada")
+    monkeypatch.setenv("USERPROFILE", "/home/ada")
+    assert expanded(Path("~/runs/a.bag")) == Path("/home/ada/runs/a.bag")
+    for path in ("~a.bag", "runs/~/a.bag", "/~/a.bag", "a~"):
+        assert expanded(Path(path)) == Path(path)

@@ -22,7 +22,7 @@ from typing import Any
 from urllib.parse import quote
 
 from rose2_logs.errors import LogError, OutputError
-from rose2_logs.system.files import reason_of
+from rose2_logs.system.files import expanded, reason_of
 from rose2_logs.system.guarded_port import is_welcome
 
 VIEWER_PORT = 9876
@@ -95,7 +95,7 @@ def find_recording(named: Path | str) -> str:
     """
     if "://" in str(named):
         return str(named)
-    path = Path(named)
+    path = expanded(Path(named))
     if path.is_file():
         with path.open("rb") as file:
             if file.read(len(MAGIC)) != MAGIC:
