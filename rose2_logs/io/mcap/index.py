@@ -57,6 +57,8 @@ logger = logging.getLogger(__name__)
 _CHUNKS_KEPT = 2
 _KEPT_BYTES = 1 << 24
 """Large chunks, each with a single large map, are not kept together."""
+NAMED_RECORDS = {Opcode.ATTACHMENT: Attachment, Opcode.METADATA: Metadata}
+"""Records with a name, which lie outside chunks; all others are of channels and messages."""
 # What parsing damaged data raises; ValueError includes TooLargeError.
 DAMAGE = (McapError, ValueError, KeyError, EOFError, struct.error)
 
@@ -85,6 +87,7 @@ class McapFile(LogFile):
         self.start_ns = self.end_ns = None
         self._chunks: OrderedDict[int, memoryview] = OrderedDict()
         self._scanned: list[Place] = []
+        self._named_at: dict[int, list[int]] = {opcode: [] for opcode in NAMED_RECORDS}
         try:
             self._stream = CheckedFile(path)
         except OSError as error:
@@ -247,22 +250,36 @@ class McapFile(LogFile):
         return header
 
     def attachments(self) -> Iterator[Attachment]:
-        """Yield the readable attachments that the summary lists."""
-        return self._named(Attachment, [] if self.summary is None else self.summary.attachments)
+        """Yield the readable attachments, one in memory at a time."""
+        return self._named(Opcode.ATTACHMENT)
 
     def metadata(self) -> Iterator[Metadata]:
-        """Yield the readable metadata records that the summary lists."""
-        return self._named(Metadata, [] if self.summary is None else self.summary.metadata)
+        """Yield the readable metadata records."""
+        return self._named(Opcode.METADATA)
 
-    def _named(self, kind: Any, offsets: list[int]) -> Iterator[Any]:
-        for offset in offsets:
+    def _named(self, opcode: Opcode) -> Iterator[Any]:
+        kind = NAMED_RECORDS[opcode]
+        for offset in self._offsets_of(opcode):
             try:
-                yield parsed(kind, memoryview(self._record(offset)))
+                yield parsed(kind, memoryview(self._record(offset, opcode)))
             except DAMAGE as error:
                 text = (
                     f"{self.path}: the {kind.__name__.lower()} at byte {offset} is damaged ({error}); skipped"
                 )
                 log_warning(logger, "damaged_record", text, file=self.path)
+
+    def _offsets_of(self, opcode: Opcode) -> list[int]:
+        """File offsets of the records with a name: those that the summary lists, unless there are more."""
+        if self.summary is None:
+            return self._named_at[opcode]
+        statistics = self.summary.statistics
+        listed, count = {
+            Opcode.ATTACHMENT: (self.summary.attachments, statistics.attachment_count),
+            Opcode.METADATA: (self.summary.metadata, statistics.metadata_count),
+        }[opcode]
+        if len(listed) >= count:
+            return listed
+        return [begin for begin, found, _ in self._heads() if found == opcode]
 
     def messages_in(self, chunk: ChunkIndex) -> list[StoredMessage]:
         """Messages of one chunk in log time order; raises the errors of `DAMAGE` if it cannot be read."""
@@ -284,6 +301,21 @@ class McapFile(LogFile):
         """Yield the records of the data section, one in memory at a time, as far as the file is readable.
 
         For a scan, a truncated file gives a warning, and only the head of messages outside chunks is read.
+        Attachments and metadata records are left empty.
+        """
+        for begin, opcode, length in self._heads(is_scan):
+            if opcode in NAMED_RECORDS:
+                yield Record(begin, opcode, memoryview(b""))
+            elif opcode in (Opcode.MESSAGE, Opcode.CHUNK, Opcode.SCHEMA, Opcode.CHANNEL):
+                needed = min(length, MESSAGE.size) if is_scan and opcode == Opcode.MESSAGE else length
+                # Too large: left empty, which every reader treats as damage.
+                content = self._stream.read(needed if needed <= self.limits.chunk_max_bytes else 0)
+                yield Record(begin, opcode, memoryview(content))
+
+    def _heads(self, is_scan: bool = False) -> Iterator[tuple[int, int, int]]:
+        """Yield offset, kind and length of the records of the data section; each is to be read right away.
+
+        What is left of a truncated file is yielded only of a chunk.
         """
         size = self._stream.seek(0, 2)
         begin = len(MAGIC)
@@ -298,15 +330,11 @@ class McapFile(LogFile):
                     text = f"{self.path}: truncated or damaged after {begin} bytes; everything before is read"
                     log_warning(logger, "cut_off", text, file=self.path)
                 if opcode == Opcode.CHUNK and length <= self.limits.chunk_max_bytes:
-                    yield Record(begin, opcode, memoryview(self._stream.read(length)))
+                    yield begin, opcode, length
                 return
             if opcode in (Opcode.DATA_END, Opcode.FOOTER):
                 return
-            if opcode in (Opcode.MESSAGE, Opcode.CHUNK, Opcode.SCHEMA, Opcode.CHANNEL):
-                needed = min(length, MESSAGE.size) if is_scan and opcode == Opcode.MESSAGE else length
-                # Too large: left empty, which every reader treats as damage.
-                content = self._stream.read(needed if needed <= self.limits.chunk_max_bytes else 0)
-                yield Record(begin, opcode, memoryview(content))
+            yield begin, opcode, length
             begin = end
 
     def _scan(self) -> None:
@@ -314,6 +342,9 @@ class McapFile(LogFile):
         size = self._stream.seek(0, 2)
         for record in self._records(is_scan=True):
             try:
+                if record.opcode in NAMED_RECORDS:
+                    self._named_at[record.opcode].append(record.offset)
+                    continue
                 if record.opcode != Opcode.CHUNK:
                     self._take(record, record.offset, -1)
                     continue
@@ -363,10 +394,12 @@ class McapFile(LogFile):
             self._chunks.popitem(last=False)
         return records
 
-    def _record(self, begin: int) -> bytes:
-        """Content of the record at a file offset."""
+    def _record(self, begin: int, wanted: Opcode | None = None) -> bytes:
+        """Content of the record at a file offset, of a kind if one is wanted."""
         self._stream.seek(begin)
         opcode, length = RECORD.unpack(read_exactly(self._stream, RECORD.size))
+        if wanted is not None and opcode != wanted:
+            raise ValueError("the index points to another record")
         if length > self.limits.chunk_max_bytes:
             raise ValueError(f"it claims {length} bytes; {REMEDY}")
         return self._stream.read(length) if opcode == Opcode.CHUNK else read_exactly(self._stream, length)

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from mcap.exceptions import McapError
+from mcap.records import Attachment, Metadata
 
 from rose2_logs.drawing.extent import Extent
 from rose2_logs.drawing.robot_trail import RobotTrail
@@ -20,11 +21,12 @@ from rose2_logs.io import open_source
 from rose2_logs.io.grids import GRID_TYPE
 from rose2_logs.io.mcap.index import DAMAGE
 from rose2_logs.io.source import MessageSource
-from rose2_logs.outputs.mcap.bag_metadata import RECORD_NAME, version_record, write_bag_metadata
-from rose2_logs.outputs.mcap.check import Tallies, checked_copy
+from rose2_logs.outputs.mcap.bag_metadata import version_record, write_bag_metadata
+from rose2_logs.outputs.mcap.check import RecordTallies, Tallies, checked_copy
 from rose2_logs.outputs.mcap.input import (
     LATCHED_QOS,
     NAMED_LATCHED_QOS,
+    RECORD_NAME,
     CopiedChannel,
     CopiedChunk,
     CopiedLog,
@@ -121,7 +123,7 @@ class AnnotatedMcap(Sink):
         self._writer = McapWriter(file, log.profile, library)
         self._channels: dict[int, int] = {}
         self._schemas: dict[int | tuple[str, str, bytes], int] = {}
-        self._input, self._own = Tallies(), Tallies()
+        self._input, self._own, self._records = Tallies(), Tallies(), RecordTallies()
         self._items = self._input.watched(log.messages())
         self._waiting: CopiedMessage | CopiedChunk | None = None
         # Messages of a chunk that had to be unpacked; they are next.
@@ -134,31 +136,24 @@ class AnnotatedMcap(Sink):
             if channel.topic == info.topic:
                 map_metadata = channel.metadata
         for attachment in log.attachments():
-            self._writer.add_attachment(
-                attachment.create_time,
-                attachment.log_time,
-                attachment.name,
-                attachment.media_type,
-                attachment.data,
-            )
+            self._add_record(attachment)
         names = set()
         for record in log.metadata():
             names.add(record.name)
-            self._writer.add_metadata(record.name, record.metadata)
+            self._add_record(record)
         self._map_qos = map_metadata.get("offered_qos_profiles", "")
         self._qos = self._added_qos(has_version=RECORD_NAME in names)
         self._added = {topic: self._add_channel(topic, kind) for topic, kind in ADDED.items()}
         self._own_map = self._map_channel()
-        self._writer.add_metadata(
-            METADATA, {name: str(value) for name, value in (info.versions | info.provenance).items()}
-        )
+        made_by = {name: str(value) for name, value in (info.versions | info.provenance).items()}
+        self._add_record(Metadata(METADATA, made_by))
 
     def _added_qos(self, *, has_version: bool) -> str:
         """Quality of service of the added topics: that of the map, else of maps in the log's notation."""
         texts = [channel.metadata.get("offered_qos_profiles", "") for channel in self._log.channels()]
         is_named = any(NAMED_QOS.search(text) for text in texts)
         if self._log.profile == "ros2" and not has_version and not is_named:
-            self._writer.add_metadata(RECORD_NAME, version_record())
+            self._add_record(Metadata(RECORD_NAME, version_record()))
         if self._map_qos.strip() not in ("", "[]"):
             return self._map_qos
         return NAMED_LATCHED_QOS if is_named else LATCHED_QOS
@@ -206,7 +201,7 @@ class AnnotatedMcap(Sink):
         with self._writing():
             self._copy_until(None)
             text = json.dumps(self._info.parameters.resolved(), indent=2)
-            self._writer.add_attachment(0, 0, ATTACHMENT, "application/json", text.encode())
+            self._add_record(Attachment(0, 0, ATTACHMENT, "application/json", text.encode()))
             self._writer.finish()
             if self._file is not None:
                 self._file.close()
@@ -228,7 +223,9 @@ class AnnotatedMcap(Sink):
     def _checked(self) -> dict[str, Any]:
         # Channels without messages were copied too.
         read = {number: self._input[key] for key, number in self._channels.items()}
-        return checked_copy(self._part, str(self._path), read, self._own, self._input.closed_chunks)
+        return checked_copy(
+            self._part, str(self._path), read, self._own, self._input.closed_chunks, self._records
+        )
 
     def _copy_until(self, time_ns: int | None) -> None:
         """Copy what was logged up to a time; a chunk that extends beyond it is unpacked."""
@@ -314,6 +311,16 @@ class AnnotatedMcap(Sink):
     def _add(self, channel: int, time_ns: int, data: bytearray) -> None:
         self._own[channel].add(time_ns, time_ns, self._sequence, data)
         self._writer.add_message(channel, time_ns, data, time_ns, self._sequence)
+
+    def _add_record(self, record: Attachment | Metadata) -> None:
+        """Write an attachment or a metadata record."""
+        self._records.add(record)
+        if isinstance(record, Attachment):
+            self._writer.add_attachment(
+                record.create_time, record.log_time, record.name, record.media_type, record.data
+            )
+        else:
+            self._writer.add_metadata(record.name, record.metadata)
 
     def abandon(self) -> None:
         """Close both files, and remove the output if it has not been renamed yet."""

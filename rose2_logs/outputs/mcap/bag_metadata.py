@@ -15,8 +15,6 @@ from rose2_logs.system.files import replacing
 
 VERSION = 5
 """Version of the format: that of Humble, which all later releases can read."""
-RECORD_NAME = "rosbag2"
-"""Name of the record of an MCAP in which rosbag2 looks for the version."""
 
 
 def version_record() -> dict[str, str]:

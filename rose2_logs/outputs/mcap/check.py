@@ -17,13 +17,16 @@ from typing import IO, Any
 
 from mcap.opcode import Opcode
 from mcap.reader import make_reader
+from mcap.records import Attachment, Metadata
+from mcap.summary import Summary
 
 from rose2_logs.errors import OutputError
-from rose2_logs.io.mcap.index import DAMAGE
-from rose2_logs.io.mcap.records import MAGIC, MESSAGE, RECORD, chunk_records, records_in
+from rose2_logs.io.mcap.index import DAMAGE, NAMED_RECORDS
+from rose2_logs.io.mcap.records import MAGIC, MESSAGE, RECORD, chunk_records, parsed, records_in
 from rose2_logs.outputs.mcap.input import CopiedChunk, CopiedMessage
 
 HASH_BYTES = 16
+REMEDY = "try another disk, or leave out the annotated MCAP (annotated_log=False)"
 LARGEST_CHUNK_BYTES = 1 << 30
 """A chunk that claims to be larger is copied without being checked."""
 
@@ -37,10 +40,11 @@ class Tally:
     messages: int = 0
     hashes: int = 0
 
-    def add(self, log_time: int, publish_time: int, sequence: int, data: Any) -> None:
-        """Add a message."""
+    def add(self, log_time: int, publish_time: int, sequence: int, *data: Any) -> None:
+        """Add a message; its data may be in parts."""
         digest = hashlib.sha256(_TIMES.pack(log_time, publish_time, sequence))
-        digest.update(data)
+        for part in data:
+            digest.update(part)
         self.messages += 1
         self.hashes += int.from_bytes(digest.digest()[:HASH_BYTES], "little")
 
@@ -59,11 +63,28 @@ class Tally:
         return {"messages": self.messages, "hash": self.hash}
 
 
+class RecordTallies(defaultdict[str, Tally]):
+    """The tally of the records that are no messages: ``attachments`` and ``metadata records``."""
+
+    def __init__(self) -> None:
+        super().__init__(Tally)
+
+    def add(self, record: Attachment | Metadata) -> None:
+        """Count a record."""
+        if isinstance(record, Attachment):
+            name = repr((record.name, record.media_type)).encode()
+            self["attachments"].add(record.log_time, record.create_time, 0, name, record.data)
+        else:
+            self["metadata records"].add(0, 0, 0, repr((record.name, record.metadata)).encode())
+
+
 class Tallies(defaultdict[int, Tally]):
     """The tally of each channel, by its id.
 
     Attributes
     ----------
+    records : RecordTallies
+        That of the records that are no messages.
     closed_chunks : int
         Number of chunks that cannot be checked because they are damaged or too large. Their messages are not
         counted.
@@ -71,6 +92,7 @@ class Tallies(defaultdict[int, Tally]):
 
     def __init__(self) -> None:
         super().__init__(Tally)
+        self.records = RecordTallies()
         self.closed_chunks = 0
 
     def watched(self, items: Iterable[CopiedMessage | CopiedChunk]) -> Iterator[CopiedMessage | CopiedChunk]:
@@ -95,7 +117,7 @@ class Tallies(defaultdict[int, Tally]):
         self._take_chunk(chunk.stream, chunk.index.chunk_length - RECORD.size)
 
     def take_file(self, file: IO[bytes]) -> None:
-        """Count the messages of an MCAP file up to the end of its data section.
+        """Count what an MCAP file holds up to the end of its data section.
 
         Raises
         ------
@@ -115,6 +137,8 @@ class Tallies(defaultdict[int, Tally]):
                 self._take_chunk(file, length)
             elif opcode == Opcode.MESSAGE:
                 _take_message(self, memoryview(file.read(length)))
+            elif opcode in NAMED_RECORDS:
+                self.records.add(parsed(NAMED_RECORDS[opcode], memoryview(file.read(length))))
             file.seek(end)
 
     def _take_chunk(self, file: IO[bytes], length: int) -> None:
@@ -139,7 +163,12 @@ def _take_message(tallies: dict[int, Tally], message: memoryview) -> None:
 
 
 def checked_copy(
-    path: Path, name: str, copied: dict[int, Tally], added: dict[int, Tally], closed_chunks: int
+    path: Path,
+    name: str,
+    copied: dict[int, Tally],
+    added: dict[int, Tally],
+    closed_chunks: int,
+    records: RecordTallies,
 ) -> dict[str, Any]:
     """Read a written file back and compare it with what should have been written.
 
@@ -153,6 +182,8 @@ def checked_copy(
         What was read from the input and what was added to it, by the channel ids of the file.
     closed_chunks : int
         Number of chunks of the input that cannot be checked.
+    records : RecordTallies
+        Attachments and metadata records, copied and added.
 
     Returns
     -------
@@ -162,7 +193,7 @@ def checked_copy(
     Raises
     ------
     OutputError
-        If a message is missing, differs, or was not expected.
+        If a message or a record is missing, differs, or was not expected.
     """
     found = Tallies()
     try:
@@ -182,8 +213,7 @@ def checked_copy(
         if expected.as_json() != got.as_json() or indexed != got.messages:
             raise OutputError(
                 f"{name}: {channel.topic} has {got.messages} messages (hash {got.hash}) after writing, "
-                f"instead of {expected.messages} (hash {expected.hash}); "
-                "try another disk, or leave out the annotated MCAP (annotated_log=False)"
+                f"instead of {expected.messages} (hash {expected.hash}); {REMEDY}"
             )
         if number in added:
             channels.append({"topic": channel.topic, "added": got.as_json()})
@@ -191,7 +221,21 @@ def checked_copy(
             channels.append({"topic": channel.topic, "input": expected.as_json(), "output": got.as_json()})
     if set(found) - set(summary.channels):
         raise OutputError(f"{name}: has messages of channels that its summary does not list")
+    _check_records(name, records, found.records, summary)
     return {
         "channels": channels,
         "chunks_not_looked_into": {"input": closed_chunks, "output": found.closed_chunks},
     }
+
+
+def _check_records(name: str, expected: RecordTallies, found: RecordTallies, summary: Summary) -> None:
+    """Raise an OutputError unless the records that are no messages are those that were written."""
+    for kind, listed in (
+        ("attachments", len(summary.attachment_indexes)),
+        ("metadata records", len(summary.metadata_indexes)),
+    ):
+        if expected[kind] != found[kind] or listed != found[kind].messages:
+            raise OutputError(
+                f"{name}: has {found[kind].messages} {kind} after writing, {listed} in its index, instead of "
+                f"{expected[kind].messages}; {REMEDY}"
+            )

@@ -8,6 +8,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from itertools import chain
 from typing import IO, Any
 
 from mcap.records import Attachment, ChunkIndex, Metadata
@@ -21,6 +22,9 @@ from rose2_logs.outputs.mcap.ros_messages import ros2_typestore
 from rose2_logs.system.warnings import log_warning
 
 logger = logging.getLogger(__name__)
+
+RECORD_NAME = "rosbag2"
+"""Name of the record of an MCAP in which rosbag2 looks for the version of its metadata."""
 
 LATCHED_QOS = (
     "- history: 1\n  depth: 1\n  reliability: 1\n  durability: 1\n"
@@ -245,6 +249,14 @@ class _Files(CopiedLog):
         streams = [self._messages_of(number) for number in range(len(self._files))]
         yield from heapq.merge(*streams, key=lambda message: message.log_time)
 
+    def attachments(self) -> Iterator[Attachment]:
+        return chain.from_iterable(file.attachments() for file in self._files if isinstance(file, McapFile))
+
+    def metadata(self) -> Iterator[Metadata]:
+        """Yield the records of all files, but for those in which rosbag2 describes each of the files."""
+        records = chain.from_iterable(file.metadata() for file in self._files if isinstance(file, McapFile))
+        return (record for record in records if record.name != RECORD_NAME)
+
     def _messages_of(self, number: int) -> Iterator[CopiedMessage]:
         file = self._files[number]
         for message in file.messages():
@@ -315,10 +327,13 @@ def _definitions(channels: Sequence[Channel]) -> dict[str, Any]:
 
 
 def qos_of_version_8(text: str) -> str:
-    """Quality of service as rosbag2 wrote it up to version 8, with numbers; empty if it cannot be read."""
+    """Quality of service as rosbag2 wrote it up to version 8, with numbers; empty if it cannot be read.
+
+    Where there is none, the text stays as it is.
+    """
     from rosbags.rosbag2.metadata import dump_qos_v8, parse_qos
 
     try:
-        return str(dump_qos_v8(parse_qos(text)))
+        return str(dump_qos_v8(parse_qos(text))) or text
     except Exception:  # whatever the parser raises; an unreadable profile is left empty
         return "[]"

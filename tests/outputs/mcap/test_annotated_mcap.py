@@ -15,7 +15,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mcap.reader import make_reader
-from mcap.writer import CompressionType, Writer
+from mcap.records import Attachment, Metadata
+from mcap.writer import CompressionType, IndexType, Writer
 from rosbags.highlevel import AnyReader
 from saved_maps import save_run
 
@@ -172,6 +173,94 @@ def test_channels_of_other_encodings_attachments_and_empty_channels_are_kept(tmp
         )
         assert {item.name for item in reader.iter_attachments()} == {"a.txt", ATTACHMENT}
         assert {"site", METADATA} <= {record.name for record in reader.iter_metadata()}
+
+
+def office_with_records(
+    path: Path, *, number: int = 0, qos: str = "", without: IndexType = IndexType.NONE, chunks: bool = True
+) -> Path:
+    """Write the maps of the office after two attachments and two records, one each at the end."""
+    with LOGS["sample mcap"].open("rb") as source, path.open("wb") as target:
+        writer = Writer(target, use_chunking=chunks, index_types=IndexType.ALL & ~without)
+        writer.start("ros2", "test")
+        writer.add_attachment(1, 2, "a.yaml", "text/yaml", b"x: %d" % number)
+        writer.add_metadata("robot", {"serial": str(number)})
+        writer.add_metadata("rosbag2", {"ROS_DISTRO": "humble"})
+        channel_id = None
+        for kind, _, message in make_reader(source).iter_messages(topics=["/map"]):
+            if channel_id is None:
+                schema = writer.register_schema(kind.name, kind.encoding, kind.data)
+                channel_id = writer.register_channel("/map", "cdr", schema, {"offered_qos_profiles": qos})
+            time = message.log_time + number * 10**12
+            writer.add_message(channel_id, time, message.data, time)
+        writer.add_attachment(3, 4, "b.bin", "", bytes(1000))
+        writer.add_metadata("end", {})
+        writer.finish()
+    return path
+
+
+def records_of(path: Path) -> tuple[list[Attachment], list[Metadata]]:
+    """What is neither a record of rosbag2 nor added, as another reader finds it by the index."""
+    with path.open("rb") as file:
+        reader = make_reader(file)
+        attachments = [item for item in reader.iter_attachments() if item.name != ATTACHMENT]
+        metadata = [each for each in reader.iter_metadata() if each.name not in (METADATA, "rosbag2")]
+    return attachments, metadata
+
+
+@pytest.mark.parametrize("form", ["no chunks", "not listed", "cut off"])
+def test_attachments_and_metadata_are_kept_where_no_index_lists_them(tmp_path, form):
+    log = office_with_records(
+        tmp_path / "run.mcap",
+        chunks=form != "no chunks",
+        without=IndexType.ATTACHMENT | IndexType.METADATA if form == "not listed" else IndexType.NONE,
+    )
+    if form == "cut off":
+        log.write_bytes(log.read_bytes()[:-40])
+    path = annotate(log, tmp_path / "out")
+    assert records_of(path) == records_of(office_with_records(tmp_path / "whole.mcap"))
+
+
+def test_attachments_and_metadata_of_all_files_of_a_bag_are_kept(tmp_path):
+    """But for what rosbag2 tells of each file; a quality of service that is not known stays so."""
+    bag = tmp_path / "bag"
+    bag.mkdir()
+    files = [office_with_records(bag / f"bag_{number}.mcap", number=number, qos="[]") for number in range(2)]
+    described = {
+        "version": 5,
+        "storage_identifier": "mcap",
+        "relative_file_paths": [file.name for file in files],
+        "duration": {"nanoseconds": 1},
+        "starting_time": {"nanoseconds_since_epoch": 1},
+        "message_count": 80,
+        "topics_with_message_count": [],
+        "compression_format": "",
+        "compression_mode": "",
+    }
+    (bag / "metadata.yaml").write_text(json.dumps({"rosbag2_bagfile_information": described}))
+    path = annotate(bag, tmp_path / "out")
+    (attachments, metadata), (others, more) = map(records_of, files)
+    assert records_of(path) == (attachments + others, metadata + more)
+    with path.open("rb") as file:
+        reader = make_reader(file)
+        (version,) = [each.metadata for each in reader.iter_metadata() if each.name == "rosbag2"]
+        channels = reader.get_summary().channels.values()
+    assert "serialized_metadata" in version
+    assert [each.metadata for each in channels if each.topic == "/map"] == [
+        {"offered_qos_profiles": "[]"}
+    ] * 2
+
+
+def test_a_record_that_the_index_does_not_point_to_is_told(tmp_path, caplog):
+    """Nothing else is taken for it."""
+    log = office_with_records(tmp_path / "run.mcap")
+    with log.open("rb") as file:
+        listed = make_reader(file).get_summary().attachment_indexes[1].offset
+    data = bytearray(log.read_bytes())
+    data[listed] = 0x7F  # a kind of record that readers skip
+    log.write_bytes(data)
+    path = annotate(log, tmp_path / "out")
+    assert [item.name for item in records_of(path)[0]] == ["a.yaml"]
+    assert f"the attachment at byte {listed} is damaged" in caplog.text
 
 
 def test_an_annotated_log_is_not_annotated_again_and_nothing_is_left_behind(tmp_path):

@@ -8,12 +8,13 @@ from pathlib import Path
 
 import pytest
 from mcap.reader import make_reader
+from mcap.records import Attachment
 from mcap.writer import CompressionType, IndexType, Writer
 from saved_maps import save_run
 
 from rose2_logs.errors import OutputError
 from rose2_logs.outputs.mcap import annotated as annotated_mcap
-from rose2_logs.outputs.mcap.check import Tallies, Tally, checked_copy
+from rose2_logs.outputs.mcap.check import RecordTallies, Tallies, Tally, checked_copy
 from rose2_logs.workflows.analyze import RunOptions, analyze_log
 
 OFFICE = Path(__file__).parents[3] / "sample_logs" / "office.mcap"
@@ -73,14 +74,15 @@ def test_another_file_is_refused(tmp_path: Path, changed):
     path = tmp_path / "copy.mcap"
     path.write_bytes(mcap(changed))
     with pytest.raises(OutputError, match=r"run\.mcap: /[ab] has \d+ messages .* after writing"):
-        checked_copy(path, "run.mcap", tallies(mcap()), {}, 0)
+        checked_copy(path, "run.mcap", tallies(mcap()), {}, 0, RecordTallies())
 
 
 def test_what_is_equal_is_told_by_channel(tmp_path: Path):
     """Also of a channel without a message, and of channels that were added."""
     path = tmp_path / "copy.mcap"
     path.write_bytes(mcap())
-    told = checked_copy(path, "run.mcap", {1: tallies(mcap())[1], 3: Tally()}, {2: tallies(mcap())[2]}, 0)
+    copied, added = {1: tallies(mcap())[1], 3: Tally()}, {2: tallies(mcap())[2]}
+    told = checked_copy(path, "run.mcap", copied, added, 0, RecordTallies())
     by_topic = {each["topic"]: each for each in told["channels"]}
     assert by_topic["/a"]["input"] == by_topic["/a"]["output"] == plain(tallies(mcap()))[1]
     assert by_topic["/b"]["added"]["messages"] == 10
@@ -92,7 +94,7 @@ def test_a_file_that_is_cut_off_is_refused(tmp_path: Path, cut: int):
     path = tmp_path / "copy.mcap"
     path.write_bytes(mcap()[:cut])
     with pytest.raises(OutputError, match="reads back differently"):
-        checked_copy(path, "run.mcap", tallies(mcap()), {}, 0)
+        checked_copy(path, "run.mcap", tallies(mcap()), {}, 0, RecordTallies())
 
 
 def test_a_chunk_that_is_damaged_is_not_looked_into():
@@ -140,3 +142,27 @@ def test_a_message_that_is_lost_on_the_way_is_an_error_and_no_file_appears(tmp_p
         analyze_log(maps, tmp_path / "out", RunOptions(recording=False))
     assert len(dropped) == 1
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(("name", "kind"), [("add_attachment", "attachments"), ("add_metadata", "metadata")])
+def test_a_record_that_is_lost_on_the_way_is_an_error_too(tmp_path: Path, monkeypatch, name: str, kind: str):
+    """A writer that drops attachments, or metadata records."""
+    monkeypatch.setattr(annotated_mcap.McapWriter, name, lambda self, *record: None)
+    maps = save_run(tmp_path / "maps")
+    with pytest.raises(OutputError, match=rf"maps\.rose2\.mcap: has 0 {kind} .*instead of [12]; "):
+        analyze_log(maps, tmp_path / "out", RunOptions(recording=False))
+
+
+@pytest.mark.parametrize("changed", [Attachment(1, 2, "a", "", b"y"), Attachment(1, 2, "b", "", b"x"), None])
+def test_attachments_are_compared_with_what_was_written(tmp_path: Path, changed: Attachment | None):
+    """In content, name, and in what the index of the file says of them."""
+    path = tmp_path / "copy.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file, index_types=IndexType.NONE if changed is None else IndexType.ALL)
+        writer.start("x", "y")
+        writer.add_attachment(1, 2, "a", "", b"x")
+        writer.finish()
+    expected = RecordTallies()
+    expected.add(changed or Attachment(1, 2, "a", "", b"x"))
+    with pytest.raises(OutputError, match=r"run\.mcap: has 1 attachments after writing, [01] in its index"):
+        checked_copy(path, "run.mcap", {}, {}, 0, expected)
