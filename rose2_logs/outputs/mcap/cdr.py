@@ -74,9 +74,9 @@ class CdrWriter:
         self.time(stamp_ns)
         self.string(frame_id)
 
-    def points(self, xy_m: NDArray[np.float64], dtype: type[np.floating] = np.float64) -> None:
-        """Append points (N, 2) as a sequence of geometry_msgs/Point, or of Point32 as single precision."""
-        points = np.zeros((len(xy_m), 3), dtype)
+    def points(self, xy_m: NDArray[np.float64]) -> None:
+        """Append points (N, 2) as a sequence of geometry_msgs/Point."""
+        points = np.zeros((len(xy_m), 3))
         points[:, :2] = xy_m
         self.sequence(points)
 

@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 
 ROOMS_TYPE = "rose2_msgs/msg/Rooms"
 ROOM_TYPE = "rose2_msgs/msg/Room"
+RING_TYPE = "rose2_msgs/msg/Ring"
+"""Like geometry_msgs/Polygon, whose single precision is decimeters off in the coordinates of a country."""
 WRITTEN_TYPES = (GRID_TYPE, "visualization_msgs/msg/MarkerArray", ROOMS_TYPE)
 HEADER_TYPE = "std_msgs/msg/Header"
 DEFINITIONS = Path(__file__).parent / "definitions"
@@ -83,7 +85,7 @@ def ros2_typestore(
     written: dict[str, Any] = {}
     for kind in WRITTEN_TYPES:
         written |= get_types_from_msg(definition(kind).decode(), kind)
-    own = {name: written[name] for name in (HEADER_TYPE, ROOMS_TYPE, ROOM_TYPE)}
+    own = {name: written[name] for name in (HEADER_TYPE, ROOMS_TYPE, ROOM_TYPE, RING_TYPE)}
     given = {**written, **(extra or {}), **own}
     found = given if wanted is None else _needed(given, wanted)
     used = {name for fields in found.values() for name in _used(fields)}
@@ -212,8 +214,8 @@ class MessageMaker:
             rings = rooms.outer_rings_m[number - 1]
             message.numbers("I", len(rings))
             for ring in rings:
-                # The last corner of a ring repeats the first; a ROS polygon closes by itself.
-                message.points(ring[:-1], np.float32)
+                # The last corner of a ring repeats the first; as a ROS polygon it closes by itself.
+                message.points(ring[:-1])
             neighbors = sorted(tracks[other - 1] for other in rooms.neighbors(number))
             message.sequence(np.array(neighbors, np.uint32))
         return message.message()
