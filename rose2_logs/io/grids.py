@@ -48,12 +48,13 @@ class MapWarning(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """A whole map: stamp in nanoseconds, geometry, cells (H, W) int8 as they are stored, and warnings."""
+    """A whole map: stamp in nanoseconds, geometry, cells (H, W) int8 as they are stored, warnings, height."""
 
     stamp_ns: int
     geometry: GridGeometry
     cells: Cells
     map_warnings: tuple[MapWarning, ...] = ()
+    z_m: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,11 +147,14 @@ def make_grid(
     cells: Cells,
     map_warnings: list[MapWarning],
 ) -> Grid | None:
-    """Build a grid; `pose` is x, y, z and the quaternion x, y, z, w. None if there are no cells."""
+    """Build a grid; `pose` is x, y, z and the quaternion x, y, z, w. None if there are no cells.
+
+    A height that is no finite number is taken as 0: nothing that is found depends on it.
+    """
     if cells.size == 0:
         return None
-    x, y, _, *quaternion = pose
+    x, y, z, *quaternion = pose
     height, width = cells.shape
     yaw_rad = flat_yaw_of((quaternion[0], quaternion[1], quaternion[2], quaternion[3]), map_warnings)
     geometry = GridGeometry(resolution_m, (x, y), yaw_rad, frame_id, (height, width))
-    return Grid(stamp_ns, geometry, cells, tuple(map_warnings))
+    return Grid(stamp_ns, geometry, cells, tuple(map_warnings), z if z and math.isfinite(z) else 0.0)

@@ -124,7 +124,7 @@ class MapStream:
         # Cells that belong to a message or a snapshot are not modified.
         cells = self._map.cells.copy() if self._cells_are_shared else self._map.cells
         cells[top : top + height, left : left + width] = message.cells
-        self._map = Grid(message.stamp_ns, self._map.geometry, cells)
+        self._map = Grid(message.stamp_ns, self._map.geometry, cells, z_m=self._map.z_m)
         self._cells_are_shared = False
         self._counts.updates_applied += 1
 
@@ -160,6 +160,7 @@ class MapStream:
             self._repeats,
             is_percent=True,
             read_by=self._occupancy,
+            z_m=now.z_m,
         )
         self._yielded = now
         self._index += 1

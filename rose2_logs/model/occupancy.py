@@ -204,6 +204,8 @@ class OccupancySnapshot:
         their values what they mean.
     read_by : OccupancyParameters, optional
         What a reader has read the cells by; none of a map that no reader made.
+    z_m : float
+        Height of the grid in the world, at which the annotated MCAP shows what was found.
 
     Raises
     ------
@@ -228,6 +230,7 @@ class OccupancySnapshot:
     repeats_before: int = 0
     is_percent: bool = False
     read_by: OccupancyParameters | None = None
+    z_m: float = 0.0
 
     def __repr__(self) -> str:
         return f"OccupancySnapshot(index={self.index}, topic={self.topic!r}, {self.geometry.size_text})"

@@ -113,6 +113,15 @@ def test_any_quaternion_about_z_gives_its_yaw(quaternion, yaw):
     assert abs(math.remainder(difference, 2 * math.pi)) < 1e-6
 
 
+@pytest.mark.parametrize(("written", "read"), [(3.5, 3.5), (math.nan, 0.0), (math.inf, 0.0)])
+def test_a_grid_has_the_height_of_its_origin(written, read):
+    """Rooms do not depend on it, so that a height that is none costs no map."""
+    store = typestore(2)
+    message = store.deserialize_cdr(serialized(Map(np.zeros((2, 3))), 2), GRID)
+    message.info.origin.position.z = written
+    assert decode(bytes(store.serialize_cdr(message, GRID))).z_m == read
+
+
 def test_values_outside_the_range_of_occupancy_count_as_unknown():
     cells = np.array([[-128, -2, -1, 0, 100, 101, 127]], np.int8)
     read = STORED.of(decode(serialized(Map(cells), 2)))

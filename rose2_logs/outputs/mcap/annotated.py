@@ -102,6 +102,7 @@ class AnnotatedMcap(Sink):
         self._extent = Extent()
         self._trail = RobotTrail()
         self._frame_id = ""
+        self._z_m = 0.0
         self._file: IO[bytes] | None = None
         self.facts: dict[str, Any] = {}
 
@@ -180,7 +181,7 @@ class AnnotatedMcap(Sink):
         self._extent.add(step)
         self._trail.add(step.path)
         sizes = MarkerSizes.of_view(view_height_m(self._extent.low_m, self._extent.high_m, aspect=1.0))
-        self._frame_id = step.analysis.geometry.frame_id
+        self._frame_id, self._z_m = step.analysis.geometry.frame_id, step.snapshot.z_m
         with self._writing():
             self._copy_until(time_ns)
             messages = {
@@ -214,7 +215,13 @@ class AnnotatedMcap(Sink):
         """Write the layouts for viewers and, if wanted, the bag's description."""
         extent = self._extent
         scene = MapScene(
-            self._frame_id, self._info.topic, extent.low_m, extent.high_m, self._map_qos, self._qos
+            self._frame_id,
+            self._info.topic,
+            extent.low_m,
+            extent.high_m,
+            self._map_qos,
+            self._qos,
+            self._z_m,
         )
         write_layouts(self._path, scene)
         if self._is_bag:

@@ -74,9 +74,9 @@ class CdrWriter:
         self.time(stamp_ns)
         self.string(frame_id)
 
-    def points(self, xy_m: NDArray[np.float64]) -> None:
-        """Append points (N, 2) as a sequence of geometry_msgs/Point."""
-        points = np.zeros((len(xy_m), 3))
+    def points(self, xy_m: NDArray[np.float64], z_m: float = 0.0) -> None:
+        """Append points (N, 2), all at one height, as a sequence of geometry_msgs/Point."""
+        points = np.full((len(xy_m), 3), z_m)
         points[:, :2] = xy_m
         self.sequence(points)
 

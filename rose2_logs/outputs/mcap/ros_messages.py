@@ -201,7 +201,7 @@ class MessageMaker:
 
     def rooms(self, step: TrackedSnapshot) -> bytearray:
         """Make the rooms message, by ascending track."""
-        rooms, tracks = step.analysis.rooms, step.track_ids
+        rooms, tracks, z_m = step.analysis.rooms, step.track_ids, step.snapshot.z_m
         message = CdrWriter()
         message.header(step.snapshot.stamp_ns, step.analysis.geometry.frame_id)
         message.numbers("d2I", step.coverage, len(rooms), len(rooms))  # the count, the sequence's length
@@ -210,12 +210,12 @@ class MessageMaker:
             shape = rooms.polygons[number - 1]
             message.numbers("I", track)
             message.string(step.given_name(number - 1))
-            message.numbers("5d", float(rooms.areas_m2[number - 1]), shape.area, *points[number - 1], 0.0)
+            message.numbers("5d", float(rooms.areas_m2[number - 1]), shape.area, *points[number - 1], z_m)
             rings = rooms.outer_rings_m[number - 1]
             message.numbers("I", len(rings))
             for ring in rings:
                 # The last corner of a ring repeats the first; as a ROS polygon it closes by itself.
-                message.points(ring[:-1])
+                message.points(ring[:-1], z_m)
             neighbors = sorted(tracks[other - 1] for other in rooms.neighbors(number))
             message.sequence(np.array(neighbors, np.uint32))
         return message.message()
@@ -285,7 +285,8 @@ class MessageMaker:
         # RViz calls a marker without points an error.
         markers = [each for each in markers if len(each.points_m) or each.kind == TEXT or each.action != ADD]
         # At different heights, so that layers do not flicker through each other or through the map.
-        heights = {name: LAYER_STEP_M * (layer + 1) for layer, name in enumerate(MARKER_LAYERS)}
+        base_m = step.snapshot.z_m
+        heights = {name: base_m + LAYER_STEP_M * (layer + 1) for layer, name in enumerate(MARKER_LAYERS)}
         message = CdrWriter()
         message.numbers("I", len(markers))
         shared = SharedFields.of(step.snapshot.stamp_ns, analysis.geometry.frame_id)
@@ -362,7 +363,7 @@ class Marker:
     position_m: tuple[float, float] = (0.0, 0.0)
 
     def write(self, message: CdrWriter, shared: SharedFields, height_m: float) -> None:
-        """Append the marker, at a height above the map."""
+        """Append the marker, at a height in the world."""
         width_m = self.width_m
         lifetime, frame_locked = (0, 0), 0  # forever; where it was
         message.written(shared.header, 4)
@@ -387,14 +388,15 @@ def room_value(track: int) -> int:
 
 
 def _grid(step: TrackedSnapshot, cells: NDArray[np.int8]) -> bytearray:
-    """Make a nav_msgs/OccupancyGrid with the stamp and the geometry of the map."""
+    """Make a nav_msgs/OccupancyGrid with the stamp, the geometry and the height of the map."""
     geometry, stamp_ns = step.analysis.geometry, step.snapshot.stamp_ns
     message = CdrWriter()
     message.header(stamp_ns, geometry.frame_id)
     message.time(stamp_ns)  # map_load_time
     message.numbers("f2I", geometry.resolution_m, geometry.shape[1], geometry.shape[0])
     half = geometry.yaw_rad / 2
-    message.numbers("7d", *geometry.origin_xy_m, 0.0, 0.0, 0.0, float(np.sin(half)), float(np.cos(half)))
+    origin_m = (*geometry.origin_xy_m, step.snapshot.z_m)
+    message.numbers("7d", *origin_m, 0.0, 0.0, float(np.sin(half)), float(np.cos(half)))
     message.sequence(cells.astype(np.int8, copy=False).ravel())
     return message.message()
 

@@ -50,6 +50,8 @@ class MapScene:
         Quality of service that the map is offered with, in rosbag2's notation; empty if it is not known.
     qos : str
         The same of the added topics.
+    z_m : float
+        Height of the map in its frame.
     """
 
     frame_id: str
@@ -58,6 +60,7 @@ class MapScene:
     high_m: FloatArray
     map_qos: str
     qos: str
+    z_m: float = 0.0
 
     @property
     def center_m(self) -> tuple[float, float]:
@@ -167,7 +170,7 @@ def _foxglove_world(title: str, scene: MapScene, topics: dict[str, Any], aspect:
             "thetaOffset": 0,
             "distance": scene.height_m(aspect),
             "target": [0, 0, 0],
-            "targetOffset": [x, y, 0],
+            "targetOffset": [x, y, scene.z_m or 0],
             "targetOrientation": [0, 0, 0, 1],
             "fovy": 45,
             "near": 0.5,

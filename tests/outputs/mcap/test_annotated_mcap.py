@@ -17,6 +17,7 @@ import pytest
 from mcap.reader import make_reader
 from mcap.records import Attachment, Metadata
 from mcap.writer import CompressionType, IndexType, Writer
+from reader_logs import Update, serialized
 from rosbags.highlevel import AnyReader
 from saved_maps import save_run
 
@@ -39,6 +40,9 @@ LOGS = {
     "rosbag2 sqlite3 zstd": SHARED / "fr79.ros2_sqlite3_zstd",
     "costmaps": SHARED / "third_party" / "base_cmaps_mcap",
 }
+
+
+PATCH = "map_msgs/msg/OccupancyGridUpdate"
 
 
 def annotate(log: Path, folder: Path, **changes) -> Path:
@@ -261,6 +265,48 @@ def test_a_record_that_the_index_does_not_point_to_is_told(tmp_path, caplog):
     path = annotate(log, tmp_path / "out")
     assert [item.name for item in records_of(path)[0]] == ["a.yaml"]
     assert f"the attachment at byte {listed} is damaged" in caplog.text
+
+
+def test_what_was_found_lies_at_the_height_of_the_map(tmp_path):
+    """Also where a patch has changed the map; the layers are a little above it."""
+    log, height_m = tmp_path / "run.mcap", 3.5
+    with AnyReader([LOGS["sample mcap"]]) as source:
+        (kept,) = (each for each in source.connections if each.topic == "/map")
+        *_, (_, time, data) = source.messages([kept])
+        message = source.deserialize(data, kept.msgtype)
+        message.info.origin.position.z = height_m
+        lifted = bytes(source.typestore.serialize_cdr(message, kept.msgtype))
+    with log.open("wb") as target:
+        writer = Writer(target)
+        writer.start("ros2", "test")
+        for topic, kind, content in (
+            ("/map", kept.msgtype, lifted),
+            ("/map_updates", PATCH, serialized(Update(3, 3, np.full((2, 2), 100)), 2)),
+        ):
+            schema = writer.register_schema(kind, "ros2msg", b"")
+            channel = writer.register_channel(topic, "cdr", schema)
+            writer.add_message(channel, time + (kind == PATCH), content, time)
+        writer.finish()
+    path = annotate(log, tmp_path / "out")
+    heights = {topic: [] for topic in ADDED}
+    with AnyReader([path]) as found:
+        for connection, _, data in found.messages(
+            [each for each in found.connections if each.topic in ADDED]
+        ):
+            message = found.deserialize(data, connection.msgtype)
+            if connection.topic == "/rose2/markers":
+                heights[connection.topic] += [each.pose.position.z for each in message.markers[1:]]
+            elif connection.topic == "/rose2/rooms":
+                heights[connection.topic] += [each.label_point.z for each in message.rooms]
+                corners = [point for each in message.rooms for ring in each.outline for point in ring.points]
+                assert {point.z for point in corners} == {height_m}
+            else:
+                heights[connection.topic].append(message.info.origin.position.z)
+    markers = heights.pop("/rose2/markers")
+    assert height_m < min(markers) <= max(markers) < height_m + 0.1
+    assert all(set(each) == {height_m} and len(each) >= 2 for each in heights.values())
+    layout = json.loads(path.with_suffix(".foxglove.json").read_text(encoding="utf-8"))
+    assert layout["configById"]["3D!rooms"]["cameraState"]["targetOffset"][2] == height_m
 
 
 def test_an_annotated_log_is_not_annotated_again_and_nothing_is_left_behind(tmp_path):
