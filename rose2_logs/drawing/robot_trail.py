@@ -1,14 +1,16 @@
-"""The robot's path from the start of a run on, thinned so that it can be drawn again with every map."""
+"""The robot's path from the start of a run or of a part on, thinned to be drawn again with every map."""
 
 from __future__ import annotations
 
 import numpy as np
 import shapely
 
+from rose2_logs.io.poses import JUMP_M
 from rose2_logs.model.occupancy import FloatArray
+from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot
 
-GAP_M = 2.0
-"""Poses farther apart are not joined: the robot was put elsewhere, or found itself again."""
+GAP_M = JUMP_M
+"""Poses farther apart are not joined."""
 TOLERANCE_M = 0.02
 """How far the thinned path may be from the poses, at first: less than a cell of most maps."""
 MOST_POINTS = 2000
@@ -16,7 +18,7 @@ MOST_POINTS = 2000
 
 
 class RobotTrail:
-    """Where the robot has been so far.
+    """Where the robot has been so far on the map of a part of the run, in one frame.
 
     Attributes
     ----------
@@ -27,6 +29,14 @@ class RobotTrail:
     def __init__(self) -> None:
         self.pieces_m: list[FloatArray] = []
         self._tolerance_m = TOLERANCE_M
+        self._place: tuple[int | None, str] | None = None
+
+    def follow(self, step: TrackedSnapshot) -> None:
+        """Go on with the poses of a map; the same coordinates are elsewhere in another part or frame."""
+        place = step.part, step.snapshot.geometry.frame_id.lstrip("/")
+        if place != self._place:
+            self.pieces_m, self._tolerance_m, self._place = [], TOLERANCE_M, place
+        self.add(step.path)
 
     def add(self, path: FloatArray | None) -> None:
         """Go on along poses (K, 3): x, y in world meters, yaw in radians."""

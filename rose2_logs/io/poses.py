@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from itertools import islice
+from itertools import islice, pairwise
 
 import numpy as np
 
@@ -38,6 +38,8 @@ POSE_STEP_S = 0.25
 """Minimum time between two poses: at 0.8 m/s a robot moves `POSE_STEP_M` in this time."""
 POSE_STEP_M = 0.2
 """Minimum distance between two poses: well below the width of a door."""
+JUMP_M = 2.0
+"""Poses farther apart than this are no drive: the robot was put elsewhere, or found itself again."""
 LEAD_NS = 10 * 10**9
 """Transforms are read from this long before the first pose on: slow ones are published every second."""
 TRIED_MESSAGES = 3000
@@ -87,22 +89,31 @@ class RobotPath:
         base_frame: str | None = None,
     ) -> None:
         self._start_ns = start_ns or 0
-        wanted = _Wanted(_plain(frame_id) or "map", _namespace(map_topic), _plain(base_frame or ""))
+        wanted = _Wanted(map_frame(frame_id), _namespace(map_topic), _plain(base_frame or ""))
         topics, poses = _choose(source, wanted, self._start_ns)
         self.origin = ", ".join(topics)
         self._poses = poses
         self._next: tuple[int, Pose] | None = next(self._poses, None)
         self._last: Pose | None = None
 
-    def until(self, log_time_ns: int) -> FloatArray:
+    def until(self, log_time_ns: int, *, is_begun_anew: bool = False) -> FloatArray:
         """Return the poses since the previous call.
+
+        Parameters
+        ----------
+        log_time_ns : int
+            Up to when.
+        is_begun_anew : bool
+            Whether the map has been begun anew since then: poses that may be on the map before are left out,
+            those up to the robot's last jump, or all but the last one if it has not jumped.
 
         Returns
         -------
         (K, 3) float
             x, y in meters and yaw in radians; consecutive poses are at least `POSE_STEP_M` apart.
         """
-        taken = []
+        taken = [] if self._last is None else [self._last]
+        known = begin = len(taken)
         while self._next is not None and self._next[0] <= log_time_ns:
             time_ns, pose = self._next
             if time_ns >= self._start_ns and (
@@ -111,7 +122,14 @@ class RobotPath:
                 taken.append(pose)
                 self._last = pose
             self._next = next(self._poses, None)
-        return np.array(taken, float).reshape(-1, 3)
+        if is_begun_anew:
+            jumps = [
+                place
+                for place, (before, now) in enumerate(pairwise(taken), start=1)
+                if math.dist(before[:2], now[:2]) > JUMP_M
+            ]
+            begin = max(known, jumps[-1] if jumps else len(taken) - 1)
+        return np.array(taken[begin:], float).reshape(-1, 3)
 
 
 @dataclass(frozen=True)
@@ -388,6 +406,11 @@ def _composed(outer: Pose, inner: Pose) -> Pose:
         y + sine * inner[0] + cosine * inner[1],
         math.remainder(yaw + inner[2], math.tau),
     )
+
+
+def map_frame(frame_id: str) -> str:
+    """Name of a map's frame without a leading slash; ``map`` if the map says none."""
+    return _plain(frame_id) or "map"
 
 
 def _plain(frame: str) -> str:

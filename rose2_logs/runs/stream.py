@@ -5,20 +5,22 @@ from __future__ import annotations
 import logging
 import math
 import traceback
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from functools import partial
 from pathlib import Path
+
+import numpy as np
 
 from rose2_logs.config.parameters import Parameters
 from rose2_logs.config.run_options import RunOptions
 from rose2_logs.errors import InvalidMapError
 from rose2_logs.io.cell_values import oddity
 from rose2_logs.io.log import LogReader
-from rose2_logs.io.poses import RobotPath
+from rose2_logs.io.poses import RobotPath, map_frame
 from rose2_logs.model.analysis import SnapshotAnalysis
 from rose2_logs.model.explored import coarser_for_its_size
 from rose2_logs.model.far_cells import find_far_cells
-from rose2_logs.model.occupancy import OccupancySnapshot, free_area_m2, is_same_to_analysis
+from rose2_logs.model.occupancy import FloatArray, OccupancySnapshot, free_area_m2, is_same_to_analysis
 from rose2_logs.model.room_names import RoomNames
 from rose2_logs.runs.journal import Found, JournaledWorkers
 from rose2_logs.segmentation.pipeline import analyze
@@ -64,8 +66,9 @@ class TrackedStream:
         What warnings call the log.
     topic : str, optional
         The map topic.
-    path : RobotPath, optional
-        Where the robot was, to be part of the steps.
+    paths : mapping of str to RobotPath, optional
+        Where the robot was, to be part of the steps, in each frame in which it is wanted; maps in other
+        frames have no poses.
     part_at : callable, optional
         Returns the part of the run that the map of a log time is of, None if the run has no parts. Each part
         has its own coverage and tracks.
@@ -91,7 +94,7 @@ class TrackedStream:
         *,
         source: str = "the maps",
         topic: str | None = None,
-        path: RobotPath | None = None,
+        paths: Mapping[str, RobotPath] | None = None,
         part_at: Callable[[int], int | None] = lambda _: None,
         names: RoomNames | None = None,
     ) -> None:
@@ -107,7 +110,7 @@ class TrackedStream:
         self._workers = workers
         self._occupancy = parameters.occupancy
         self._source, self._topic = source, topic
-        self._path = path
+        self._paths = paths
         self._names = names
         self._tracker = RoomTracker(parameters.tracking, parameters.occupancy)
         self._layout = LayoutFollower()
@@ -158,7 +161,7 @@ class TrackedStream:
             parameters,
             source=str(reader.info.path),
             topic=reader.topic,
-            path=reader.robot_path(last.geometry.frame_id, base_frame) if with_path else None,
+            paths=_paths_of(reader, lasts.values(), base_frame) if with_path else None,
             part_at=reader.part_at,
             names=names,
         )
@@ -204,12 +207,22 @@ class TrackedStream:
         tracker, motion = self._tracker, map_motion(events)
         change = self._layout.update(analysis.rooms, tracker.shapes, track_ids, motion, tracker.common)
         coverage = self._coverage(analysis.free_area_m2)
-        poses = None if self._path is None else self._path.until(snapshot.log_time_ns)
+        poses = self._poses(snapshot, is_begun_anew=bool(begun))
         names = self._named(track_ids, analysis)
         quality = analysis.quality
         return TrackedSnapshot(
             snapshot, analysis, coverage, track_ids, begun + events, quality, change, poses, self._part, names
         )
+
+    def _poses(self, snapshot: OccupancySnapshot, *, is_begun_anew: bool) -> FloatArray | None:
+        """Poses of the robot since the map before, in the frame of this one; None if they are not wanted."""
+        if self._paths is None:
+            return None
+        found = {
+            frame: path.until(snapshot.log_time_ns, is_begun_anew=is_begun_anew)
+            for frame, path in self._paths.items()
+        }
+        return found.get(map_frame(snapshot.geometry.frame_id), np.zeros((0, 3)))
 
     def _named(self, track_ids: tuple[int, ...], analysis: SnapshotAnalysis) -> tuple[str, ...]:
         """Name the rooms of a map. What lies at a point of the last part may be anything in another one."""
@@ -232,6 +245,14 @@ class TrackedStream:
         if final_m2 is None:
             return math.nan
         return min(free_m2 / final_m2, 1.0) if final_m2 > 0 else 0.0
+
+
+def _paths_of(
+    reader: LogReader, lasts: Collection[OccupancySnapshot], base_frame: str | None
+) -> dict[str, RobotPath]:
+    """The robot's path in the frame of the last map of each part; that of the last one is the last."""
+    frames = dict.fromkeys(map_frame(each.geometry.frame_id) for each in reversed(list(lasts)))
+    return {frame: reader.robot_path(frame, base_frame) for frame in reversed(frames)}
 
 
 def _analyze_or_refuse(

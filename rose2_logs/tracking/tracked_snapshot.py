@@ -88,7 +88,9 @@ class TrackedSnapshot:
     change : LayoutChange, optional
         How the layout changed since the map before.
     path : (K, 3) float, optional
-        Poses of the robot since the map before: x, y in world meters, yaw in radians.
+        Poses of the robot since the map before: x, y in world meters, yaw in radians. Of a map that begins
+        another part those that may be of the part before are left out; there are none in a frame in which no
+        part ends.
     part : int, optional
         Number of the part, from 1, in a log in which maps were begun anew or are of several publishers.
     names : tuple of R str

@@ -291,6 +291,18 @@ def test_transforms_that_lead_to_no_base_are_told_of(tmp_path, caplog):
         assert len(log.robot_path("map", "chassis").until(2**62)) > 1
 
 
+@pytest.mark.parametrize(("jump", "expected"), [(10.0, [13.0, 14.0, 15.0]), (0.0, [5.0])])
+def test_where_the_map_is_begun_anew_the_way_is_that_on_the_new_one(tmp_path, jump, expected):
+    """From the last jump on; without one only the last pose is sure to be."""
+    xs = [k + (jump if k >= 3 else 0.0) for k in range(6)]
+    messages = ((k * SECOND, "/odom", ODOMETRY, odometry(ROS2, k * SECOND, x)) for k, x in enumerate(xs))
+    with open_log(write(tmp_path / "run.mcap", messages)) as log:
+        path = log.robot_path("odom")
+        assert path.until(SECOND)[:, 0].tolist() == [0.0, 1.0]
+        assert path.until(2**62, is_begun_anew=True)[:, 0].tolist() == expected
+        assert len(path.until(2**62, is_begun_anew=True)) == 0
+
+
 def test_odometry_in_another_frame_than_the_map_is_told_of(tmp_path, caplog):
     messages = ((k * SECOND, "/odom", ODOMETRY, odometry(ROS2, k * SECOND, float(k))) for k in range(5))
     assert way(write(tmp_path / "run.mcap", messages))[0] == "/odom"

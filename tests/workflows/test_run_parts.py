@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+import scan_logs
 from reader_logs import SHARED, START_NS, Map, McapLog
 from rerun.chunk import RrdReader
+from rosbags.highlevel import AnyReader
+from scan_logs import Move
 
 import rose2_logs as rl
 from rose2_logs.errors import ParameterError, ResultsError
@@ -150,6 +154,52 @@ def test_a_recording_shows_one_part_behind_the_other_along_coverage(folder: Path
         for step in batch["coverage_percent"].to_pylist()
     ]
     assert sorted(steps) == [int(100 * each) + 100 * (k > 2) for k, each in enumerate(coverage)]
+
+
+def driven(path: Path, frame: str) -> Path:
+    """The two parts with the robot's way, the second 30 m beside the first, in a frame 100 m off or not."""
+    left = 30.0 if frame == "map" else 130.0
+    log, store = McapLog(path), scan_logs.typestore(2)
+    schema = (Move.kind, "ros2msg", store.generate_msgdef(Move.kind, ros_version=2)[0].encode())
+    maps = [(each, 0.0, "map") for each in FIRST] + [(each, left, frame) for each in SECOND]
+    for k, (columns, at, of) in enumerate(maps):
+        for time_s in (k - 0.9, k - 0.6, k - 0.3):
+            x = time_s + (1.0 if k < len(FIRST) else 31.0 - len(FIRST))
+            moves = (
+                Move(time_s, "map", "base_link", (x, 2.0, 0.0)),
+                Move(time_s, "upstairs", "map", (100.0, 0.0, 0.0)),
+            )
+            for move in moves:
+                data = bytes(store.serialize_cdr(scan_logs.made(move, 2), Move.kind))
+                log.raw("/tf", START_NS + round(time_s * 1e9), schema, "cdr", data)
+        log.add("/map", START_NS + k * 10**9, replace(two_rooms(columns, at), frame=of))
+    return log.close()
+
+
+@pytest.mark.parametrize("frame", ["map", "upstairs"])
+def test_the_robots_path_is_of_each_part_in_the_frame_of_its_map(tmp_path: Path, frame: str):
+    """In the annotated MCAP and in the recording: no map shows the path on a map that no longer is."""
+    folder = rl.analyze(driven(tmp_path / "run.mcap", frame), tmp_path / "run", layers=("path",)).folder
+    marked, recorded = [], {}
+    with AnyReader([folder / "run.rose2.mcap"]) as log:
+        of_markers = [each for each in log.connections if each.topic == "/rose2/markers"]
+        for _, _, data in log.messages(of_markers):
+            markers = log.deserialize(data, "visualization_msgs/msg/MarkerArray").markers
+            path = [point.x for each in markers if each.ns == "path" for point in each.points]
+            marked.append((markers[1].header.frame_id, min(path), max(path)))
+    for chunk in RrdReader(str(folder / "run.rrd")).stream():
+        batch = chunk.to_record_batch()
+        assert str(chunk.entity_path) != "/world/path" or "snapshot" not in batch.schema.names
+        if str(chunk.entity_path) == "/world/path_in_part" and "snapshot" in batch.schema.names:
+            rows = zip(batch["snapshot"].to_pylist(), batch["LineStrips3D:strips"].to_pylist(), strict=True)
+            recorded |= {number: np.concatenate(strips)[:, 0] for number, strips in rows}
+    low = 30.1 if frame == "map" else 130.1
+    expected = [("map", 0.1, k + 0.7) for k in range(3)] + [(frame, low, low + k + 0.6) for k in range(4)]
+    assert [each[0] for each in marked] == [each[0] for each in expected]
+    np.testing.assert_allclose([each[1:] for each in marked], [each[1:] for each in expected])
+    assert sorted(recorded) == list(range(7))
+    found = [(recorded[k].min(), recorded[k].max()) for k in range(7)]
+    np.testing.assert_allclose(found, [each[1:] for each in expected], rtol=1e-6)
 
 
 def test_a_log_in_one_piece_is_part_1_in_its_tables(tmp_path: Path):

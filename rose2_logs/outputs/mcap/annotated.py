@@ -179,7 +179,7 @@ class AnnotatedMcap(Sink):
         assert source is not None  # it was opened by `begin`
         time_ns = source.recorded_ns(step.snapshot.log_time_ns)
         self._extent.add(step)
-        self._trail.add(step.path)
+        self._trail.follow(step)
         sizes = MarkerSizes.of_view(view_height_m(self._extent.low_m, self._extent.high_m, aspect=1.0))
         self._frame_id, self._z_m = step.analysis.geometry.frame_id, step.snapshot.z_m
         with self._writing():

@@ -24,6 +24,7 @@ from rose2_logs.outputs.rerun.world import (
     LINES,
     PAPER,
     PATH,
+    PATH_IN_PART,
     PREDICTED,
     ROBOT,
     ROOMS,
@@ -55,6 +56,7 @@ def make_blueprint(
     back_projected: bool = False,
     first_percent: int = 0,
     most_rooms: int = 0,
+    in_parts: bool = False,
 ) -> rrb.Blueprint:
     """Map from above and a tab per stage of the method; next to it curves, summary, room lanes, events.
 
@@ -72,6 +74,8 @@ def make_blueprint(
         Coverage of the first map, where playing begins.
     most_rooms : int
         Greatest number of rooms of a map; 0 if it is not known.
+    in_parts : bool
+        Whether the recording may be of a run in parts, with the robot's path in each.
     """
     stages = (
         ("Rooms", (), ()),
@@ -83,12 +87,13 @@ def make_blueprint(
         ("Voronoi graph", ("voronoi",), (VORONOI,)),
     )
     views: list[rrb.View] = [
-        _map_view(name, low_m, high_m, shown, (BACK_PROJECTED,) if back_projected else ())
+        _map_view(name, low_m, high_m, shown, (BACK_PROJECTED,) if back_projected else (), in_parts=in_parts)
         for name, needed, shown in stages
         if not needed or set(needed) & set(layers)
     ]
     if back_projected:
-        views.insert(1, _map_view("Rooms projected back", low_m, high_m, (BACK_PROJECTED,)))
+        of_last = (BACK_PROJECTED,)
+        views.insert(1, _map_view("Rooms projected back", low_m, high_m, of_last, in_parts=in_parts))
     if "spectrum" in layers:
         eye = eye_above(np.array([-1.0, -1.0]), np.array([1.0, 1.0]))
         views.append(
@@ -136,14 +141,20 @@ def make_blueprint(
 
 
 def _map_view(
-    name: str, low_m: FloatArray, high_m: FloatArray, shown: Collection[str], off: Collection[str] = ()
+    name: str,
+    low_m: FloatArray,
+    high_m: FloatArray,
+    shown: Collection[str],
+    off: Collection[str] = (),
+    *,
+    in_parts: bool,
 ) -> rrb.Spatial3DView:
     """View of the map with some of the switched layers on; rooms step back where others are looked at."""
     hidden = [*(path for path in SWITCHED if path not in shown), *off]
     if BACK_PROJECTED in shown:
         hidden += [FILLS, ROOMS, PREDICTED, DOORWAYS]
     elif shown:
-        hidden += [PREDICTED, PATH, ROBOT]
+        hidden += [PREDICTED, PATH, ROBOT, *([PATH_IN_PART] if in_parts else [])]
     if set(shown) & {CLEAN, SCORE, SEGMENTS, LINES, VORONOI}:
         hidden += [FILLS, ROOMS]
     overrides: dict[rr.EntityPath | str, Overrides] = {

@@ -114,7 +114,8 @@ def _set_layout(server: Server, name: str, recordings: Sequence[Path], scratch: 
     """Open every run in our layout: the one in each file counts only where it is opened alone."""
     layout = scratch / "layout.rbl"
     back_projected = any(path.with_name("back_projected.parquet").is_file() for path in recordings)
-    make_blueprint(*_corners_m(recordings), back_projected=back_projected).save("rose2_logs", str(layout))
+    blueprint = make_blueprint(*_corners_m(recordings), back_projected=back_projected, in_parts=True)
+    blueprint.save("rose2_logs", str(layout))
     try:
         server.client().get_dataset(name).register_blueprint(layout.as_uri())
     except ImportError:

@@ -221,6 +221,7 @@ class RerunRecording(Sink):
             back_projected=self._back_projected is not None,
             first_percent=self._first_percent - 100 * (len(self._parts) - 1),
             most_rooms=self._most_rooms,
+            in_parts=self._parts != [None],
         )
         self._stream.send_blueprint(blueprint)
 

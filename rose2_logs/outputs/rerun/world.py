@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rose2_logs.drawing.hatching import hatch_unseen
 from rose2_logs.drawing.palette import track_color
-from rose2_logs.drawing.robot_trail import GAP_M
+from rose2_logs.drawing.robot_trail import GAP_M, RobotTrail
 from rose2_logs.model.borders import UNSURE_BORDER_BELOW
 from rose2_logs.model.occupancy import FloatArray
 from rose2_logs.model.room_names import NameOf, room_name, short_name
@@ -53,6 +53,8 @@ MAP, ROOMS, DOORWAYS = "/world/map", "/world/rooms", "/world/doorways"
 BORDERS = "/world/borders"
 FILLS, CLEAN, SCORE = "/world/room_fills", "/world/clean_map", "/world/structure_score"
 PREDICTED, PATH, ROBOT = "/world/predicted", "/world/path", "/world/robot"
+PATH_IN_PART = "/world/path_in_part"
+"""The robot's path of runs in parts, as a whole with each map; of others `PATH` has a piece with each map."""
 SEGMENTS, LINES, FACES, VORONOI = "/world/segments", "/world/lines", "/world/faces", "/world/voronoi"
 SPECTRUM = "/spectrum"
 HEIGHTS = (
@@ -106,6 +108,7 @@ class World:
         self._named: set[int] = set()
         self._begun: set[str] = set()
         self._pose: FloatArray | None = None
+        self._trail = RobotTrail()
         recording.log("/world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
         for path, width, color in (
             (DOORWAYS, DOOR_POINTS, DOOR_COLOR),
@@ -139,8 +142,10 @@ class World:
             colors = np.array([track_color(track) for track in step.track_ids], float).reshape(-1, 3)
             self._log_lines(PREDICTED, lines, (OUTLINE_SHADE * colors[room]).astype(np.uint8))
         self._log_structure(step)
-        if step.path is not None:
+        if step.path is not None and step.part is None:
             self._log_path(step.path)
+        elif step.path is not None:
+            self._log_trail(step, step.path)
 
     def _log_pictures(self, step: TrackedSnapshot) -> None:
         pictures = MapPictures(step.snapshot)
@@ -252,10 +257,31 @@ class World:
         far = np.hypot(*np.diff(poses[:, :2], axis=0).T) > GAP_M
         lengths = np.diff([0, *np.flatnonzero(far) + 1, len(poses)])
         self._layers.add(PATH, Strips(lifted(poses[:, :2], HEIGHTS.index(PATH)), lengths.astype(np.int32)))
+        self._log_robot(self._pose)
+
+    def _log_trail(self, step: TrackedSnapshot, path: FloatArray) -> None:
+        """Log the robot's whole path on the map of a part, which replaces that of the map before.
+
+        Pieces that a view shows together would stay where the map is begun anew.
+        """
+        if PATH_IN_PART not in self._begun:
+            self._begun.add(PATH_IN_PART)
+            self._style_lines(PATH_IN_PART, PATH_POINTS, PATH_COLOR)
+        self._trail.follow(step)
+        points = np.concatenate([np.zeros((0, 2)), *self._trail.pieces_m])
+        lengths = np.array([len(piece) for piece in self._trail.pieces_m], np.int32)
+        self._layers.show(PATH_IN_PART, Strips(lifted(points, HEIGHTS.index(PATH)), lengths))
+        if len(path):
+            self._pose = path[-1]
+            self._log_robot(self._pose)
+        elif not self._trail.pieces_m:
+            self._layers.show(ROBOT, Strips(np.zeros((0, 3), np.float32), np.zeros(0, np.int32)))
+
+    def _log_robot(self, pose: FloatArray) -> None:
         tip, back, side = ROBOT_LENGTH_M / 2, -ROBOT_LENGTH_M / 2, ROBOT_WIDTH_M / 2
         head = np.array([[tip, 0], [back, side], [0.6 * back, 0], [back, -side], [tip, 0]])
-        cosine, sine = np.cos(self._pose[2]), np.sin(self._pose[2])
-        there = head @ np.array([[cosine, sine], [-sine, cosine]]) + self._pose[:2]
+        cosine, sine = np.cos(pose[2]), np.sin(pose[2])
+        there = head @ np.array([[cosine, sine], [-sine, cosine]]) + pose[:2]
         self._layers.show(ROBOT, Strips(lifted(there, HEIGHTS.index(ROBOT)), np.array([5], np.int32)))
 
     def _log_lines(self, path: str, ends_m: FloatArray, colors: NDArray[np.uint8] | None = None) -> None:
