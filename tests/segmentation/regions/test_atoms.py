@@ -5,6 +5,7 @@ import pytest
 
 from rose2_logs.config.regions import RegionParameters
 from rose2_logs.segmentation.regions.atoms import absorb_small, clearance_basins
+from rose2_logs.segmentation.regions.stage import find_atoms, region_tree
 
 PARAMETERS = RegionParameters()
 
@@ -51,3 +52,17 @@ def test_each_side_of_a_narrow_place_has_a_basin():
 def test_a_field_without_walls_is_one_basin_whatever_its_size():
     free = np.ones((50, 70), bool)
     assert len(np.unique(clearance_basins(free, ~free, 0.1, PARAMETERS))) == 1
+
+
+@pytest.mark.parametrize("column", [60, 61])
+def test_a_sliver_between_two_lines_belongs_to_the_floor_around_it(column):
+    """Of two columns of cells, the centers of plan cells lie on one."""
+    cells = np.full((100, 130), 100, np.int8)
+    cells[2:-2, 2:-2] = 0
+    faces = np.ones(cells.shape, np.int32)
+    faces[:, column], faces[:, column + 1 :] = 2, 3
+    free, score = cells == 0, np.zeros(cells.shape, np.float32)
+    found = find_atoms(free, ~free, score, faces, 0.0, 0.05, PARAMETERS)
+    rooms = region_tree(found, free, 0.05, PARAMETERS).rooms(0.0).labels
+    assert np.array_equal(rooms > 0, free)
+    assert rooms.max() == 1

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 from drawn_floors import corridor_of_offices, draw_floor, turned
@@ -43,9 +44,11 @@ def lone_regions(*area_m2):
     )
 
 
-def rooms(area_m2, log_odds, edge_share=None, narrow=None):
+def rooms(area_m2, log_odds, edge_share=None, narrow=None, outlines_m=()):
     edge = np.zeros(len(area_m2)) if edge_share is None else np.array(edge_share)
     graph = lone_regions(*area_m2)
+    for region, of_region in enumerate(outlines_m):
+        graph.node_sums[region, 1:3] = of_region
     no_width = None if narrow is None else np.array(narrow)
     outside = outside_of(graph, edge, lambda _: np.array(log_odds), PARAMETERS, no_width)
     room = rooms_among(graph.node_sums[:, 0], outside, PARAMETERS)
@@ -66,6 +69,43 @@ def test_an_answer_by_which_hardly_anything_is_left_is_not_used(outside_m2, beli
     found, left_out_m2 = rooms([outside_m2, 10 - outside_m2], [-9.0, 9.0])
     assert found == ([0, 1] if believed else [1, 2])
     assert left_out_m2 == (outside_m2 if believed else 0.0)
+
+
+@pytest.mark.parametrize(
+    ("left_m2", "walled_m", "unknown_m", "believed"),
+    [(2.0, 7.1, 3.0, True), (2.0, 6.9, 3.0, False), (1.4, 7.1, 3.0, False), (2.0, 0.0, 0.0, False)],
+)
+def test_an_answer_that_takes_most_of_a_map_is_used_if_what_is_left_is_walled(
+    left_m2, walled_m, unknown_m, believed
+):
+    """As rays through the windows of a building do."""
+    outlines_m = [(walled_m, unknown_m), (3.0, 30.0)]
+    _, left_out_m2 = rooms([left_m2, 10 - left_m2], [9.0, -9.0], outlines_m=outlines_m)
+    assert left_out_m2 == (10 - left_m2 if believed else 0.0)
+
+
+def test_ground_that_is_seen_through_windows_is_no_room_however_large_it_is():
+    """Each room has a window of 2 m, through which rays of 12 m lead into the open."""
+    floor = draw_floor([(5 * k, 0, 5 * k + 4.8, 6) for k in range(4)])
+    margin, cell_m = 280, floor.resolution_m
+    cells = np.pad(floor.cells, margin, constant_values=-1)
+    inside = np.pad(floor.rooms, margin)
+    for room in range(1, 5):
+        rows, columns = np.nonzero(inside == room)
+        middle, side = int(columns.mean()), int(rows.min())
+        cells[side - 6 : side, middle - 20 : middle + 20] = 0
+        for at in range(middle - 20, middle + 20):
+            for seen_from in range(middle - 40, middle + 41, 20):
+                x, y = at - seen_from, -80.0
+                scale = 12 / cell_m / np.hypot(x, y)
+                end = (round(at + x * scale), round(side + y * scale))
+                cv2.line(ray := np.zeros_like(cells), (at, side - 4), end, 1)
+                cells[(ray > 0) & (cells == -1)] = 0
+    found = analyze(snapshot(cells, resolution_m=cell_m))
+    free_m2 = np.count_nonzero(cells == 0) * cell_m**2
+    assert found.outside_m2 > PARAMETERS.outside_max_share * free_m2
+    assert found.rooms.labels.max() == 4
+    assert np.count_nonzero(found.rooms.labels[inside == 0]) < 0.05 * np.count_nonzero(inside)
 
 
 def test_what_is_narrow_is_no_room():
