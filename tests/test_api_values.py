@@ -190,7 +190,7 @@ def test_parameters_of_reading_are_told_to_have_no_effect_without_a_log(caplog):
     ):
         caplog.clear()
         call()
-        assert caplog.text.count("mapping.resolution_m has no effect on maps") == 1
+        assert caplog.text.count("mapping.resolution_m has no effect here") == 1
 
 
 @pytest.mark.parametrize("resolution_m", [0.1, -1])

@@ -130,5 +130,5 @@ def test_names_are_those_of_one_run(cli, log: Path, tmp_path: Path, several: str
     }
     code, _, err = cli("analyze", *runs[several], "-o", tmp_path / "out", "--names", names, *QUIET)
     assert code == 2
-    assert f"--names {names}: is for the rooms of one run" in err
+    assert f"--names '{names}': is for the rooms of one run" in err
     assert not list(tmp_path.rglob("summary.json"))

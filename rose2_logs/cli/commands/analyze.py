@@ -118,7 +118,7 @@ def _refuse_names(options: RunOptions, *, is_one: bool) -> None:
     """Refuse names for the rooms of several runs: a track of one is another room in the next."""
     if options.names is not None and not is_one:
         raise ParameterError(
-            f"names={options.names}: is for the rooms of one run; analyze each log and topic by itself"
+            f"names={str(options.names)!r}: is for the rooms of one run; analyze each log and topic by itself"
         )
 
 
