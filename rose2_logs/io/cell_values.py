@@ -60,6 +60,8 @@ UNKNOWN_SHARE = 0.01
 """Cells that are unknown, at least, if one number stands for it: 4 % are, with two around a building."""
 BORDER_WALL_SHARE = 0.05
 """Where less of the border of the free cells is wall, the map tells no rooms."""
+RAY_CELLS = 2
+"""Free cells that are nowhere wider are rays of a scan."""
 NARROW_M = 0.4
 """Where the free cells are narrower on average, no robot got anywhere: the floor of buildings is 1 m or more
 wide between walls and furniture, walls are 0.1 to 0.3 m thick."""
@@ -386,11 +388,16 @@ def stored_bytes(values: NDArray[np.integer]) -> Cells:
 def few_walls(snapshot: OccupancySnapshot, parameters: OccupancyParameters) -> str | None:
     """Say that hardly any of the border of a map's free cells is wall; None where enough of it is.
 
-    In costmaps the cells around walls are neither, and nothing is said of these.
+    Rays through windows and doors, which have long borders and no walls, are left out. In costmaps the cells
+    around walls are neither, and nothing is said of these.
     """
     if _are_inflated_costs(count_values(snapshot.cells)):
         return None
+    import cv2
+
     free, occupied = classify(snapshot.cells, parameters)
+    wider = np.ones((RAY_CELLS + 1, RAY_CELLS + 1), np.uint8)
+    free = cv2.morphologyEx(free.view(np.uint8), cv2.MORPH_OPEN, wider).view(bool)
     walls = sides = 0
     for one, other in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
         sides += int(np.count_nonzero(free[one] != free[other]))

@@ -189,6 +189,9 @@ def test_a_map_with_hardly_any_wall_is_told_of_and_others_are_not():
     without = np.where(building() == 100, -1, building())
     assert "only 0% of the border" in few_walls(snapshot_of(without), usual)
     assert few_walls(snapshot_of(without[10:20, 10:20]), usual) is None
+    rays = np.pad(building(), 400, constant_values=-1)
+    rays[:400:4] = rays[:, :400:4] = 0
+    assert few_walls(snapshot_of(rays), usual) is None
 
 
 def test_maps_that_are_none_of_a_building_are_told_of_by_kind():
