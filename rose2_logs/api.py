@@ -385,7 +385,9 @@ def map_topics(log: str | Path | Sequence[str | Path], *, message_type: str | No
     return map_topics_of_log(path, Parameters().reading.with_type(message_type))
 
 
-def read_map(map_file: str | Path, resolution_m: float | None = None) -> OccupancySnapshot:
+def read_map(
+    map_file: str | Path, resolution_m: float | None = None, parameters: GivenParameters = None
+) -> OccupancySnapshot:
     """Read a saved map.
 
     Parameters
@@ -394,6 +396,8 @@ def read_map(map_file: str | Path, resolution_m: float | None = None) -> Occupan
         A map_server ``.yaml``, or an image in the gray values of ROS maps.
     resolution_m : float, optional
         Side of a cell in meters, for an image without a ``.yaml`` next to it.
+    parameters : Parameters or mapping, optional
+        As for `analyze`; those of ``reading`` and ``occupancy`` count.
 
     Raises
     ------
@@ -411,7 +415,7 @@ def read_map(map_file: str | Path, resolution_m: float | None = None) -> Occupan
     ...     rl.read_map(f"{folder}/plan.png", resolution_m=0.05)
     OccupancySnapshot(index=0, topic='/map', 200 x 120 cells of 0.05 m)
     """
-    return _read_map(map_file, resolution_m, Parameters())
+    return _read_map(map_file, resolution_m, Parameters.from_any(parameters))
 
 
 def _read_map(map_file: str | Path, resolution_m: float | None, parameters: Parameters) -> OccupancySnapshot:

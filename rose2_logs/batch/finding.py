@@ -64,7 +64,8 @@ def find_logs(arguments: Sequence[str], out: Path) -> list[Location]:
         for log in logs:
             each = Location(log)
             found.setdefault(each.address, each)
-    tell_split_recordings(each.address for each in found.values())
+    remedy = "if they are, analyze them as one, without batch: a folder that holds only these is one log"
+    tell_split_recordings((each.address for each in found.values()), remedy)
     return list(found.values())
 
 

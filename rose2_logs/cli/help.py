@@ -39,6 +39,8 @@ class Command(TyperCommand):
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Refuse what is given twice: of two values one would be left out without a word."""
+        if ctx.resilient_parsing:  # of what is typed so far, to complete it
+            return super().parse_args(ctx, args)
         _, _, given = self.make_parser(ctx).parse_args(args=list(args))
         for each in given:
             takes_one = isinstance(each, TyperOption) and not (each.multiple or each.is_flag)

@@ -104,8 +104,8 @@ class RegionParameters(ParameterBlock):
     outside_max_share: float = number(
         0.4,
         "share",
-        "Where more than this share of a map would be outside, nothing is: it is 18 % at most on 98 maps "
-        "with true rooms.",
+        "Where more than this share of a map would be outside, nothing is, but for `walled_min_share`: it is "
+        "18 % at most on 98 maps with true rooms. With 0 nothing ever is.",
         0,
         1,
     )
@@ -117,6 +117,14 @@ class RegionParameters(ParameterBlock):
         "with windows 0.6 to 0.75 are equally good.",
         0,
         1,
+    )
+    walled_min_rooms: int = number(
+        3,
+        "rooms",
+        "If so many rooms would be left: the one room that a robot has looked into is walled, too, and what "
+        "it has seen of the others is not.",
+        1,
+        10**6,
     )
     walled_min_left: float = number(
         0.15,

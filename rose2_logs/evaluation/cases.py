@@ -145,7 +145,7 @@ def load_cases(path: Path, group: str | None = None) -> tuple[Case, ...]:
     Raises
     ------
     CasesError
-        If the file cannot be read, misses something, two cases are called the same, or no case is left.
+        If the file cannot be read, misses something, or no case is left.
     """
     try:
         listed = json.loads(path.read_text(encoding="utf-8"))
@@ -154,11 +154,6 @@ def load_cases(path: Path, group: str | None = None) -> tuple[Case, ...]:
     if not isinstance(listed, dict) or not isinstance(listed.get("cases"), list):
         raise CasesError(f'{path}: must hold an object with a list "cases"')
     cases = tuple(_case(path, number, entry) for number, entry in enumerate(listed["cases"]))
-    numbers: dict[tuple[str, str], int] = {}
-    for number, case in enumerate(cases):
-        if (first := numbers.setdefault((case.group, case.name), number)) != number:
-            called = f"group {case.group!r}, name {case.name!r}"
-            raise CasesError(f"{path}: cases {first} and {number} are both called {called}; rename one")
     groups = dict.fromkeys(case.group for case in cases)
     chosen = tuple(case for case in cases if group in (None, case.group))
     if not chosen:

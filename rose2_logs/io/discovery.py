@@ -138,7 +138,7 @@ def split_recordings(logs: Iterable[str]) -> list[list[str]]:
     ]
 
 
-def tell_split_recordings(logs: Iterable[str]) -> None:
+def tell_split_recordings(logs: Iterable[str], remedy: str) -> None:
     """Warn of logs that are going to be analyzed by themselves, and may be pieces of one recording."""
     found = split_recordings(logs)
     if found:
@@ -146,7 +146,7 @@ def tell_split_recordings(logs: Iterable[str]) -> None:
         more = f", and {counted(len(found) - 1, 'other recording')} like it" if len(found) > 1 else ""
         text = (
             f"{listed(pieces, TOLD_MOST)}: may be pieces of one recording{more}, and are analyzed as a log "
-            "each; to analyze them as one, give a folder that holds only these"
+            f"each; {remedy}"
         )
         log_warning(logger, "split_recording", text)
 

@@ -111,7 +111,7 @@ def _taken_over(given: Block, read_by: Block, where: str) -> Block:
         name = others[-1]  # a threshold, rather than the values that it implies
         raise ParameterError(
             f"{given.block}.{name}={changed[name]!r}: {where}, by {getattr(read_by, name)!r}; give this "
-            "parameter to open_log, or give the path in place of what was opened"
+            "parameter to open_log or read_map, or give the path in place of what was read"
         )
     return dataclasses.replace(read_by, **changed)  # type: ignore[type-var]
 

@@ -122,7 +122,10 @@ def _given_name(properties: dict[str, Any]) -> str:
     """Name of a feature, empty where it is what an exported plan calls a room that nobody has named."""
     name = " ".join(properties["name"].split())
     number = properties.get("room")
-    return "" if isinstance(number, int) and name == room_name(number) else name
+    # Programs write whole numbers as 4.0 where other features have none.
+    if isinstance(number, int | float) and float(number).is_integer() and name == room_name(int(number)):
+        return ""
+    return name
 
 
 def _plan(path: Path, text: str) -> RoomNames:

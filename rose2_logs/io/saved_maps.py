@@ -431,6 +431,8 @@ def _load_image(path: Path, most_cells: int) -> tuple[NDArray[np.float32], NDArr
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)
             with Image.open(path, formats=FORMATS) as image:
                 check_cells(image.height, image.width, most_cells)
+                if image.mode == "F":
+                    raise InvalidMapError("its pixels are fractions; save it with grays from 0 to 255")
                 if image.mode.startswith("I"):
                     return np.asarray(image, np.float32) / np.float32(2**16 - 1), None
                 has_alpha = "A" in image.getbands() or "transparency" in image.info

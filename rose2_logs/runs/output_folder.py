@@ -27,6 +27,11 @@ logger = logging.getLogger(__name__)
 
 TOLD_MOST = 5
 """Files that are told in one line."""
+MADE_OF_RESULTS = re.compile(
+    r"report(_part_\d+)?\.html|.+\.(figure\.(png|svg)|floor_plan\.(geojson|svg|dxf)|graph\.json"
+    r"|rooms\.(pgm|yaml|list\.yaml|labels\.png|geojson)|\w+\.qml)"
+)
+"""Names of what ``report``, ``figure`` and ``export`` make of the results of a run."""
 MAY_PASS = (OutputError, WorkerError, OSError, MemoryError)
 """After these errors, as after Ctrl-C, another try may go on; the others would come again."""
 
@@ -108,6 +113,7 @@ class OutputFolder:
             If the results to continue are already complete.
         """
         facts = json.loads(json.dumps(facts))
+        replaced = self.files[-1].exists()
         with writing(self._folder):
             self._work.parent.mkdir(parents=True, exist_ok=True)
         with locked(
@@ -124,7 +130,7 @@ class OutputFolder:
                 self._clean_up(journal.maps if _may_pass(error) else 0)
                 raise
             self._clean_up()
-            if made := self._made_of_results():
+            if replaced and (made := self._made_of_results()):
                 logger.warning(
                     "%s: made of the results that were here before: %s; make them again or remove them",
                     self._folder,
@@ -210,16 +216,8 @@ class OutputFolder:
         ]
 
     def _made_of_results(self) -> list[str]:
-        """Pages, figures and plans in the folder, which ``report``, ``figure`` and ``export`` name so."""
-        name = re.escape(self._place.name)
-        made = re.compile(rf"report.*\.html|{name}\..+")
-        files = [file for file in self._place.iterdir() if file.is_file() and made.fullmatch(file.name)]
-        return sorted(
-            file.name
-            for file in files
-            if file.name not in self._names
-            and not any(file.samefile(each) for each in self._sources if each.exists())
-        )
+        """Names of pages, figures and plans in the folder."""
+        return sorted(file.name for file in self._place.iterdir() if MADE_OF_RESULTS.fullmatch(file.name))
 
     def _clean_up(self, kept_maps: int = 0) -> None:
         shutil.rmtree(self._work, ignore_errors=True)

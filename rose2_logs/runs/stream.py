@@ -24,7 +24,7 @@ from rose2_logs.model.occupancy import FloatArray, OccupancySnapshot, free_area_
 from rose2_logs.model.room_names import RoomNames
 from rose2_logs.runs.journal import Found, JournaledWorkers
 from rose2_logs.segmentation.pipeline import analyze
-from rose2_logs.system.warnings import log_warning
+from rose2_logs.system.warnings import log_warning, muted
 from rose2_logs.system.workers import Workers, give_back_freed_memory
 from rose2_logs.tracking.layout_change import LayoutFollower
 from rose2_logs.tracking.tracked_snapshot import MAP_TRACK, RoomEvent, TrackedSnapshot, map_motion
@@ -252,7 +252,10 @@ def _paths_of(
 ) -> dict[str, RobotPath]:
     """The robot's path in the frame of the last map of each part; that of the last one is the last."""
     frames = dict.fromkeys(map_frame(each.geometry.frame_id) for each in reversed(list(lasts)))
-    return {frame: reader.robot_path(frame, base_frame) for frame in reversed(frames)}
+    *others, last = reversed(frames)
+    with muted():  # what is odd about the path is told of the last frame
+        paths = {frame: reader.robot_path(frame, base_frame) for frame in others}
+    return paths | {last: reader.robot_path(last, base_frame)}
 
 
 def _analyze_or_refuse(

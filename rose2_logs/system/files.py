@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from types import TracebackType
 
 from rose2_logs.errors import OutputError, ParameterError
@@ -56,9 +57,18 @@ def writing(path: Path) -> Iterator[None]:
         raise OutputError(f"{path}: cannot be written: {reason_of(error)}") from error
 
 
+def is_stream(path: Path) -> bool:
+    """Whether something is there that is written to, but never replaced: a device or a pipe."""
+    # What is printed may go to a file, which /dev/stdout then is.
+    is_device = path.absolute().parent == Path("/dev")
+    return path.exists() and not path.is_dir() and (is_device or not path.is_file())
+
+
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
     """Yield a path to write to; on success that file replaces `path`. Creates the folder if needed.
+
+    What is written to a device or a pipe, as ``/dev/stdout``, goes through it.
 
     Raises
     ------
@@ -67,6 +77,12 @@ def replacing(path: Path) -> Iterator[Path]:
     """
     part = part_of(path)
     with writing(path):
+        if is_stream(path):
+            with TemporaryDirectory() as folder:
+                yield Path(folder) / path.name
+                with path.open("ab") as stream:
+                    stream.write((Path(folder) / path.name).read_bytes())
+            return
         path.parent.mkdir(parents=True, exist_ok=True)
         try:
             yield part
@@ -161,7 +177,7 @@ def refuse_existing(files: Iterable[Path], *, overwrite: bool) -> None:
     OutputError
         If one exists and must not be replaced.
     """
-    if not overwrite and (existing := [file for file in files if file.exists()]):
+    if not overwrite and (existing := [file for file in files if file.exists() and not is_stream(file)]):
         raise OutputError(
             f"{existing[0]}: already exists; choose another folder, or allow overwriting (overwrite=True)"
         )

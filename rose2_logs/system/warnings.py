@@ -20,6 +20,8 @@ FIRST_KEPT = 5
 FIELDS = ("kind", "file", "topic", "index")
 """Attributes of a log record besides its text, see `log_warning`."""
 
+NOT_OF_LOG = "no_effect"
+"""Kind of warnings about the parameters."""
 UNCOUNTED = {"is_counted": False}
 """Passed as `extra` with warnings about how a run proceeds, which do not belong to its results."""
 
@@ -147,8 +149,9 @@ def collect_warnings(strict: bool = False) -> Iterator[WarningLog]:
             if record.thread != thread or not getattr(record, "is_counted", True):
                 return
             warning_log.add(record)
-            # Warnings without a kind are about this machine, not about the log.
-            if strict and hasattr(record, "kind"):
+            # Warnings without a kind are about this machine, not about the log. Parameters without effect may
+            # stand in a file that serves other commands, too.
+            if strict and getattr(record, "kind", NOT_OF_LOG) != NOT_OF_LOG:
                 text = f"{record.getMessage()} (an error because of strict=True)"
                 where = {name: getattr(record, name, None) for name in FIELDS[1:]}
                 raise StrictError(text, **where)

@@ -64,7 +64,7 @@ def check_files(
         if place in taken:
             raise OutputError(
                 f"{file}: two results would be this file; give label images, pictures and figures each a "
-                "place of its own"
+                "place of its own, and the cases of a group names of their own"
             )
         taken.add(place)
     refuse_existing(outputs, overwrite=overwrite)

@@ -71,7 +71,7 @@ def tell_without_effect(parameters: Parameters, *read: str, method: str | None =
         else:
             continue
         for each, counts in vain.items():
-            log_warning(logger, "no_effect", f"{name}.{each} has no effect here; it has {counts}")
+            log_warning(logger, "no_effect", f"{name}.{each} has no effect here; it counts {counts}")
     if method == METHODS[0]:
         for text in parameters.without_effect():
             log_warning(logger, "no_effect", text)

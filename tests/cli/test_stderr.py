@@ -105,6 +105,13 @@ def test_strict_ends_at_the_first_warning_and_leaves_nothing(cli, damaged):
     assert not list((damaged.parent / "out").rglob("*.*"))
 
 
+def test_strict_is_about_the_log_and_not_about_parameters(cli, tmp_path):
+    """A file of parameters may serve several commands."""
+    maps, vain = save_run(tmp_path / "maps"), ("--set", "mapping.resolution_m=0.2")
+    code, _, err = cli("analyze", maps, "-o", tmp_path / "out", "--no-rrd", "--no-mcap", "--strict", *vain)
+    assert (code, "mapping.resolution_m has no effect here" in err) == (0, True)
+
+
 def test_names_in_a_log_cannot_write_to_the_terminal(cli, tmp_path):
     """A name is shown as text: no colors of rich, no escape sequences, no second line."""
     log = tmp_path / "run.mcap"

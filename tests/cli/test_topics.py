@@ -132,3 +132,10 @@ def test_names_are_those_of_one_run(cli, log: Path, tmp_path: Path, several: str
     assert code == 2
     assert f"--names '{names}': is for the rooms of one run" in err
     assert not list(tmp_path.rglob("summary.json"))
+    # A plan names rooms by where they are, and tells where it does not fit.
+    plan = tmp_path / "plan.geojson"
+    box = {"type": "Polygon", "coordinates": [[[0.3, 0.3], [2.4, 0.3], [2.4, 2.7], [0.3, 2.7], [0.3, 0.3]]]}
+    feature = {"type": "Feature", "geometry": box, "properties": {"name": "Kitchen"}}
+    plan.write_text(json.dumps({"type": "FeatureCollection", "features": [feature]}))
+    _, _, err = cli("analyze", *runs[several], "-o", tmp_path / "out", "--names", plan, *QUIET)
+    assert "is for the rooms of one run" not in err

@@ -16,6 +16,7 @@ from rose2_logs.drawing.image_files import write_label_image
 from rose2_logs.errors import CasesError, OutputError
 from rose2_logs.evaluation.benchmark import evaluate_case, figures
 from rose2_logs.evaluation.cases import Case, load_cases
+from rose2_logs.workflows.evaluation_files import check_files
 
 
 @pytest.fixture
@@ -83,12 +84,20 @@ def test_an_image_that_is_missing_is_named(cases_file: Path):
         load_cases(cases_file)[0].snapshot()
 
 
-def test_two_cases_of_one_name_are_refused(cases_file: Path):
-    """Their images would be one file, and their rows could not be told apart."""
+@pytest.mark.parametrize("group", ["g", "h"])
+def test_two_cases_of_one_name_are_refused_where_their_images_would_be_one(
+    cases_file: Path, tmp_path: Path, group: str
+):
     listed = json.loads(cases_file.read_text())["cases"]
     cases_file.write_text(json.dumps({"cases": [*listed, listed[0]]}))
-    with pytest.raises(CasesError, match="cases 0 and 2 are both called group 'g', name 'n'; rename one"):
-        load_cases(cases_file)
+    chosen = load_cases(cases_file, group)
+    given = {"pictures": None, "json_file": None, "along": False, "overwrite": False}
+    check_files(cases_file, chosen, predictions=None, **given)
+    if group == "h":
+        check_files(cases_file, chosen, predictions=tmp_path / "out", **given)
+    else:
+        with pytest.raises(OutputError, match="the cases of a group names of their own"):
+            check_files(cases_file, chosen, predictions=tmp_path / "out", **given)
 
 
 @pytest.mark.parametrize(

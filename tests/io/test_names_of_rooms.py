@@ -39,13 +39,14 @@ def test_a_plan_names_outlines(tmp_path: Path):
     features = [
         feature(kitchen, name="Kitchen"),
         feature(shapely.box(4, 0, 5, 1), name=""),
+        feature(shapely.box(5, 0, 6, 1), name="Room 3", room=3.0),
         feature(shapely.LineString([(0, 0), (1, 1)]), name="door"),
         {"type": "Feature", "geometry": None, "properties": None},
     ]
     file = tmp_path / "plan.geojson"
     file.write_text(json.dumps({"type": "FeatureCollection", "features": features}))
     names = read_room_names(file)
-    assert names.of_place == ("Kitchen",)
+    assert names.of_place == ("Kitchen", "")
     assert names.places[0].equals(kitchen)
 
 

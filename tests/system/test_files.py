@@ -2,12 +2,24 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+import threading
 from pathlib import Path
 
 import pytest
+from commands import WAIT_S
 
 from rose2_logs.errors import OutputError, ParameterError
-from rose2_logs.system.files import OnFailure, expanded, reason_of, replacing, require_local
+from rose2_logs.system.files import (
+    OnFailure,
+    expanded,
+    reason_of,
+    refuse_existing,
+    replacing,
+    require_local,
+)
 
 
 @pytest.mark.parametrize("below", ["file/out.txt", "file/folder/out.txt"])
@@ -23,6 +35,33 @@ def test_a_folder_in_place_of_a_file_is_named(tmp_path: Path):
     with pytest.raises(OutputError) as raised, replacing(tmp_path / "out.txt") as part:
         part.touch()
     assert str(raised.value).endswith(f"cannot be written: {tmp_path / 'out.txt'} is a folder, not a file")
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
+def test_a_pipe_is_written_to_and_stays(tmp_path: Path):
+    pipe, heard = tmp_path / "pipe", []
+    os.mkfifo(pipe)
+    reader = threading.Thread(target=lambda: heard.append(pipe.read_text()))
+    reader.start()
+    refuse_existing([pipe], overwrite=False)
+    with replacing(pipe) as part:
+        part.write_text("figures")
+    reader.join(WAIT_S)
+    assert heard == ["figures"]
+    assert pipe.is_fifo()
+    assert list(tmp_path.iterdir()) == [pipe]
+
+
+@pytest.mark.skipif(not Path("/dev/stdout").exists(), reason="there is no /dev/stdout")
+def test_what_goes_to_the_output_of_a_program_leaves_its_device(tmp_path: Path):
+    """Also where that is a file."""
+    code = "from pathlib import Path; from rose2_logs.system.files import replacing\n"
+    code += "with replacing(Path('/dev/stdout')) as part: part.write_text('figures')"
+    before = Path("/dev/stdout").readlink()
+    with (tmp_path / "out").open("w") as out:
+        subprocess.run([sys.executable, "-c", code], stdout=out, check=True)
+    assert (tmp_path / "out").read_text() == "figures"
+    assert Path("/dev/stdout").readlink() == before
 
 
 def test_other_errors_lose_only_their_number():

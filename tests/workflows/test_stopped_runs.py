@@ -155,7 +155,12 @@ def test_results_that_only_the_earlier_run_has_made_go_with_it(log: Path, tmp_pa
 def test_what_was_made_of_the_results_before_is_told(log: Path, tmp_path: Path, caplog):
     """A page beside new results would be taken for theirs; what has other names is somebody's own."""
     out = tmp_path / "out"
+    out.mkdir()
+    for name in ("out.bag", "out.notes.txt", "out.graph.json"):
+        (out / name).write_text("")
     analyze_log(log, out, RunOptions(**OPTIONS))
+    assert "made of the results" not in caplog.text
+    (out / "out.graph.json").unlink()
     for name in ("report.html", "out.figure.png", "out.floor_plan.geojson", "notes.txt"):
         (out / name).write_text("")
     assert "made of the results" not in caplog.text

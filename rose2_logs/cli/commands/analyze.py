@@ -93,7 +93,8 @@ def analyze(
     of_topics = [dataclasses.replace(options, topic=topic) for topic in asked] or [options]
     _refuse_names(options, is_one=len(logs) == 1 and len(asked) < 2)
     if len(logs) > 1:
-        tell_split_recordings(map(str, logs))
+        remedy = "if they are, give a folder that holds only these: it is one log"
+        tell_split_recordings(map(str, logs), remedy)
     failed = 0
     for log, name in zip(logs, names, strict=True):
         try:
@@ -115,8 +116,10 @@ def analyze(
 
 
 def _refuse_names(options: RunOptions, *, is_one: bool) -> None:
-    """Refuse names for the rooms of several runs: a track of one is another room in the next."""
-    if options.names is not None and not is_one:
+    """Refuse a table of names for the rooms of several runs: a track of one is another room in the next."""
+    from rose2_logs.io.room_names import is_plan
+
+    if options.names is not None and not is_one and not is_plan(Path(options.names)):
         raise ParameterError(
             f"names={str(options.names)!r}: is for the rooms of one run; analyze each log and topic by itself"
         )

@@ -94,11 +94,14 @@ def outside_of(
     for answer in no_room:
         with_answer = outside | (answer & ~around)
         # An answer by which hardly anything is left is not believed, nor one that takes much of a map, unless
-        # what it leaves is behind walls, as a building that is seen into the open through its windows.
+        # what it leaves are several rooms behind walls: a building whose windows are seen through.
         left = ~with_answer & ~around
         least_walled_m = parameters.walled_min_share * (walled_m[left].sum() + unknown_m[left].sum())
         is_building = (
-            area[left].sum() > parameters.walled_min_left * whole_m2 and walled_m[left].sum() > least_walled_m
+            parameters.outside_max_share > 0
+            and np.count_nonzero(area[left] >= parameters.room_min_area_m2) >= parameters.walled_min_rooms
+            and area[left].sum() > parameters.walled_min_left * whole_m2
+            and walled_m[left].sum() > least_walled_m
         )
         if is_building or area[with_answer].sum() <= parameters.outside_max_share * whole_m2:
             outside = with_answer

@@ -9,6 +9,7 @@ from drawn_floors import corridor_of_offices, draw_floor, turned
 from drawn_maps import snapshot
 from test_graph import drawn_graph
 
+from rose2_logs.config.parameters import Parameters
 from rose2_logs.config.regions import RegionParameters
 from rose2_logs.segmentation.pipeline import analyze
 from rose2_logs.segmentation.regions.graph import (
@@ -73,15 +74,23 @@ def test_an_answer_by_which_hardly_anything_is_left_is_not_used(outside_m2, beli
 
 @pytest.mark.parametrize(
     ("left_m2", "walled_m", "unknown_m", "believed"),
-    [(2.0, 7.1, 3.0, True), (2.0, 6.9, 3.0, False), (1.4, 7.1, 3.0, False), (2.0, 0.0, 0.0, False)],
+    [
+        ((2.0, 2.0, 2.0), 7.1, 3.0, True),
+        ((2.0, 2.0, 2.0), 6.9, 3.0, False),
+        ((2.0, 2.0, 2.0), 0.0, 0.0, False),
+        ((2.0, 2.0, 0.9), 7.1, 3.0, False),  # two rooms and a closet
+        ((1.0, 1.0, 1.1), 7.1, 3.0, True),
+        ((1.0, 1.0, 0.9), 7.1, 3.0, False),
+    ],
 )
-def test_an_answer_that_takes_most_of_a_map_is_used_if_what_is_left_is_walled(
+def test_an_answer_that_takes_most_of_a_map_is_used_if_what_is_left_are_walled_rooms(
     left_m2, walled_m, unknown_m, believed
 ):
     """As rays through the windows of a building do."""
-    outlines_m = [(walled_m, unknown_m), (3.0, 30.0)]
-    _, left_out_m2 = rooms([left_m2, 10 - left_m2], [9.0, -9.0], outlines_m=outlines_m)
-    assert left_out_m2 == (10 - left_m2 if believed else 0.0)
+    outside_m2 = 20 - sum(left_m2)
+    outlines_m = [(walled_m, unknown_m), (0, 0), (0, 0), (3.0, 30.0)]
+    _, left_out_m2 = rooms([*left_m2, outside_m2], [9.0, 9.0, 9.0, -9.0], outlines_m=outlines_m)
+    assert left_out_m2 == (outside_m2 if believed else 0.0)
 
 
 def test_ground_that_is_seen_through_windows_is_no_room_however_large_it_is():
@@ -104,6 +113,8 @@ def test_ground_that_is_seen_through_windows_is_no_room_however_large_it_is():
     found = analyze(snapshot(cells, resolution_m=cell_m))
     free_m2 = np.count_nonzero(cells == 0) * cell_m**2
     assert found.outside_m2 > PARAMETERS.outside_max_share * free_m2
+    kept = {"regions.outside_max_share": 0, "regions.surroundings_min_edge": 1}
+    assert analyze(snapshot(cells, resolution_m=cell_m), Parameters.from_any(kept)).outside_m2 == 0
     assert found.rooms.labels.max() == 4
     assert np.count_nonzero(found.rooms.labels[inside == 0]) < 0.05 * np.count_nonzero(inside)
 
