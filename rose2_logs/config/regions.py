@@ -122,8 +122,8 @@ class RegionParameters(ParameterBlock):
         2,
         "rooms",
         "If so many rooms would be left: the one room that a robot has looked into is walled, too, and what "
-        "it has seen of the others is not. With 1, 2, 3 the rooms of 49 drawn buildings with windows agree by "
-        "93, 92, 91 %, and those of 43 first scans by 78, 80, 80 %.",
+        "it has seen of the others is not. With 1, 2, 3 the rooms of 49 drawn buildings with windows agree "
+        "by 93, 92, 91 %, and those of 43 first scans by 78, 80, 80 %.",
         1,
         10**6,
     )
