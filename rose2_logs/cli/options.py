@@ -93,7 +93,7 @@ def _with_options(command: Callable[..., Any]) -> Callable[..., Any]:
     def with_options(**given: Any) -> Any:
         quiet, verbose, as_json, _ = (given.pop(each) for each in MESSAGE_OPTIONS)
         show_messages(quiet=quiet, verbose=verbose, as_json=as_json)
-        given = {name: _local(value) for name, value in given.items()}
+        given = {each: _local(value) for each, value in given.items()}
         return command(**{each: _built(kind, name, given) for each, kind in made.items()}, **given)
 
     parameters: list[inspect.Parameter] = []
