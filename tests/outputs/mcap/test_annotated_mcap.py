@@ -270,6 +270,8 @@ def test_a_record_that_the_index_does_not_point_to_is_told(tmp_path, caplog):
 def test_what_was_found_lies_at_the_height_of_the_map(tmp_path):
     """Also where a patch has changed the map; the layers are a little above it."""
     log, height_m = tmp_path / "run.mcap", 3.5
+    with LOGS["sample mcap"].open("rb") as file:
+        texts = {each.name: each.data for each in make_reader(file).get_summary().schemas.values()}
     with AnyReader([LOGS["sample mcap"]]) as source:
         (kept,) = (each for each in source.connections if each.topic == "/map")
         *_, (_, time, data) = source.messages([kept])
@@ -283,7 +285,7 @@ def test_what_was_found_lies_at_the_height_of_the_map(tmp_path):
             ("/map", kept.msgtype, lifted),
             ("/map_updates", PATCH, serialized(Update(3, 3, np.full((2, 2), 100)), 2)),
         ):
-            schema = writer.register_schema(kind, "ros2msg", b"")
+            schema = writer.register_schema(kind, "ros2msg", texts.get(kind, b""))
             channel = writer.register_channel(topic, "cdr", schema)
             writer.add_message(channel, time + (kind == PATCH), content, time)
         writer.finish()
