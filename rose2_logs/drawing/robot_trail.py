@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from rose2_logs.io.poses import JUMP_M
+from rose2_logs.io.poses import JUMP_M, map_frame
 from rose2_logs.model.occupancy import FloatArray
 from rose2_logs.tracking.tracked_snapshot import TrackedSnapshot
 
@@ -33,7 +33,7 @@ class RobotTrail:
 
     def follow(self, step: TrackedSnapshot) -> None:
         """Go on with the poses of a map; the same coordinates are elsewhere in another part or frame."""
-        place = step.part, step.snapshot.geometry.frame_id.lstrip("/")
+        place = step.part, map_frame(step.snapshot.geometry.frame_id)
         if place != self._place:
             self.pieces_m, self._tolerance_m, self._place = [], TOLERANCE_M, place
         self.add(step.path)

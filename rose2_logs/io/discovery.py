@@ -33,7 +33,8 @@ ANNOTATED_ENDING = ".rose2.mcap"
 BAG_DESCRIPTION = "metadata.yaml"
 TOLD_MOST = 3
 """Pieces of a recording that are named in one line."""
-_NUMBER = re.compile(r"_(\d{1,9})$")
+LAST_NUMBER = re.compile(r"_(\d+)(\.[a-z][a-z0-9]*)+$", re.IGNORECASE)
+"""Recorders number the files of a recording one after the other, at the end of their names."""
 _DIGITS = re.compile(r"\d+")
 
 
@@ -127,9 +128,9 @@ def split_recordings(logs: Iterable[str]) -> list[list[str]]:
     pieces: dict[tuple[str, str], dict[int, str]] = defaultdict(dict)
     for log in logs:
         folder, _, name = log.replace("\\", "/").rpartition("/")
-        if is_storage(name) and (found := _NUMBER.search(stem_of(name))):
+        if is_storage(name) and (found := LAST_NUMBER.search(name)):
             # Recorders put the time at which a piece was begun before its number.
-            alike = f"{folder}/{_DIGITS.sub('0', stem_of(name)[: found.start()])}"
+            alike = f"{folder}/{_DIGITS.sub('0', name[: found.start()])}"
             pieces[alike, PurePosixPath(plain_name(name)).suffix][int(found[1])] = log
     return [
         [numbers[place] for place in range(len(numbers))]

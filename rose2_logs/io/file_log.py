@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import re
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
@@ -18,6 +17,7 @@ from rose2_logs.config.reading import ReadingParameters
 from rose2_logs.config.selection import Times
 from rose2_logs.config.times import LATEST_NS
 from rose2_logs.errors import LogError
+from rose2_logs.io.discovery import LAST_NUMBER
 from rose2_logs.io.grids import Decoder, Grid, Patch
 from rose2_logs.io.log_file import LogFile, Place
 from rose2_logs.io.messages import decoder
@@ -34,8 +34,6 @@ more than this, the recorder's clock was set back."""
 
 LONGEST_RUN_NS = 366 * 86400 * 10**9
 """No robot is on the way for a year; a clock that is set after the start makes a log last for decades."""
-_LAST_NUMBER = re.compile(r"_(\d+)(\.[a-z][a-z0-9]*)+$", re.IGNORECASE)
-"""Recorders number the files of a recording one after the other, at the end of their names."""
 OpenFile = Callable[[Path, ReadingParameters], LogFile]
 
 
@@ -293,7 +291,7 @@ class FileLog(MessageSource):
 
     def _sequences(self) -> list[list[int]]:
         """Files that a recorder wrote one after the other; one alone where it is not known."""
-        numbered = [_LAST_NUMBER.search(file.path.name) for file in self._files]
+        numbered = [LAST_NUMBER.search(file.path.name) for file in self._files]
         numbers = [int(found[1]) for found in numbered if found is not None]
         if len(numbers) < len(self._files) or np.any(np.diff(sorted(numbers)) != 1):
             return [[number] for number in range(len(self._files))]

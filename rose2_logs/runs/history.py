@@ -161,6 +161,11 @@ class RunSummary:
         """The map from which on what was known of the layout was that of the last one; None as above."""
         return self.convergence.known_final
 
+    def is_last(self, since: SnapshotRef) -> bool:
+        """Whether something held in the last map only, of several: so it may change again."""
+        last = self.histories.last
+        return self.totals.snapshots > 1 and last is not None and since.snapshot == last.snapshot
+
     def median_coverage(self, since: Mapping[int, SnapshotRef]) -> float | None:
         """Median coverage, over the last map's rooms, from which on something held; None if it never did."""
         tracks = self.histories.in_last_map

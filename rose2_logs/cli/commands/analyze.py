@@ -232,7 +232,6 @@ def _part(part: RunSummary) -> str:
 
 def _since(since: SnapshotRef, summary: RunSummary) -> str:
     """Say from when on something held."""
-    last = summary.histories.last
-    if summary.totals.snapshots > 1 and last is not None and since.snapshot == last.snapshot:
+    if summary.is_last(since):
         return "only in the last map: take the rooms as preliminary"
     return f"from {since.coverage:.1%} coverage on, {duration(since.time_s)}"

@@ -43,15 +43,14 @@ def summary_text(info: RunInfo, summary: RunSummary, name_of: NameOf = room_name
     ]
     text += [_parts_text(parts)] if parts else []
     final = summary.layout_final
-    last = None if maps == 1 or histories.last is None else histories.last.snapshot
     text.append(
         "**The layout still changed up to the last map**: take the rooms as preliminary."
-        if final is None or final.snapshot == last
+        if final is None or summary.is_last(final)
         else f"The layout was as in the end **from {_percent(final.coverage)} coverage on** "
         f"({_duration(final.time_s)})."
     )
     known = summary.known_final
-    if known is not None and known.snapshot != last and known != final:
+    if known is not None and not summary.is_last(known) and known != final:
         text[-1] += (
             f" What was known of it was right **from {_percent(known.coverage)} coverage on** "
             f"({_duration(known.time_s)})."
